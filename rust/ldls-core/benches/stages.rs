@@ -1,0 +1,113 @@
+//! Each stage of the method and all of it, on a made-up street of 20 instances: `cargo bench`.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use ldls_core::{
+    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, diffuse,
+    keep_largest_components, segment,
+};
+use std::hint::black_box;
+
+const HEIGHT: usize = 375;
+const WIDTH: usize = 1242;
+const INSTANCES: usize = 20;
+const SIZES: [usize; 3] = [10_000, 100_000, 1_000_000];
+
+/// `n` points in view, scan line by scan line: ground below, a wall ahead, and a pillar for each instance.
+fn street(n: usize) -> Vec<f32> {
+    let lines = 64.max(n / 4000);
+    let columns = n / lines;
+    let mut points = Vec::with_capacity(3 * n);
+    for line in 0..lines {
+        let pitch = 0.03 - 0.25 * line as f32 / lines as f32;
+        for column in 0..columns {
+            let yaw = 0.7 * (0.5 - column as f32 / columns as f32);
+            let noise = 0.02 * ((column * 7919 + line * 104_729) % 1000) as f32 / 1000.0;
+            let pillar = column * INSTANCES / columns;
+            let on_pillar = (column * INSTANCES * 3 / columns) % 3 == 1;
+            let wall = if on_pillar { 8.0 + pillar as f32 } else { 40.0 };
+            let ground = if pitch < 0.0 {
+                -1.7 / pitch
+            } else {
+                f32::INFINITY
+            };
+            let range = wall.min(ground) + noise;
+            points.extend([range * yaw.cos(), range * yaw.sin(), range * pitch]);
+        }
+    }
+    points
+}
+
+fn camera() -> Camera {
+    let projection = [720., 0., 620., 0., 0., 720., 180., 0., 0., 0., 1., 0.];
+    let t_camera_lidar = [
+        0., -1., 0., 0., 0., 0., -1., -0.1, 1., 0., 0., -0.3, 0., 0., 0., 1.,
+    ];
+    Camera::new(&projection, &t_camera_lidar, 0.1).expect("a camera")
+}
+
+fn masks() -> InstanceMasks {
+    let rles = (0..INSTANCES).map(|instance| {
+        let left = (620.0 - 720.0 * (0.35 - 0.7 * (instance as f64 + 0.3) / 20.0).tan()) as usize;
+        let pixels: Vec<bool> = (0..HEIGHT * WIDTH)
+            .map(|i| (left..left + 11).contains(&(i % WIDTH)) && (150..300).contains(&(i / WIDTH)))
+            .collect();
+        Rle::from_pixels(HEIGHT, WIDTH, &pixels).expect("a mask")
+    });
+    InstanceMasks::new(HEIGHT, WIDTH, rles.collect()).expect("masks")
+}
+
+fn stages(criterion: &mut Criterion) {
+    let (camera, masks, params) = (camera(), masks(), Params::paper());
+    for n in SIZES {
+        let values = street(n);
+        let cloud = Cloud::F32 {
+            values: &values,
+            columns: 3,
+        };
+        let view = camera.view(cloud, HEIGHT, WIDTH, false).expect("a view");
+        let mut labels = masks
+            .pixel_labels(&view.uv, params.window, params.pixel_weight)
+            .expect("labels");
+        let neighbors = Neighbors::search(&view.points, params.neighbors);
+        let mut graph = PointGraph::from_neighbors(view.points.len(), &neighbors, params.sigma);
+        graph.normalize_rows(&mut labels).expect("rows");
+        let diffused =
+            diffuse(&graph, &labels, masks.len() + 1, params.iterations).expect("labels");
+
+        let mut group = criterion.benchmark_group("stage");
+        group
+            .throughput(Throughput::Elements(view.points.len() as u64))
+            .sample_size(10);
+        group.bench_function(BenchmarkId::new("project", n), |b| {
+            b.iter(|| black_box(camera.view(cloud, HEIGHT, WIDTH, false)));
+        });
+        group.bench_function(BenchmarkId::new("pixel labels", n), |b| {
+            b.iter(|| black_box(masks.pixel_labels(&view.uv, params.window, params.pixel_weight)));
+        });
+        group.bench_function(BenchmarkId::new("neighbors", n), |b| {
+            b.iter(|| black_box(Neighbors::search(&view.points, params.neighbors)));
+        });
+        group.bench_function(BenchmarkId::new("graph", n), |b| {
+            b.iter(|| {
+                black_box(PointGraph::from_neighbors(
+                    view.points.len(),
+                    &neighbors,
+                    params.sigma,
+                ))
+            });
+        });
+        group.bench_function(BenchmarkId::new("diffusion", n), |b| {
+            b.iter(|| black_box(diffuse(&graph, &labels, masks.len() + 1, params.iterations)));
+        });
+        group.bench_function(BenchmarkId::new("components", n), |b| {
+            b.iter(|| black_box(keep_largest_components(&graph, &diffused.labels)));
+        });
+        group.bench_function(BenchmarkId::new("whole frame", n), |b| {
+            b.iter(|| black_box(segment(cloud, &masks, &camera, &params, false)));
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, stages);
+criterion_main!(benches);

@@ -1,0 +1,36 @@
+//! Label diffusion lidar segmentation (LDLS): instance masks of a camera image become labels of lidar points.
+//!
+//! The method is that of Wang et al., "LDLS: 3-D Object Segmentation Through Label Diffusion From 2-D Images",
+//! RA-L 2019. [`segment`] runs all of it; every step is also a function of its own. Nothing here knows of Python,
+//! of files or of the 2D segmenter that made the masks.
+//!
+//! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is
+//! taken by one thread in one order.
+
+mod camera;
+mod cloud;
+mod components;
+mod diffusion;
+mod error;
+mod graph;
+mod masks;
+mod neighbors;
+mod params;
+mod polygon;
+mod rle;
+mod segment;
+
+pub use camera::{Camera, View, ViewCounts};
+pub use cloud::Cloud;
+pub use components::keep_largest_components;
+pub use diffusion::{Convergence, Diffused, diffuse, likelihoods};
+pub use error::Error;
+pub use graph::PointGraph;
+pub use masks::{InstanceMasks, PixelLabels};
+pub use neighbors::Neighbors;
+pub use params::Params;
+pub use rle::Rle;
+pub use segment::{Report, Segmentation, Timings, segment};
+
+/// Result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;

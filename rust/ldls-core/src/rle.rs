@@ -1,0 +1,363 @@
+//! One mask as run lengths: column by column, runs of zeros and ones in turn, zeros first, as COCO has it.
+
+use crate::{Error, Result};
+
+/// Most pixels of an image: what Pillow takes for a decompression bomb.
+pub(crate) const MAX_PIXELS: usize = 178_956_970;
+
+/// A binary mask of `height` x `width` pixels as column-major run lengths.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rle {
+    height: usize,
+    width: usize,
+    runs: Vec<u32>,
+}
+
+impl Rle {
+    /// A mask from its run lengths, which must cover the image exactly.
+    ///
+    /// # Errors
+    /// [`Error::ImageSize`] and [`Error::RunSum`].
+    pub fn from_runs(height: usize, width: usize, runs: Vec<u32>) -> Result<Self> {
+        let pixels = check_size(height, width)?;
+        let found: u64 = runs.iter().map(|&run| u64::from(run)).sum();
+        if found == pixels as u64 {
+            return Ok(Self {
+                height,
+                width,
+                runs,
+            });
+        }
+        Err(Error::RunSum {
+            found,
+            expected: pixels as u64,
+            height,
+            width,
+        })
+    }
+
+    /// A mask from COCO's compressed string: 5 bits a byte, least significant first, bit 5 set where more follow,
+    /// offset by 48; from the third run on, the difference to the run before last.
+    ///
+    /// # Errors
+    /// [`Error::RleString`] with the offset of the byte at fault, and as [`Rle::from_runs`].
+    pub fn from_compressed(height: usize, width: usize, counts: &[u8]) -> Result<Self> {
+        check_size(height, width)?;
+        let mut runs: Vec<u32> = Vec::new();
+        let mut offset = 0;
+        while offset < counts.len() {
+            let (value, next) = read_number(counts, offset)?;
+            let before_last = if runs.len() > 2 {
+                i64::from(runs[runs.len() - 2])
+            } else {
+                0
+            };
+            let run = u32::try_from(value + before_last).map_err(|_| Error::RleString {
+                offset,
+                problem: "the run is negative or over 32 bits",
+            })?;
+            runs.push(run);
+            offset = next;
+        }
+        Self::from_runs(height, width, runs)
+    }
+
+    /// A mask from its pixels, row by row: `true` where the object is.
+    ///
+    /// # Errors
+    /// [`Error::ImageSize`], and [`Error::Mismatch`] where `pixels` is not `height * width` long.
+    pub fn from_pixels(height: usize, width: usize, pixels: &[bool]) -> Result<Self> {
+        if check_size(height, width)? != pixels.len() {
+            let problem = format!("{} values, expected {height} x {width}", pixels.len());
+            return Err(Error::Mismatch {
+                name: "mask",
+                problem,
+            });
+        }
+        let columns =
+            (0..width).flat_map(|column| (0..height).map(move |row| pixels[row * width + column]));
+        let mut runs = Vec::new();
+        let mut inside = false;
+        let mut run = 0;
+        for pixel in columns {
+            if pixel != inside {
+                runs.push(run);
+                inside = pixel;
+                run = 0;
+            }
+            run += 1;
+        }
+        runs.push(run);
+        Ok(Self {
+            height,
+            width,
+            runs,
+        })
+    }
+
+    /// A mask from the positions, in column-major order, at which it switches between zeros and ones. Two switches at
+    /// one place undo each other.
+    pub(crate) fn from_switches(height: usize, width: usize, mut switches: Vec<u32>) -> Self {
+        switches.sort_unstable();
+        let end = (height * width) as u32;
+        let mut runs = Vec::new();
+        let mut start = 0;
+        let mut at = 0;
+        while at < switches.len() && switches[at] < end {
+            if switches.get(at + 1) == Some(&switches[at]) {
+                at += 2;
+                continue;
+            }
+            runs.push(switches[at] - start);
+            start = switches[at];
+            at += 1;
+        }
+        runs.push(end - start);
+        Self {
+            height,
+            width,
+            runs,
+        }
+    }
+
+    /// Where `self` or `other`, of the same size, has a pixel.
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        assert_eq!(
+            (self.height, self.width),
+            (other.height, other.width),
+            "masks of one image"
+        );
+        let mut spans: Vec<(u32, u32)> = self.spans().chain(other.spans()).collect();
+        spans.sort_unstable();
+        let mut switches = Vec::with_capacity(2 * spans.len());
+        let mut open: Option<(u32, u32)> = None;
+        for (start, end) in spans {
+            open = match open {
+                Some((first, last)) if start <= last => Some((first, last.max(end))),
+                done => {
+                    switches.extend(done.into_iter().flat_map(|(first, last)| [first, last]));
+                    Some((start, end))
+                }
+            };
+        }
+        switches.extend(open.into_iter().flat_map(|(first, last)| [first, last]));
+        Self::from_switches(self.height, self.width, switches)
+    }
+
+    /// Rows of the image.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Columns of the image.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Run lengths, zeros first.
+    pub fn runs(&self) -> &[u32] {
+        &self.runs
+    }
+
+    /// Number of pixels of the object.
+    pub fn area(&self) -> usize {
+        self.spans()
+            .map(|(start, end)| (end - start) as usize)
+            .sum()
+    }
+
+    /// Half-open spans of the object's pixels, positions counted column by column.
+    pub fn spans(&self) -> impl Iterator<Item = (u32, u32)> {
+        let mut at = 0;
+        self.runs
+            .chunks(2)
+            .map(move |pair| {
+                let start = at + pair[0];
+                at = start + pair.get(1).copied().unwrap_or(0);
+                (start, at)
+            })
+            .filter(|(start, end)| start < end)
+    }
+
+    /// The smallest box that holds the object: top, left, height, width; all 0 where it is empty.
+    pub fn bounding_box(&self) -> [usize; 4] {
+        let mut rows = (usize::MAX, 0);
+        let mut columns = (usize::MAX, 0);
+        for (start, end) in self.spans() {
+            let [first, last] =
+                [start as usize, end as usize - 1].map(|at| (at / self.height, at % self.height));
+            columns = (columns.0.min(first.0), columns.1.max(last.0));
+            let spans_columns = first.0 != last.0;
+            let (top, bottom) = if spans_columns {
+                (0, self.height - 1)
+            } else {
+                (first.1, last.1)
+            };
+            rows = (rows.0.min(top), rows.1.max(bottom));
+        }
+        if rows.0 == usize::MAX {
+            return [0; 4];
+        }
+        [
+            rows.0,
+            columns.0,
+            rows.1 + 1 - rows.0,
+            columns.1 + 1 - columns.0,
+        ]
+    }
+
+    /// The pixels of the box top, left, height, width, row by row.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where the box leaves the image.
+    pub fn crop(&self, [top, left, height, width]: [usize; 4]) -> Result<Vec<bool>> {
+        if top + height > self.height || left + width > self.width {
+            let problem = format!(
+                "box {height} x {width} at ({top}, {left}) leaves {} x {}",
+                self.height, self.width
+            );
+            return Err(Error::Mismatch {
+                name: "crop",
+                problem,
+            });
+        }
+        let mut pixels = vec![false; height * width];
+        for at in self
+            .spans()
+            .flat_map(|(start, end)| start as usize..end as usize)
+        {
+            let (column, row) = (at / self.height, at % self.height);
+            if (top..top + height).contains(&row) && (left..left + width).contains(&column) {
+                pixels[(row - top) * width + column - left] = true;
+            }
+        }
+        Ok(pixels)
+    }
+}
+
+/// Number of pixels, if an image may have so many.
+pub(crate) fn check_size(height: usize, width: usize) -> Result<usize> {
+    match height.checked_mul(width) {
+        Some(pixels) if (1..=MAX_PIXELS).contains(&pixels) => Ok(pixels),
+        _ => Err(Error::ImageSize {
+            height,
+            width,
+            limit: MAX_PIXELS,
+        }),
+    }
+}
+
+/// The signed number that starts at `offset`, and the offset behind it.
+fn read_number(counts: &[u8], offset: usize) -> Result<(i64, usize)> {
+    let mut value = 0_i64;
+    for digit in 0..7 {
+        let at = offset + digit;
+        let byte = *counts.get(at).ok_or(Error::RleString {
+            offset: at,
+            problem: "the string ends within a number",
+        })?;
+        if !(48..=111).contains(&byte) {
+            return Err(Error::RleString {
+                offset: at,
+                problem: "the byte is outside 48 to 111",
+            });
+        }
+        let bits = i64::from(byte - 48);
+        value |= (bits & 0x1f) << (5 * digit);
+        let more = bits & 0x20 != 0;
+        if !more {
+            let negative = bits & 0x10 != 0;
+            let sign = if negative { -1 << (5 * (digit + 1)) } else { 0 };
+            return Ok((value | sign, at + 1));
+        }
+    }
+    Err(Error::RleString {
+        offset,
+        problem: "the number has more than 7 digits",
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn pixels_of(rle: &Rle) -> Vec<bool> {
+        rle.crop([0, 0, rle.height(), rle.width()]).unwrap()
+    }
+
+    #[test]
+    fn runs_go_down_the_columns() {
+        let rle = Rle::from_runs(2, 3, vec![1, 2, 3]).unwrap();
+        assert_eq!(pixels_of(&rle), [false, true, false, true, false, false]);
+        assert_eq!(rle.bounding_box(), [0, 0, 2, 2]);
+        assert_eq!(rle.area(), 2);
+    }
+
+    #[test]
+    fn runs_must_cover_the_image() {
+        let error = Rle::from_runs(10, 10, vec![3, 5]).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("runs sum to 8, size 10 x 10 needs 100"),
+            "{error}"
+        );
+        assert!(Rle::from_runs(10, 10, vec![]).is_err());
+        assert!(Rle::from_runs(1 << 31, 1 << 31, vec![1]).is_err());
+    }
+
+    #[test]
+    fn compressed_strings_with_faults_are_refused_with_the_offset() {
+        for (counts, at) in [
+            (&b"!"[..], 0),
+            (b"PP", 2),
+            (b"\x7f", 0),
+            (b"PPPPPPPP", 0),
+            (b"@", 0),
+        ] {
+            match Rle::from_compressed(4, 4, counts).unwrap_err() {
+                Error::RleString { offset, .. } => assert_eq!(offset, at, "{counts:?}"),
+                other => panic!("{counts:?}: {other}"),
+            }
+        }
+    }
+
+    #[test]
+    fn an_empty_mask_has_an_empty_box() {
+        let rle = Rle::from_pixels(3, 4, &[false; 12]).unwrap();
+        assert_eq!(
+            (rle.runs(), rle.area(), rle.bounding_box()),
+            (&[12][..], 0, [0; 4])
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn pixels_survive_the_round_trip((height, width, pixels) in (1_usize..9, 1_usize..9).prop_flat_map(
+            |(h, w)| (Just(h), Just(w), proptest::collection::vec(any::<bool>(), h * w))
+        )) {
+            let rle = Rle::from_pixels(height, width, &pixels).unwrap();
+            prop_assert_eq!(&pixels_of(&rle), &pixels);
+            prop_assert_eq!(rle.area(), pixels.iter().filter(|&&p| p).count());
+            prop_assert_eq!(&rle, &Rle::from_runs(height, width, rle.runs().to_vec()).unwrap());
+        }
+
+        #[test]
+        fn a_union_has_the_pixels_of_both(a in proptest::collection::vec(any::<bool>(), 35),
+                                          b in proptest::collection::vec(any::<bool>(), 35)) {
+            let both = Rle::from_pixels(5, 7, &a).unwrap().union(&Rle::from_pixels(5, 7, &b).unwrap());
+            let expected: Vec<bool> = a.iter().zip(&b).map(|(&p, &q)| p || q).collect();
+            prop_assert_eq!(pixels_of(&both), expected);
+        }
+
+        #[test]
+        fn no_string_panics(counts in proptest::collection::vec(40_u8..120, 0..40)) {
+            let _ = Rle::from_compressed(20, 20, &counts);
+        }
+    }
+}

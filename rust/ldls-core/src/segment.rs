@@ -1,0 +1,167 @@
+//! The method on one screen: points, masks and a camera in, one label a point out.
+
+use crate::{
+    Camera, Cloud, Convergence, Error, InstanceMasks, Neighbors, Params, PointGraph, Result, View,
+    ViewCounts, diffuse, keep_largest_components,
+};
+use std::time::{Duration, Instant};
+
+/// Label of points that the image does not see.
+const OUT_OF_VIEW: i32 = -1;
+/// Most edges of a graph: what 32 bits index.
+const MAX_EDGES: u64 = u32::MAX as u64;
+
+/// Labels of all points of a cloud.
+#[derive(Debug, Clone)]
+pub struct Segmentation {
+    /// Label of every point: -1 out of view, 0 background, m instance m.
+    pub labels: Vec<i32>,
+    /// The same before outlier removal.
+    pub diffused_labels: Vec<i32>,
+    /// Share of the winner in the values of all labels at a point; 0 out of view.
+    pub confidence: Vec<f32>,
+    /// Points in view: their rows, coordinates and pixels.
+    pub view: View,
+    /// What was noticed on the way.
+    pub report: Report,
+    /// How long each step took.
+    pub timings: Timings,
+}
+
+/// What a caller should know about the input and the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Report {
+    /// Points left out, and why.
+    pub counts: ViewCounts,
+    /// Points in view that share their place with another one in view.
+    pub duplicates: usize,
+    /// Whether every point has more than K copies, so that the graph falls into islands.
+    pub only_islands: bool,
+    /// Neighbours a point really has.
+    pub k_effective: usize,
+    /// How far the diffusion came.
+    pub convergence: Convergence,
+}
+
+/// Time of each step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Timings {
+    /// Projection to pixels.
+    pub project: Duration,
+    /// Labels of the pixels around each point.
+    pub pixel_labels: Duration,
+    /// K nearest neighbours.
+    pub neighbors: Duration,
+    /// Point graph and row sums.
+    pub graph: Duration,
+    /// Diffusion and argmax.
+    pub diffusion: Duration,
+    /// Outlier removal.
+    pub components: Duration,
+}
+
+/// Segments `cloud` by the instance masks of the image that `camera` took.
+///
+/// Points at exactly (0, 0, 0) are taken for missing returns unless `keep_origin` is set.
+///
+/// # Errors
+/// Whatever [`Params::check`] and [`Camera::view`] refuse, and [`Error::TooManyPoints`].
+pub fn segment(
+    cloud: Cloud,
+    masks: &InstanceMasks,
+    camera: &Camera,
+    params: &Params,
+    keep_origin: bool,
+) -> Result<Segmentation> {
+    params.check()?;
+    check_edges(cloud.len(), params.neighbors)?;
+    let mut clock = Stopwatch::start();
+
+    let view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
+    let project = clock.lap();
+    let mut pixels = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
+    let pixel_labels = clock.lap();
+    let nearest = Neighbors::search(&view.points, params.neighbors);
+    let neighbors = clock.lap();
+    let mut point_graph = PointGraph::from_neighbors(view.points.len(), &nearest, params.sigma);
+    point_graph.normalize_rows(&mut pixels)?;
+    let graph = clock.lap();
+    let diffused = diffuse(&point_graph, &pixels, masks.len() + 1, params.iterations)?;
+    let diffusion = clock.lap();
+    let kept = if params.remove_outliers {
+        Some(keep_largest_components(&point_graph, &diffused.labels)?)
+    } else {
+        None
+    };
+    let components = clock.lap();
+
+    let whole_cloud = |labels: &[u32]| {
+        scatter(
+            cloud.len(),
+            &view,
+            OUT_OF_VIEW,
+            labels.iter().map(|&m| m as i32),
+        )
+    };
+    Ok(Segmentation {
+        labels: whole_cloud(kept.as_ref().unwrap_or(&diffused.labels)),
+        diffused_labels: whole_cloud(&diffused.labels),
+        confidence: scatter(cloud.len(), &view, 0.0, diffused.confidence.iter().copied()),
+        report: Report {
+            counts: view.counts,
+            duplicates: nearest.duplicates(),
+            only_islands: nearest.only_islands(),
+            k_effective: nearest.k,
+            convergence: diffused.convergence,
+        },
+        timings: Timings {
+            project,
+            pixel_labels,
+            neighbors,
+            graph,
+            diffusion,
+            components,
+        },
+        view,
+    })
+}
+
+fn check_edges(points: usize, neighbors: usize) -> Result<()> {
+    if (points as u64).saturating_mul(neighbors as u64 + 1) <= MAX_EDGES {
+        return Ok(());
+    }
+    Err(Error::TooManyPoints {
+        points,
+        neighbors,
+        limit: MAX_EDGES,
+        of: "edges",
+    })
+}
+
+/// Values of the points in view, laid out over the whole cloud.
+fn scatter<T: Copy>(
+    n: usize,
+    view: &View,
+    elsewhere: T,
+    values: impl Iterator<Item = T>,
+) -> Vec<T> {
+    let mut all = vec![elsewhere; n];
+    for (&index, value) in view.indices.iter().zip(values) {
+        all[index as usize] = value;
+    }
+    all
+}
+
+struct Stopwatch(Instant);
+
+impl Stopwatch {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Time since the start or the last lap.
+    fn lap(&mut self) -> Duration {
+        let now = Instant::now();
+        now - std::mem::replace(&mut self.0, now)
+    }
+}
