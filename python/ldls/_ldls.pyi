@@ -1,0 +1,129 @@
+"""Types of the private extension module. Arrays are C-contiguous; the callers in this package see to that."""
+
+from typing import Any, TypeAlias, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Params: TypeAlias = tuple[int, float, float, int, int | None, bool]
+_Csr: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]
+_Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
+
+__all__ = [
+    "Masks",
+    "Rle",
+    "SegmentationArrays",
+    "__version__",
+    "check_camera",
+    "check_params",
+    "default_threads",
+    "diffuse",
+    "direct_labels",
+    "largest_components",
+    "neighbors",
+    "normalize_rows",
+    "panic_in_worker",
+    "pixel_labels",
+    "point_graph",
+    "project",
+    "segment",
+]
+
+__version__: str
+
+@final
+class Rle:
+    @staticmethod
+    def from_runs(height: int, width: int, runs: NDArray[np.uint32]) -> Rle: ...
+    @staticmethod
+    def from_compressed(height: int, width: int, counts: bytes) -> Rle: ...
+    @staticmethod
+    def from_polygons(height: int, width: int, polygons: list[list[float]]) -> Rle: ...
+    @staticmethod
+    def from_pixels(pixels: NDArray[np.bool_]) -> Rle: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def area(self) -> int: ...
+    @property
+    def bounding_box(self) -> tuple[int, int, int, int]: ...
+    def runs(self) -> NDArray[np.uint32]: ...
+    def crop(self, top: int, left: int, height: int, width: int) -> NDArray[np.bool_]: ...
+
+@final
+class Masks:
+    def __new__(cls, height: int, width: int, masks: list[Rle]) -> Masks: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def width(self) -> int: ...
+    def __len__(self) -> int: ...
+    def rle(self, index: int) -> Rle: ...
+
+@final
+class SegmentationArrays:
+    @property
+    def labels(self) -> NDArray[np.int32]: ...
+    @property
+    def diffused_labels(self) -> NDArray[np.int32]: ...
+    @property
+    def confidence(self) -> NDArray[np.float32]: ...
+    @property
+    def in_view(self) -> NDArray[np.int64]: ...
+    @property
+    def pixels(self) -> NDArray[np.float64]: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+    @property
+    def timings(self) -> dict[str, float]: ...
+
+def segment(
+    points: _Points,
+    masks: Masks,
+    projection: NDArray[np.float64],
+    t_camera_lidar: NDArray[np.float64],
+    min_depth_m: float,
+    params: _Params,
+    keep_origin: bool,
+    threads: int | None,
+) -> SegmentationArrays: ...
+def check_params(params: _Params, threads: int | None) -> None: ...
+def check_camera(projection: NDArray[np.float64], t_camera_lidar: NDArray[np.float64], min_depth_m: float) -> None: ...
+def default_threads() -> int: ...
+def panic_in_worker() -> None: ...
+def project(
+    points: _Points,
+    projection: NDArray[np.float64],
+    t_camera_lidar: NDArray[np.float64],
+    min_depth_m: float,
+    height: int,
+    width: int,
+    keep_origin: bool,
+    threads: int | None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
+def neighbors(
+    points: NDArray[np.float64], k: int, threads: int | None
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]: ...
+def point_graph(
+    indices: NDArray[np.uint32],
+    squared_distances: NDArray[np.float32],
+    sigma: float,
+    threads: int | None,
+) -> _Csr: ...
+def pixel_labels(
+    pixels: NDArray[np.float64],
+    masks: Masks,
+    window: int,
+    pixel_weight: float,
+    threads: int | None,
+) -> tuple[_Csr, NDArray[np.float32]]: ...
+def direct_labels(pixels: NDArray[np.float64], masks: Masks) -> NDArray[np.int32]: ...
+def normalize_rows(
+    point_graph: _Csr, labels: _Csr, mass: NDArray[np.float32]
+) -> tuple[_Csr, tuple[_Csr, NDArray[np.float32]]]: ...
+def diffuse(
+    point_graph: _Csr, labels: _Csr, n_labels: int, iterations: int | None, threads: int | None
+) -> tuple[NDArray[np.float32], int, float]: ...
+def largest_components(point_graph: _Csr, labels: NDArray[np.uint32]) -> NDArray[np.int32]: ...

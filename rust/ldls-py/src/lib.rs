@@ -1,0 +1,37 @@
+//! The private extension module `ldls._ldls`. It extracts arguments, checks them, releases the GIL, calls `ldls_core`
+//! and wraps what comes back. No algorithm lives here.
+
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "pyo3 hands arguments over by value"
+)]
+
+mod arrays;
+mod call;
+mod errors;
+mod masks;
+mod segment;
+mod stages;
+
+/// Core of `ldls`; private, use `ldls`.
+#[pyo3::pymodule]
+mod _ldls {
+    #[pymodule_export]
+    use crate::call::{default_threads, panic_in_worker};
+    #[pymodule_export]
+    use crate::masks::{Masks, Rle};
+    #[pymodule_export]
+    use crate::segment::{SegmentationArrays, check_camera, check_params, segment};
+    #[pymodule_export]
+    use crate::stages::{
+        diffuse, direct_labels, largest_components, neighbors, normalize_rows, pixel_labels,
+        point_graph, project,
+    };
+
+    #[pymodule_init]
+    fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        use pyo3::types::PyModuleMethods;
+        crate::call::remember_panics();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,147 @@
+//! Masks as Python objects.
+
+use crate::arrays::{matrix, slice};
+use crate::call::run;
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+
+/// One mask as column-major run lengths.
+#[pyclass(frozen, module = "ldls._ldls", skip_from_py_object)]
+#[derive(Clone)]
+pub struct Rle(pub ldls_core::Rle);
+
+#[pymethods]
+impl Rle {
+    #[staticmethod]
+    fn from_runs(
+        py: Python<'_>,
+        height: usize,
+        width: usize,
+        runs: PyReadonlyArray1<'_, u32>,
+    ) -> PyResult<Self> {
+        let runs = slice(py, "counts", &runs)?.to_vec();
+        run(py, None, || ldls_core::Rle::from_runs(height, width, runs)).map(Self)
+    }
+
+    #[staticmethod]
+    fn from_compressed(
+        py: Python<'_>,
+        height: usize,
+        width: usize,
+        counts: &[u8],
+    ) -> PyResult<Self> {
+        run(py, None, || {
+            ldls_core::Rle::from_compressed(height, width, counts)
+        })
+        .map(Self)
+    }
+
+    #[staticmethod]
+    fn from_polygons(
+        py: Python<'_>,
+        height: usize,
+        width: usize,
+        polygons: Vec<Vec<f64>>,
+    ) -> PyResult<Self> {
+        run(py, None, || {
+            ldls_core::Rle::from_polygons(height, width, &polygons)
+        })
+        .map(Self)
+    }
+
+    #[staticmethod]
+    fn from_pixels(py: Python<'_>, pixels: PyReadonlyArray2<'_, bool>) -> PyResult<Self> {
+        let [height, width] = [pixels.shape()[0], pixels.shape()[1]];
+        let pixels = slice(py, "mask", &pixels)?;
+        run(py, None, || {
+            ldls_core::Rle::from_pixels(height, width, pixels)
+        })
+        .map(Self)
+    }
+
+    #[getter]
+    fn height(&self) -> usize {
+        self.0.height()
+    }
+
+    #[getter]
+    fn width(&self) -> usize {
+        self.0.width()
+    }
+
+    #[getter]
+    fn area(&self) -> usize {
+        self.0.area()
+    }
+
+    #[getter]
+    fn bounding_box(&self) -> (usize, usize, usize, usize) {
+        self.0.bounding_box().into()
+    }
+
+    fn runs(&self, py: Python<'_>) -> Py<PyArray1<u32>> {
+        self.0.runs().to_vec().into_pyarray(py).unbind()
+    }
+
+    fn crop(
+        &self,
+        py: Python<'_>,
+        top: usize,
+        left: usize,
+        height: usize,
+        width: usize,
+    ) -> PyResult<Py<PyArray2<bool>>> {
+        let pixels = run(py, None, || self.0.crop([top, left, height, width]))?;
+        if width == 0 {
+            return Ok(PyArray2::zeros(py, [height, width], false).unbind());
+        }
+        matrix(py, pixels, width)
+    }
+}
+
+/// The masks of one image.
+#[pyclass(frozen, module = "ldls._ldls")]
+pub struct Masks(pub ldls_core::InstanceMasks);
+
+#[pymethods]
+impl Masks {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        height: usize,
+        width: usize,
+        masks: Vec<PyRef<'_, Rle>>,
+    ) -> PyResult<Self> {
+        let masks = masks.iter().map(|mask| mask.0.clone()).collect();
+        run(py, None, || {
+            ldls_core::InstanceMasks::new(height, width, masks)
+        })
+        .map(Self)
+    }
+
+    #[getter]
+    fn height(&self) -> usize {
+        self.0.height()
+    }
+
+    #[getter]
+    fn width(&self) -> usize {
+        self.0.width()
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+
+    fn rle(&self, index: usize) -> PyResult<Rle> {
+        let mask = self
+            .0
+            .masks()
+            .get(index)
+            .ok_or_else(|| PyIndexError::new_err("no such mask"))?;
+        Ok(Rle(mask.clone()))
+    }
+}
