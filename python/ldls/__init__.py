@@ -1,0 +1,57 @@
+"""LDLS: 2D instance masks become instance labels of lidar points, by label diffusion."""
+
+from ldls import stages
+from ldls._ldls import __version__
+from ldls.camera import Camera
+from ldls.errors import (
+    CalibrationError,
+    CorruptFileError,
+    DtypeError,
+    FileFormatError,
+    InputError,
+    InternalError,
+    LdlsError,
+    LimitError,
+    MaskError,
+    NonFiniteError,
+    ParameterError,
+    ShapeError,
+    TruncatedFileError,
+    UnsafeFileError,
+    UnsupportedFormatError,
+)
+from ldls.io import read_points
+from ldls.masks import InstanceMasks
+from ldls.objects import OrientedBox, SegmentedObject
+from ldls.params import Params
+from ldls.report import Report
+from ldls.segmentation import Segmentation, segment
+
+__all__ = [
+    "CalibrationError",
+    "Camera",
+    "CorruptFileError",
+    "DtypeError",
+    "FileFormatError",
+    "InputError",
+    "InstanceMasks",
+    "InternalError",
+    "LdlsError",
+    "LimitError",
+    "MaskError",
+    "NonFiniteError",
+    "OrientedBox",
+    "ParameterError",
+    "Params",
+    "Report",
+    "Segmentation",
+    "SegmentedObject",
+    "ShapeError",
+    "TruncatedFileError",
+    "UnsafeFileError",
+    "UnsupportedFormatError",
+    "__version__",
+    "read_points",
+    "segment",
+    "stages",
+]

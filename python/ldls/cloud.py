@@ -1,0 +1,33 @@
+"""Point arrays from users, checked once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls.errors import DtypeError, ShapeError
+
+MAX_COLUMNS = 64
+"""Wider arrays are clouds lying on their side."""
+
+Points = NDArray[np.float32] | NDArray[np.float64]
+
+
+def as_points(points: ArrayLike) -> Points:
+    """`points` as a C-contiguous (N, >= 3) array of float32 or float64, copied only where it must be.
+
+    Raises:
+        DtypeError: The values are not float32 or float64, or are masked.
+        ShapeError: The array is not (N, >= 3).
+    """
+    if isinstance(points, np.ma.MaskedArray):
+        raise DtypeError("points: got a masked array; pass points.filled(numpy.nan)")
+    array = np.asarray(points)
+    if array.dtype.kind != "f" or array.dtype.itemsize not in (4, 8):
+        fix = "a plain array of rows" if array.dtype.kind in "OV" else "points.astype(numpy.float32)"
+        raise DtypeError(f"points: expected float32 or float64, got {array.dtype}; pass {fix}")
+    if array.ndim != 2 or not 3 <= array.shape[1] <= MAX_COLUMNS:
+        transposed = array.ndim == 2 and 3 <= array.shape[0] <= MAX_COLUMNS
+        fix = "; transpose?" if transposed else ""
+        raise ShapeError(f"points: expected shape (N, 3) or wider, got {array.shape}{fix}")
+    return np.require(array, array.dtype.newbyteorder("="), ["C", "A"])

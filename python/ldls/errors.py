@@ -1,0 +1,123 @@
+"""Errors and warnings of `ldls`, each with a stable `code`.
+
+Messages name the argument or file, what was found, what was expected, and how to mend it. A missing file stays
+`FileNotFoundError`, a full disk `OSError`, and a lack of memory `MemoryError`.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class LdlsError(Exception):
+    """Whatever `ldls` raises of its own."""
+
+    code: ClassVar[str] = "ldls"
+
+
+class InputError(LdlsError, ValueError):
+    """An argument that cannot be used."""
+
+    code = "input"
+
+
+class ShapeError(InputError):
+    """An array of the wrong shape."""
+
+    code = "shape"
+
+
+class DtypeError(InputError, TypeError):
+    """An array of the wrong type."""
+
+    code = "dtype"
+
+
+class NonFiniteError(InputError):
+    """NaN or infinity where `nonfinite="raise"` forbids it."""
+
+    code = "nonfinite"
+
+
+class CalibrationError(InputError):
+    """A calibration that cannot be a camera's."""
+
+    code = "calibration"
+
+
+class MaskError(InputError):
+    """Instance masks that contradict themselves, their image or their categories."""
+
+    code = "mask"
+
+
+class ParameterError(InputError):
+    """A parameter outside its range."""
+
+    code = "parameter"
+
+
+class FileFormatError(LdlsError, ValueError):
+    """A file that is not what its format says."""
+
+    code = "file_format"
+
+
+class TruncatedFileError(FileFormatError):
+    """A file that ends too early."""
+
+    code = "truncated_file"
+
+
+class CorruptFileError(FileFormatError):
+    """A file whose content contradicts itself."""
+
+    code = "corrupt_file"
+
+
+class UnsupportedFormatError(FileFormatError):
+    """A file of a format or variant that is not supported."""
+
+    code = "unsupported_format"
+
+
+class UnsafeFileError(FileFormatError):
+    """A file that would run code or exhaust memory if it were loaded."""
+
+    code = "unsafe_file"
+
+
+class LimitError(LdlsError):
+    """Input that exceeds a stated limit."""
+
+    code = "limit"
+
+
+class InternalError(LdlsError):
+    """A bug in `ldls`; please report it."""
+
+    code = "internal"
+
+
+class LdlsWarning(UserWarning):
+    """Whatever `ldls` warns of."""
+
+
+class NoUsablePoints(LdlsWarning):
+    """No point has finite coordinates."""
+
+
+class PrecisionWarning(LdlsWarning):
+    """Coordinates too large for single precision to resolve."""
+
+
+class ScaleWarning(LdlsWarning):
+    """A cloud so large that its unit is probably not the metre."""
+
+
+class DuplicateWarning(LdlsWarning):
+    """Every point has so many copies that the point graph falls into islands."""
+
+
+class RecoveredFileWarning(LdlsWarning):
+    """A truncated file of which the whole part was read."""

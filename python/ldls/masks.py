@@ -1,0 +1,271 @@
+"""Instance masks of one image, kept as run lengths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls import _ldls
+from ldls.categories import COCO_NAMES
+from ldls.errors import MaskError
+from ldls.io import coco, mask_npz
+
+
+@dataclass(frozen=True, eq=False)
+class InstanceMask:
+    """One instance of an image.
+
+    Attributes:
+        category: Category id.
+        name: Category name.
+        score: Score of the 2D segmenter, 0 to 1.
+        rle: Its pixels as column-major run lengths.
+    """
+
+    category: int
+    name: str
+    score: float
+    rle: _ldls.Rle
+
+    @property
+    def area(self) -> int:
+        """Number of pixels."""
+        return self.rle.area
+
+    @property
+    def bounding_box(self) -> tuple[int, int, int, int]:
+        """(top, left, height, width) in pixels of the smallest box around it; zeros if it is empty."""
+        return self.rle.bounding_box
+
+    def crop(self) -> NDArray[np.bool_]:
+        """(height, width) pixels within the bounding box."""
+        return self.rle.crop(*self.bounding_box)
+
+    def to_array(self) -> NDArray[np.bool_]:
+        """(H, W) pixels of the whole image."""
+        return self.rle.crop(0, 0, self.rle.height, self.rle.width)
+
+
+class InstanceMasks:
+    """Instance masks of one image with category, score and name; instance m is `masks[m - 1]`.
+
+    Masks are kept as run lengths, so memory grows with their outlines and not with the image. They may overlap: a
+    pixel counts for every mask that covers it.
+
+    Attributes:
+        categories: (M,) int32 category ids.
+        scores: (M,) float32 scores, 0 to 1.
+        names: Name of each category id.
+    """
+
+    def __init__(
+        self,
+        rles: Sequence[_ldls.Rle],
+        image_size: tuple[int, int],
+        *,
+        categories: ArrayLike | None = None,
+        scores: ArrayLike | None = None,
+        names: Mapping[int, str] | None = None,
+    ) -> None:
+        """Masks from run lengths; see `from_array`, `from_coco` and `from_npz` for files and arrays."""
+        height, width = image_size
+        self.core = _ldls.Masks(height, width, list(rles))
+        if categories is None:
+            categories, names = np.ones(len(rles), np.int32), names or {1: "object"}
+        self.names = dict(COCO_NAMES if names is None else names)
+        self.categories = _per_mask("categories", categories, len(rles), np.int32)
+        self.scores = _per_mask("scores", 1.0 if scores is None else scores, len(rles), np.float32)
+        self._check()
+
+    @classmethod
+    def from_array(
+        cls,
+        masks: ArrayLike | Iterable[ArrayLike],
+        *,
+        categories: ArrayLike | None = None,
+        scores: ArrayLike | None = None,
+        names: Mapping[int, str] | None = None,
+        image_size: tuple[int, int] | None = None,
+    ) -> Self:
+        """Masks from pixels.
+
+        Args:
+            masks: (M, H, W) array, or M arrays of (H, W): bool, 0 and 1, 0 and 255, or probabilities (at least 0.5
+                is the object).
+            categories: (M,) category ids; without them all are category 1, "object".
+            scores: (M,) scores from 0 to 1; all 1 without them.
+            names: Name of each category id; COCO's 91-entry list without them.
+            image_size: (H, W) of the image; only needed where M may be 0.
+
+        Raises:
+            MaskError: Masks of different sizes, values that are no mask, an unknown category or a bad score.
+        """
+        rles = [_encode(i, mask) for i, mask in enumerate(masks)]  # type: ignore[arg-type]
+        if image_size is None:
+            image_size = _image_size(masks, rles)
+        return cls(rles, image_size, categories=categories, scores=scores, names=names)
+
+    @classmethod
+    def from_coco(
+        cls,
+        source: str | PathLike[str] | Mapping[str, Any] | Sequence[Mapping[str, Any]],
+        *,
+        image_id: int | str | None = None,
+        image_size: tuple[int, int] | None = None,
+        names: Mapping[int, str] | None = None,
+    ) -> Self:
+        """Masks from COCO JSON: a file, its parsed content, or a bare list of results.
+
+        Polygons and both kinds of RLE are understood; polygons cover the pixels that the COCO tools give them.
+
+        Args:
+            source: File or parsed JSON.
+            image_id: Which image, where there are several.
+            image_size: (height, width) in pixels, where the source does not say.
+            names: Name of each category id, where the source does not say; COCO's own list without them.
+
+        Raises:
+            MaskError: An annotation that cannot be used, by its id: runs that do not sum to height * width, another
+                size than the image, an unknown category, a bad score.
+            CorruptFileError: The file is not JSON.
+            FileNotFoundError: There is no such file.
+        """
+        image = coco.read_image(source, image_id=image_id, image_size=image_size)
+        return cls(
+            image.rles,
+            image.size,
+            categories=np.array(image.categories, np.int32),
+            scores=np.array(image.scores, np.float32),
+            names=names or image.names,
+        )
+
+    @classmethod
+    def from_npz(cls, path: str | PathLike[str]) -> Self:
+        """Masks that `save` wrote, or those of the LDLS research code (Matterport class order).
+
+        Raises:
+            UnsupportedFormatError: The arrays are of neither kind.
+            MaskError: The arrays do not fit one another.
+            FileNotFoundError: There is no such file.
+        """
+        stored = mask_npz.read(path)
+        return cls(
+            stored.rles,
+            stored.size,
+            categories=stored.categories,
+            scores=stored.scores,
+            names=stored.names,
+        )
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write an `.npz` that `from_npz` reads."""
+        mask_npz.write(path, self)
+
+    @property
+    def height(self) -> int:
+        """Rows of the image."""
+        return self.core.height
+
+    @property
+    def width(self) -> int:
+        """Columns of the image."""
+        return self.core.width
+
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """(height, width) of the image in pixels."""
+        return self.height, self.width
+
+    def __len__(self) -> int:
+        return len(self.core)
+
+    def __getitem__(self, index: int) -> InstanceMask:
+        category = int(self.categories[index])  # an index out of range raises here
+        rle = self.core.rle(index % len(self))
+        return InstanceMask(category, self.names[category], float(self.scores[index]), rle)
+
+    def __iter__(self) -> Iterator[InstanceMask]:
+        return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"InstanceMasks({len(self)} instances in {self.height} x {self.width} pixels)"
+
+    def to_array(self) -> NDArray[np.bool_]:
+        """(M, H, W) pixels; M * H * W bytes."""
+        dense = np.zeros((len(self), self.height, self.width), np.bool_)
+        for pixels, mask in zip(dense, self, strict=True):
+            pixels[...] = mask.to_array()
+        return dense
+
+    def _check(self) -> None:
+        for i, (category, score) in enumerate(zip(self.categories, self.scores, strict=True)):
+            if int(category) not in self.names:
+                raise MaskError(
+                    f"mask {i}: category {category} is unknown; expected one of "
+                    f"{_some(self.names)}, or pass names={{{category}: '...'}}"
+                )
+            if not 0 <= score <= 1:
+                raise MaskError(f"mask {i}: score is {score}, expected 0 to 1")
+
+
+def _encode(index: int, mask: ArrayLike) -> _ldls.Rle:
+    pixels = np.asarray(mask)
+    if pixels.ndim != 2:
+        raise MaskError(
+            f"mask {index}: expected (height, width), got shape {pixels.shape}; pass masks as (M, height, width)"
+        )
+    try:
+        return _ldls.Rle.from_pixels(np.ascontiguousarray(_as_bool(pixels)))
+    except MaskError as error:
+        raise MaskError(f"mask {index}: {error}") from None
+
+
+def _as_bool(pixels: NDArray[Any]) -> NDArray[np.bool_]:
+    if pixels.dtype == np.bool_:
+        return pixels
+    if pixels.dtype.kind not in "iuf":
+        raise MaskError(f"expected bool, 0 and 1, or 0 and 255, got dtype {pixels.dtype}")
+    probabilities = pixels.dtype.kind == "f" and bool(((pixels >= 0) & (pixels <= 1)).all())
+    if not probabilities:
+        wrong = ~np.isin(pixels, (0, 1, 255))
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            raise MaskError(
+                f"pixel ({row}, {column}) is {pixels[row, column]}, expected bool, 0 and 1, 0 and 255, "
+                "or probabilities; split an image of instance numbers into one mask each"
+            )
+    return pixels >= 0.5
+
+
+def _image_size(masks: object, rles: Sequence[_ldls.Rle]) -> tuple[int, int]:
+    if rles:
+        return rles[0].height, rles[0].width
+    shape: tuple[int, ...] = getattr(masks, "shape", ())
+    if len(shape) == 3:
+        return int(shape[1]), int(shape[2])
+    raise MaskError("masks: none given; pass image_size=(height, width) or an array of (0, H, W)")
+
+
+def _per_mask(name: str, values: ArrayLike, count: int, dtype: type) -> NDArray[Any]:
+    array = np.asarray(values)
+    whole = dtype is not np.int32 or array.dtype.kind in "iu" or array.size == 0
+    if array.dtype.kind not in "iuf" or not whole:
+        kind = "whole numbers" if dtype is np.int32 else "numbers"
+        raise MaskError(f"{name}: expected {kind}, got {array.dtype}")
+    if array.ndim == 0:
+        array = np.full(count, array)
+    if array.shape != (count,):
+        raise MaskError(f"{name}: expected one for each of {count} masks, got shape {array.shape}")
+    array = array.astype(dtype)
+    array.flags.writeable = False
+    return array
+
+
+def _some(names: Mapping[int, str]) -> str:
+    listed = ", ".join(f"{category} {name}" for category, name in list(names.items())[:5])
+    return listed + (", ..." if len(names) > 5 else "")

@@ -1,0 +1,38 @@
+"""What was noticed about the input and the run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Counts and measures of one segmentation.
+
+    Attributes:
+        n_points: Points given.
+        n_in_view: Points that the image sees; the method works on these.
+        n_nonfinite: Points with a coordinate that is NaN or infinite; left out.
+        n_origin: Points at exactly (0, 0, 0), taken for missing returns; left out.
+        n_behind: Points behind the camera or nearer than its smallest depth.
+        n_outside: Points in front of the camera but beside the image.
+        n_duplicates: Points in view that share their place with another point in view.
+        k_effective: Neighbours that each point has: K, or one less than the points in view.
+        products: Products with the graph that the result stands for.
+        residual: Largest change of any likelihood in the last product.
+        converged: Whether that change is at most 1e-6. 200 products of the paper seldom converge, by design.
+        empty_masks: Labels of instances whose mask has no pixel.
+    """
+
+    n_points: int
+    n_in_view: int
+    n_nonfinite: int
+    n_origin: int
+    n_behind: int
+    n_outside: int
+    n_duplicates: int
+    k_effective: int
+    products: int
+    residual: float
+    converged: bool
+    empty_masks: tuple[int, ...]

@@ -1,0 +1,183 @@
+"""The steps of the method one by one, arrays in and arrays out, with SciPy's sparse matrices for the graph.
+
+    in_view, pixels = stages.project(points, camera, image_size=masks.image_size)
+    indices, squared_distances = stages.neighbors(points[in_view])
+    graph = stages.point_graph(indices, squared_distances)
+    A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, masks))
+    z = stages.diffuse(A, b)
+    labels = stages.largest_components(A, z.argmax(axis=1))
+
+equals `ldls.segment` on the points in view. Options stand for the paper's symbols as in `ldls.Params`.
+Needs the extra `eval`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls import _ldls
+from ldls._optional import require
+from ldls.camera import Camera
+from ldls.cloud import as_points
+from ldls.errors import DtypeError, InputError, NonFiniteError, ShapeError
+from ldls.masks import InstanceMasks
+from ldls.params import Params
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+_PAPER = Params.paper()
+
+
+@dataclass(frozen=True, eq=False)
+class PixelLabels:
+    """The pixel edges of n points, added up by label.
+
+    Attributes:
+        weights: (n, M + 1) sparse: weight of the pixel edges of each point that end in each label, background first.
+        mass: (n,) float32: weight of all pixel edges of each point, a pixel under two masks counted once.
+    """
+
+    weights: csr_array
+    mass: NDArray[np.float32]
+
+
+def project(
+    points: ArrayLike,
+    camera: Camera,
+    *,
+    image_size: tuple[int, int],
+    keep_origin: bool = False,
+    threads: int | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Indices (n,) of the points in view and their pixels (n, 2), u and v (step 1).
+
+    Args:
+        points: (N, >= 3) in metres in the lidar frame.
+        camera: The camera.
+        image_size: (height, width) of its image in pixels.
+        keep_origin: Whether points at exactly (0, 0, 0) are more than missing returns.
+        threads: As in `Params`.
+    """
+    return _ldls.project(
+        as_points(points),
+        camera.projection,
+        camera.T_camera_lidar,
+        camera.min_depth_m,
+        *image_size,
+        keep_origin,
+        threads,
+    )
+
+
+def neighbors(
+    points: ArrayLike, k: int = _PAPER.neighbors, *, threads: int | None = None
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+    """Indices and squared distances (n, k) of the nearest other points, nearest first (step 3).
+
+    Of equally distant points the one of lower index is nearer. With fewer than k other points, k is their number.
+
+    Args:
+        points: (n, >= 3) finite, in metres.
+        k: Neighbours wanted.
+        threads: As in `Params`.
+    """
+    Params(neighbors=k)
+    xyz = np.ascontiguousarray(as_points(points)[:, :3], np.float64)
+    if not np.isfinite(xyz).all():
+        raise NonFiniteError("points: expected finite coordinates; leave other rows out first")
+    return _ldls.neighbors(xyz, k, threads)
+
+
+def point_graph(
+    indices: ArrayLike,
+    squared_distances: ArrayLike,
+    *,
+    sigma: float = _PAPER.sigma,
+    threads: int | None = None,
+) -> csr_array:
+    """Sparse (n, n) weights: 1 to itself and exp(-d^2 / sigma) to its neighbours (step 3); rows not normalised.
+
+    Args:
+        indices: (n, k) neighbours of each point.
+        squared_distances: (n, k) in square metres.
+        sigma: In square metres.
+        threads: As in `Params`.
+    """
+    Params(sigma=sigma)
+    columns = np.ascontiguousarray(indices, np.uint32)
+    distances = np.ascontiguousarray(squared_distances, np.float32)
+    if columns.ndim != 2 or (columns.size and columns.max() >= len(columns)):
+        raise ShapeError(f"indices: expected (n, k) numbers below n, got shape {columns.shape}")
+    return _csr(_ldls.point_graph(columns, distances, sigma, threads), len(columns))
+
+
+def pixel_labels(
+    pixels: ArrayLike,
+    masks: InstanceMasks,
+    *,
+    window: int = _PAPER.window,
+    pixel_weight: float = _PAPER.pixel_weight,
+    threads: int | None = None,
+) -> PixelLabels:
+    """The pixel edges of points that fall on `pixels` (n, 2), added up by label (step 2); not normalised."""
+    Params(window=window, pixel_weight=pixel_weight)
+    uv = np.ascontiguousarray(pixels, np.float64)
+    weights, mass = _ldls.pixel_labels(uv, masks.core, window, pixel_weight, threads)
+    return PixelLabels(_csr(weights, len(masks) + 1), mass)
+
+
+def direct_labels(pixels: ArrayLike, masks: InstanceMasks) -> NDArray[np.int32]:
+    """Direct projection: the label (n,) of the pixel nearest to each of `pixels` (n, 2); of several, the first."""
+    return _ldls.direct_labels(np.ascontiguousarray(pixels, np.float64), masks.core)
+
+
+def normalize_rows(graph: csr_array, labels: PixelLabels) -> tuple[csr_array, csr_array]:
+    """A (n, n) and b (n, M + 1): point and pixel edges over the sum of both, row by row (step 4)."""
+    a, (b, _) = _ldls.normalize_rows(_arrays(graph), _arrays(labels.weights), labels.mass)
+    return _csr(a, graph.shape[1]), _csr(b, labels.weights.shape[1])
+
+
+def diffuse(
+    A: csr_array,
+    b: csr_array,
+    *,
+    iterations: int | None = _PAPER.iterations,
+    threads: int | None = None,
+) -> NDArray[np.float32]:
+    """Likelihoods (n, M + 1): z <- A z + b from z = 0, `iterations` times or, if None, until converged (step 5)."""
+    Params(iterations=iterations)
+    z, _, _ = _ldls.diffuse(_arrays(A), _arrays(b), b.shape[1], iterations, threads)
+    return z
+
+
+def largest_components(graph: csr_array, labels: ArrayLike) -> NDArray[np.int32]:
+    """`labels` (n,) with every point outside the largest component of its label turned into background (step 7)."""
+    array = np.asarray(labels)
+    if array.dtype.kind not in "iu" or array.ndim != 1:
+        raise DtypeError(f"labels: expected (n,) whole numbers, got {array.dtype} {array.shape}")
+    if array.size and array.min() < 0:
+        raise InputError("labels: expected 0 or more; pass the points in view only")
+    return _ldls.largest_components(_arrays(graph), np.ascontiguousarray(array, np.uint32))
+
+
+def _csr(arrays: tuple[Any, Any, Any], columns: int) -> csr_array:
+    offsets, indices, values = arrays
+    sparse = require("scipy.sparse", "eval")
+    shape = (len(offsets) - 1, columns)
+    return sparse.csr_array((values, indices, offsets), shape=shape)
+
+
+def _arrays(
+    matrix: csr_array,
+) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]:
+    csr = matrix.tocsr()
+    return (
+        np.ascontiguousarray(csr.indptr, np.int64),
+        np.ascontiguousarray(csr.indices, np.int32),
+        np.ascontiguousarray(csr.data, np.float32),
+    )
