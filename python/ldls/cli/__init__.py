@@ -1,0 +1,30 @@
+"""The command `ldls`: one module a subcommand."""
+
+from __future__ import annotations
+
+import typer
+
+from ldls.cli import demo, segment
+
+app = typer.Typer(
+    name="ldls",
+    help="Instance labels for lidar points from 2D masks, by label diffusion.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+app.command(name="segment")(segment.segment)
+app.command(name="demo")(demo.demo)
+
+
+@app.callback(invoke_without_command=True)
+def main(
+    version: bool = typer.Option(False, "--version", help="Print the version and leave."),
+) -> None:
+    """Instance labels for lidar points from 2D masks, by label diffusion."""
+    if version:
+        from ldls import __version__
+
+        typer.echo(f"ldls {__version__}")
+        raise typer.Exit

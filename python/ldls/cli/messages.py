@@ -1,0 +1,91 @@
+"""How commands speak: tables on standard output, errors on standard error with exit status 1."""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import ParamSpec, TypeVar
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from ldls.errors import LdlsError
+from ldls.objects import SegmentedObject
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+STAGES = {
+    "project": "project points",
+    "pixel_labels": "pixel labels",
+    "neighbors": "nearest neighbours",
+    "graph": "point graph",
+    "diffusion": "diffusion",
+    "components": "outlier removal",
+}
+
+
+def speaks_plainly(command: Callable[P, R]) -> Callable[P, R]:
+    """`command`, with its errors and warnings as single lines instead of tracebacks."""
+
+    @functools.wraps(command)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                result = command(*args, **kwargs)
+            except (LdlsError, OSError, ImportError) as error:
+                typer.secho(f"error: {error}", err=True, fg="red")
+                raise typer.Exit(1) from None
+            finally:
+                for warning in caught:
+                    typer.secho(f"warning: {warning.message}", err=True, fg="yellow")
+        return result
+
+    return wrapped
+
+
+def object_table(objects: Sequence[SegmentedObject]) -> Table:
+    """Name, points, distance and size of each object, the nearest first and those without points last."""
+    table = Table(title=f"{sum(o.n_points > 0 for o in objects)} of {len(objects)} objects found")
+    table.add_column("label", justify="right")
+    table.add_column("object")
+    for heading in ("score", "points", "distance", "length x width x height"):
+        table.add_column(heading, justify="right")
+    for found in sorted(objects, key=lambda o: (o.distance_m is None, o.distance_m)):
+        table.add_row(
+            str(found.label),
+            found.name,
+            f"{found.score:.2f}",
+            f"{found.n_points:,}",
+            "-" if found.distance_m is None else f"{found.distance_m:.1f} m",
+            _size(found),
+        )
+    return table
+
+
+def timing_table(timings: Mapping[str, float]) -> Table:
+    """Milliseconds of each stage and their sum."""
+    table = Table(title="time", show_footer=True)
+    total = sum(timings.values())
+    table.add_column("stage", footer="all")
+    table.add_column("ms", justify="right", footer=f"{total * 1e3:.1f}")
+    table.add_column("share", justify="right", footer="100 %")
+    for stage, seconds in timings.items():
+        share = seconds / total if total > 0 else 0.0
+        table.add_row(STAGES[stage], f"{seconds * 1e3:.1f}", f"{share:.0%}".replace("%", " %"))
+    return table
+
+
+def console() -> Console:
+    """Where tables go: as wide as the terminal, and wide enough where there is none."""
+    found = Console()
+    return found if found.is_terminal else Console(width=100)
+
+
+def _size(found: SegmentedObject) -> str:
+    if found.box is None:
+        return "-"
+    return " x ".join(f"{side:.1f}" for side in found.box.size) + " m"

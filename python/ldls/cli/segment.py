@@ -1,0 +1,97 @@
+"""`ldls segment`: one frame from files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ldls.camera import Camera
+from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
+from ldls.cli.outputs import Output, read_image, write_outputs
+from ldls.errors import UnsupportedFormatError
+from ldls.io import read_points
+from ldls.masks import InstanceMasks
+from ldls.params import Params
+from ldls.segmentation import segment as segment_cloud
+
+EXISTING = {"exists": True, "dir_okay": False, "readable": True}
+
+
+@speaks_plainly
+def segment(
+    points: Annotated[Path, typer.Option(help="Lidar sweep: KITTI .bin, nuScenes .pcd.bin or .npy.", **EXISTING)],
+    calib: Annotated[Path, typer.Option(help="KITTI calibration of the frame.", **EXISTING)],
+    masks: Annotated[
+        Path,
+        typer.Option(
+            help="Instance masks: COCO .json, or .npz of ldls or the LDLS research code.",
+            **EXISTING,
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
+    image: Annotated[Path | None, typer.Option(help="Image to draw the picture on.", **EXISTING)] = None,
+    camera: Annotated[
+        int,
+        typer.Option(min=0, max=3, help="Which camera of the calibration; 2 is the left colour one."),
+    ] = 2,
+    image_id: Annotated[int | None, typer.Option(help="Which image of a COCO file that holds several.")] = None,
+    formats: Annotated[
+        list[Output] | None,
+        typer.Option("--format", help="What to write; may be repeated. [default: all]"),
+    ] = None,
+    neighbors: Annotated[int, typer.Option(help="K: nearest neighbours a point.")] = 10,
+    sigma: Annotated[float, typer.Option(help="Reach of point edges exp(-d^2/sigma), in square metres.")] = 1.0,
+    pixel_weight: Annotated[float, typer.Option(help="lambda: weight of pixel edges.")] = 0.001,
+    window: Annotated[int, typer.Option(help="Side of the pixel window of a point, odd.")] = 5,
+    iterations: Annotated[int, typer.Option(help="Diffusion steps.")] = 200,
+    converge: Annotated[
+        bool,
+        typer.Option("--converge", help="Diffuse until nothing changes, however many steps it takes."),
+    ] = False,
+    outliers: Annotated[
+        bool,
+        typer.Option("--keep-outliers/--remove-outliers", help="Keep points off an object's main part?"),
+    ] = False,
+    threads: Annotated[int | None, typer.Option(help="Threads. [default: all cores]")] = None,
+) -> None:
+    """Label the points of one lidar sweep by the instance masks of one image.
+
+    Prints the objects found and the time of each stage, and writes to the folder --out, named after the sweep:
+    .npz (all fields), .label (SemanticKITTI), .ply (coloured cloud) and .png (picture).
+
+    Example: ldls segment --points velodyne/000571.bin --calib calib/000571.txt --masks masks/000571.json
+    --image image_2/000571.png --out results
+    """
+    params = Params(
+        neighbors=neighbors,
+        sigma=sigma,
+        pixel_weight=pixel_weight,
+        window=window,
+        iterations=None if converge else iterations,
+        remove_outliers=not outliers,
+        threads=threads,
+    )
+    instance_masks = read_masks(masks, image_id)
+    pixels = None if image is None else read_image(image, instance_masks)
+    result = segment_cloud(read_points(points), instance_masks, Camera.from_kitti(calib, camera=camera), params=params)
+    name = points.name.removesuffix(".bin").removesuffix(".pcd").removesuffix(".npy")
+    written = write_outputs(out, name, result, pixels, formats or list(Output))
+    screen = console()
+    screen.print(object_table(result.objects))
+    screen.print(timing_table(result.timings))
+    report = result.report
+    screen.print(f"{report.n_in_view:,} of {report.n_points:,} points in view", highlight=False)
+    if report.n_nonfinite:
+        screen.print(f"{report.n_nonfinite:,} points are not finite and were left out", highlight=False)
+    screen.print("wrote " + " ".join(map(str, written)), highlight=False, soft_wrap=True)
+
+
+def read_masks(path: Path, image_id: int | None) -> InstanceMasks:
+    """Instance masks of a file, by its suffix."""
+    if path.suffix == ".json":
+        return InstanceMasks.from_coco(path, image_id=image_id)
+    if path.suffix == ".npz":
+        return InstanceMasks.from_npz(path)
+    raise UnsupportedFormatError(f"{path}: cannot read {path.suffix!r} masks, expected .json or .npz")

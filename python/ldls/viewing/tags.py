@@ -1,0 +1,98 @@
+"""Name tags on a picture: near what they name, clear of one another and of what is drawn."""
+
+from collections.abc import Sequence
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+I64 = NDArray[np.int64]
+Colour = tuple[int, int, int]
+Box = tuple[int, int, int, int]  # left, top, right, bottom, in pixels of the picture
+
+
+class Tag(NamedTuple):
+    """A text for what lies in `box`."""
+
+    text: str
+    colour: Colour
+    box: Box
+
+
+def draw_tags(picture: Image.Image, tags: Sequence[Tag], covered: NDArray[np.bool_], pen_px: float) -> None:
+    """Draw tags onto the picture; one for which no room is left is not drawn.
+
+    `covered` (H, W), at the picture's size or a whole part of it, is where tags had better not be.
+    """
+    draw = ImageDraw.Draw(picture)
+    font = ImageFont.load_default(size=12 * pen_px)
+    places = place_tags(
+        [tag.box for tag in tags],
+        [(ceil(draw.textlength(tag.text, font) + 8 * pen_px), ceil(17 * pen_px)) for tag in tags],
+        covered,
+        picture.size,
+    )
+    shown = [(tag, place) for tag, place in zip(tags, places, strict=True) if place]
+    for tag, place in shown:
+        top_middle = ((tag.box[0] + tag.box[2]) / 2, tag.box[1] + 2 * pen_px)
+        draw.line([_middle(place), top_middle], tag.colour, ceil(pen_px))
+    for tag, place in shown:
+        draw.rounded_rectangle(place, 3 * pen_px, tag.colour)
+        draw.text(_middle(place), tag.text, _ink(tag.colour), font, anchor="mm")
+
+
+def place_tags(
+    boxes: Sequence[Box],
+    sizes: Sequence[tuple[int, int]],
+    covered: NDArray[np.bool_],
+    picture: tuple[int, int],
+) -> list[Box | None]:
+    """Return where each tag goes: inside the picture and apart; None where no room is left."""
+    cover = np.pad(covered.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    places: list[Box | None] = [None] * len(boxes)
+    for index in sorted(range(len(boxes)), key=lambda i: -boxes[i][3]):  # the nearest chooses first
+        taken = [place for place in places if place]
+        places[index] = _best_place(boxes[index], sizes[index], picture, taken, cover)
+    return places
+
+
+def _best_place(
+    box: Box,
+    size: tuple[int, int],
+    picture: tuple[int, int],
+    taken: Sequence[Box],
+    cover: I64,
+) -> Box | None:
+    """Return the free place nearest to the top of `box`, rather farther off than over objects."""
+    width, height = size
+    step = max(height // 4, 1)
+    x, y = np.arange(0, picture[0] - width, step), np.arange(0, picture[1] - height, step)
+    left, top = (grid.ravel() for grid in np.meshgrid(x, y))
+    right, bottom = left + width, top + height
+    aside_px = np.abs((left + right - box[0] - box[2]) / 2)
+    off_px = np.abs(bottom + height // 4 - box[1])
+    scale = picture[0] // (cover.shape[1] - 1)
+    hidden = _covered_share(cover, left // scale, top // scale, right // scale, bottom // scale)
+    cost = np.hypot(aside_px, off_px) + 4 * height * hidden
+    for low_x, low_y, high_x, high_y in taken:
+        cost[(right >= low_x) & (left <= high_x) & (bottom >= low_y) & (top <= high_y)] = np.inf
+    if not np.isfinite(cost).any():
+        return None
+    best = cost.argmin()
+    return int(left[best]), int(top[best]), int(right[best]), int(bottom[best])
+
+
+def _covered_share(cover: I64, left: I64, top: I64, right: I64, bottom: I64) -> NDArray[np.float64]:
+    inside = cover[bottom, right] - cover[top, right] - cover[bottom, left] + cover[top, left]
+    return np.asarray(inside / np.maximum((right - left) * (bottom - top), 1))
+
+
+def _middle(box: Box) -> tuple[float, float]:
+    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+
+
+def _ink(paper: Colour) -> Colour:
+    red, green, blue = paper
+    return (0, 0, 0) if 0.3 * red + 0.59 * green + 0.11 * blue > 115 else (255, 255, 255)
