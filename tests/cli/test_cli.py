@@ -1,0 +1,130 @@
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+import ldls
+from ldls.cli import app
+
+run = CliRunner().invoke
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("demo")
+    return folder, run(app, ["demo", "--out", str(folder)])
+
+
+def arguments(folder, out, **changes):
+    files = {
+        "points": folder / "input/points.bin",
+        "calib": folder / "input/calib.txt",
+        "masks": folder / "input/masks.npz",
+        "image": folder / "input/image.png",
+        "out": out,
+    } | changes
+    return ["segment", *(str(word) for key, value in files.items() for word in (f"--{key}", value))]
+
+
+def test_demo_writes_results_and_beats_direct_projection(demo):
+    folder, outcome = demo
+    assert outcome.exit_code == 0, outcome.output
+    assert {path.name for path in folder.iterdir()} == {
+        "demo.npz", "demo.label", "demo.ply", "demo.png", "input",
+    }  # fmt: skip
+    (mean,) = (line for line in outcome.output.splitlines() if "mean" in line)
+    direct, method = (float(cell) for cell in mean.replace("│", " ").split()[2:4])
+    assert method > direct
+    with np.load(folder / "demo.npz") as stored:
+        assert len(set(stored["object_category"].tolist())) >= 3
+
+
+def test_segment_on_the_files_of_the_demo_gives_the_same(demo, tmp_path):
+    folder, _ = demo
+    outcome = run(app, arguments(folder, tmp_path))
+    assert outcome.exit_code == 0, outcome.output
+    assert "objects found" in outcome.output
+    assert "diffusion" in outcome.output
+    expected = np.load(folder / "demo.npz")["labels"]
+    np.testing.assert_array_equal(np.load(tmp_path / "points.npz")["labels"], expected)
+    with Image.open(tmp_path / "points.png") as picture, Image.open(folder / "demo.png") as first:
+        assert picture.tobytes() == first.tobytes()
+
+
+def test_formats_can_be_chosen_and_an_image_is_not_needed(demo, tmp_path):
+    words = arguments(demo[0], tmp_path)
+    at = words.index("--image")
+    del words[at : at + 2]
+    outcome = run(app, [*words, "--format", "label", "--format", "png"])
+    assert outcome.exit_code == 0, outcome.output
+    assert {path.name for path in tmp_path.iterdir()} == {"points.label", "points.png"}
+
+
+def test_real_frame(frame_571, tmp_path):
+    outcome = run(
+        app,
+        ["segment", "--points", str(frame_571.points_path), "--calib", str(frame_571.calib_path),
+         "--masks", str(frame_571.masks_path), "--image", str(frame_571.image_path),
+         "--out", str(tmp_path / "new/folder")],
+    )  # fmt: skip
+    assert outcome.exit_code == 0, outcome.output
+    assert "17 of 19 objects found" in outcome.output
+    stored = np.load(tmp_path / "new/folder/000571.npz")
+    in_view = frame_571.expected["in_view"]
+    np.testing.assert_array_equal(stored["labels"][in_view], frame_571.expected["labels"])
+
+
+@pytest.mark.parametrize(
+    ("option", "fault", "message"),
+    [
+        pytest.param("points", lambda p: p.write_bytes(b"1234567"), "points.bin: 7 bytes", id="cut points"),
+        pytest.param("calib", lambda p: p.write_text("P2: 1 2 3"), "expected 12 numbers", id="calib"),
+        pytest.param("masks", lambda p: p.write_bytes(b"PK"), "not a whole .npz", id="masks"),
+        pytest.param("image", lambda p: p.write_bytes(b"PNG"), "not a whole image", id="image"),
+        pytest.param("image", lambda p: Image.new("RGB", (375, 1242)).save(p), "swapped?", id="image size"),
+    ],
+)
+def test_bad_files_are_one_line_and_nothing_is_written(demo, tmp_path, option, fault, message):
+    original = demo[0] / "input" / {"calib": "calib.txt", "image": "image.png"}.get(option, f"{option}.bin")
+    original = original.with_suffix(".npz") if option == "masks" else original
+    broken = tmp_path / original.name
+    shutil.copy(original, broken)
+    fault(broken)
+    out = tmp_path / "out"
+    outcome = run(app, arguments(demo[0], out, **{option: broken}))
+    assert outcome.exit_code == 1
+    assert outcome.stderr.startswith("error: ")
+    assert message in outcome.stderr
+    assert not out.exists()
+
+
+def test_parameters_out_of_range_are_refused(demo, tmp_path):
+    outcome = run(app, [*arguments(demo[0], tmp_path / "out"), "--neighbors", "0"])
+    assert outcome.exit_code == 1
+    assert "neighbors: got 0, expected 1 to 255" in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_file_is_named(demo, tmp_path):
+    outcome = run(app, arguments(demo[0], tmp_path / "out", points=tmp_path / "none.bin"))
+    assert outcome.exit_code == 2
+    assert "none.bin" in outcome.stderr.replace("\n", "")
+
+
+def test_help_teaches_and_comes_at_once():
+    command = [sys.executable, "-c", "from ldls.cli import app; app()", "--help"]
+    subprocess.run(command, check=True, capture_output=True)  # warm the disk
+    start = time.perf_counter()
+    outcome = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert time.perf_counter() - start < 2, "half a second is promised on an idle machine"
+    assert "segment" in outcome.stdout
+    assert "demo" in outcome.stdout
+
+
+def test_version():
+    assert run(app, ["--version"]).output == f"ldls {ldls.__version__}\n"

@@ -1,0 +1,81 @@
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ldls
+
+KITTI_FRAMES = ("000000", "000001", "000002", "000003", "000571")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One real KITTI frame and what the method makes of it."""
+
+    points_path: Path
+    calib_path: Path
+    masks_path: Path
+    image_path: Path
+    points: np.ndarray
+    masks: ldls.InstanceMasks
+    camera: ldls.Camera
+    expected: dict
+
+
+@pytest.fixture(scope="session")
+def data_folder():
+    folder = os.environ.get("LDLS_TEST_DATA")
+    if folder is None:
+        pytest.skip("LDLS_TEST_DATA is not set: it names the folder of real frames")
+    return Path(folder)
+
+
+def load_frame(folder: Path, name: str) -> Frame:
+    training = folder / "kitti/training"
+    points = training / f"velodyne/{name}.bin"
+    calib = training / f"calib/{name}.txt"
+    masks = training / f"masks/{name}.json"
+    with np.load(training / f"expected/{name}.npz") as expected:
+        return Frame(
+            points_path=points,
+            calib_path=calib,
+            masks_path=masks,
+            image_path=training / f"image_2/{name}.png",
+            points=ldls.read_points(points),
+            masks=ldls.InstanceMasks.from_coco(masks),
+            camera=ldls.Camera.from_kitti(calib),
+            expected=dict(expected),
+        )
+
+
+@pytest.fixture(scope="session", params=KITTI_FRAMES)
+def kitti_frame(request, data_folder):
+    return load_frame(data_folder, request.param)
+
+
+@pytest.fixture(scope="session")
+def frame_571(data_folder):
+    return load_frame(data_folder, "000571")
+
+
+@pytest.fixture
+def small_scene():
+    """Two objects before a wall, and a mask that bleeds a little over each: (points, masks, camera)."""
+    generator = np.random.default_rng(7)
+    left = generator.uniform([-2.2, -0.6, 9.8], [-1.2, 0.6, 10.2], (120, 3))
+    right = generator.uniform([1.2, -0.6, 9.8], [2.2, 0.6, 10.2], (120, 3))
+    wall = generator.uniform([-5, -4, 14], [5, 4, 14.2], (260, 3))
+    points = generator.permutation(np.vstack([left, right, wall])).astype(np.float32)
+    pixels = np.zeros((2, 60, 80), bool)
+    pixels[0, 23:38, 17:29] = True
+    pixels[1, 23:38, 51:63] = True
+    masks = ldls.InstanceMasks.from_array(pixels, categories=[1, 3], scores=[0.9, 0.8])
+    return points, masks, pinhole()
+
+
+def pinhole(focal_px=100.0, center=(40.0, 30.0), **options):
+    u, v = center
+    matrix = [[focal_px, 0, u, 0], [0, focal_px, v, 0], [0, 0, 1, 0]]
+    return ldls.Camera(projection=matrix, **options)

@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+
+import ldls
+from ldls.errors import RecoveredFileWarning
+
+
+def rows(n, columns):
+    return np.random.default_rng(0).normal(size=(n, columns)).astype("<f4")
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "options"),
+    [
+        pytest.param("sweep.bin", 4, {}, id="KITTI"),
+        pytest.param("sweep.pcd.bin", 5, {}, id="nuScenes"),
+        pytest.param("sweep.bin", 7, {"columns": 7}, id="seven columns"),
+    ],
+)
+def test_bin_files_hold_rows_of_floats(tmp_path, name, columns, options):
+    values = rows(11, columns)
+    values.tofile(tmp_path / name)
+    points = ldls.read_points(tmp_path / name, **options)
+    np.testing.assert_array_equal(points, values)
+    assert points.dtype == np.float32
+
+
+def test_npy_files_keep_their_precision(tmp_path):
+    values = rows(5, 3).astype(np.float64)
+    np.save(tmp_path / "sweep.npy", values)
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / "sweep.npy"), values)
+
+
+def test_an_empty_bin_file_is_an_empty_cloud(tmp_path):
+    (tmp_path / "sweep.bin").touch()
+    assert ldls.read_points(tmp_path / "sweep.bin").shape == (0, 4)
+
+
+def test_a_truncated_file_says_where_it_ends(tmp_path):
+    path = tmp_path / "000123.bin"
+    path.write_bytes(rows(11, 4).tobytes()[:167])
+    message = r"000123\.bin: 167 bytes is not a multiple of 16.*last whole point ends at 160"
+    with pytest.raises(ldls.TruncatedFileError, match=message):
+        ldls.read_points(path)
+    with pytest.warns(RecoveredFileWarning, match=message):
+        points = ldls.read_points(path, recover=True)
+    np.testing.assert_array_equal(points, rows(11, 4)[:10])
+
+
+def test_five_columns_are_not_taken_for_four(tmp_path):
+    values = rows(8, 5)
+    values[:, 4] = np.arange(8)
+    path = tmp_path / "sweep.bin"
+    values.tofile(path)
+    with pytest.raises(ldls.FileFormatError, match="pass columns=5"):
+        ldls.read_points(path)
+    np.testing.assert_array_equal(ldls.read_points(path, columns=5), values)
+    assert ldls.read_points(path, columns=4).shape == (10, 4)
+
+
+def test_real_nuscenes_points_have_five_columns(data_folder):
+    (path,) = (data_folder / "nuscenes").glob("*.pcd.bin")
+    assert ldls.read_points(path).shape == (34688, 5)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "error", "message"),
+    [
+        pytest.param("a.xyz", b"", ldls.UnsupportedFormatError, "expected .bin or .npy", id="suffix"),
+        pytest.param("a.npy", b"", ldls.CorruptFileError, "got an empty one", id="empty npy"),
+        pytest.param("a.npy", b"\x93NUMPY\1\0", ldls.CorruptFileError, "whole .npy", id="cut npy"),
+        pytest.param("a.npy", b"hello there", ldls.FileFormatError, "a.npy", id="no npy"),
+    ],
+)
+def test_files_that_cannot_be_read_are_named(tmp_path, name, content, error, message):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(error, match=message):
+        ldls.read_points(tmp_path / name)
+
+
+def test_arrays_that_are_no_cloud_are_named_with_their_file(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((3, 100)))
+    with pytest.raises(ldls.ShapeError, match="a.npy: points: .*transpose"):
+        ldls.read_points(tmp_path / "a.npy")
+    np.save(tmp_path / "b.npy", np.array([{}]), allow_pickle=True)
+    with pytest.raises(ldls.UnsafeFileError, match="b.npy"):
+        ldls.read_points(tmp_path / "b.npy")
+
+
+def test_missing_files_and_folders(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        ldls.read_points(tmp_path / "none.bin")
+    with pytest.raises(ldls.FileFormatError, match="expected a regular file"):
+        ldls.read_points(tmp_path)

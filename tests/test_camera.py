@@ -1,0 +1,130 @@
+import numpy as np
+import pytest
+
+import ldls
+from conftest import pinhole
+
+CALIBRATION = {
+    "P0": "100 0 50 0 0 100 40 0 0 0 1 0",
+    "P2": "100 0 50 4 0 100 40 -1 0 0 1 0.01",
+    "R0_rect": "1 0 0 0 1 0 0 0 1",
+    "Tr_velo_to_cam": "0 -1 0 0.1 0 0 -1 -0.2 1 0 0 -0.3",
+}
+
+
+def calibration(**changes):
+    lines = CALIBRATION | changes
+    return "".join(f"{key}: {value}\n" for key, value in lines.items() if value is not None)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write_text(text):
+        path = tmp_path / "calib.txt"
+        path.write_bytes(text.encode())
+        return path
+
+    return write_text
+
+
+def test_kitti_calibration_composes_projection_and_transform(write):
+    camera = ldls.Camera.from_kitti(write(calibration()))
+    assert camera.projection.tolist() == [[100, 0, 50, 4], [0, 100, 40, -1], [0, 0, 1, 0.01]]
+    assert camera.T_camera_lidar[0].tolist() == [0, -1, 0, 0.1]
+    assert ldls.Camera.from_kitti(write(calibration()), camera=0).projection[0, 3] == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(calibration().replace("\n", "\r\n"), id="windows line ends"),
+        pytest.param("\ufeff" + calibration(), id="byte order mark"),
+        pytest.param(calibration().replace(" ", "\t") + "\n\n# end\n", id="tabs, blank lines, comment"),
+        pytest.param(
+            calibration().replace("Tr_velo_to_cam:", "Tr_velo_cam").replace("R0_rect:", "R_rect"),
+            id="spelt as in KITTI tracking",
+        ),
+        pytest.param(calibration(R0_rect=None).replace("Tr_velo_to_cam", "Tr"), id="KITTI odometry"),
+        pytest.param(calibration() + "calib_time: 09-Jan-2012 13:57:47\n", id="other keys"),
+    ],
+)
+def test_spellings_of_a_calibration_that_are_understood(write, text):
+    camera = ldls.Camera.from_kitti(write(text))
+    assert camera.T_camera_lidar[2].tolist() == [1, 0, 0, -0.3]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        pytest.param(
+            calibration(Tr_velo_to_cam=None),
+            "key 'Tr_velo_to_cam' missing; found P0 P2 R0_rect; did you unpack data_object_calib",
+            id="missing key",
+        ),
+        pytest.param(calibration(P2=None), "key 'P2' missing", id="no such camera"),
+        pytest.param(calibration(P2="1 2 3"), "line 2: expected 12 numbers, got 3", id="too few"),
+        pytest.param(calibration(R0_rect="1 " * 10), "line 3: expected 9 numbers, got 10", id="many"),
+        pytest.param(calibration(P2="nan " * 12), "line 2: expected finite numbers", id="nan"),
+        pytest.param(calibration(P2="1,5 " * 12), "line 2: expected numbers with a decimal", id="comma"),
+        pytest.param(calibration() + "P2: " + CALIBRATION["P2"], "line 5: .* twice", id="doubled key"),
+        pytest.param(calibration(P2="0 " * 12), "focal lengths that are not zero", id="all zero"),
+        pytest.param(calibration(R0_rect="2 0 0 0 1 0 0 0 1"), "deviates", id="no rotation"),
+        pytest.param(calibration(R0_rect="-1 0 0 0 1 0 0 0 1"), "determinant -1", id="mirror"),
+        pytest.param("", "key 'P2' missing; found none", id="empty file"),
+    ],
+)
+def test_faults_of_a_calibration_are_named_with_their_place(write, text, message):
+    with pytest.raises(ldls.CalibrationError, match=message) as caught:
+        ldls.Camera.from_kitti(write(text))
+    assert "calib.txt" in str(caught.value)
+
+
+def test_a_missing_calibration_stays_file_not_found(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        ldls.Camera.from_kitti(tmp_path / "none.txt")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        pytest.param({"projection": np.eye(4)}, "projection: expected shape", id="shape"),
+        pytest.param({"projection": "abc"}, "projection: expected an array", id="text"),
+        pytest.param({"projection": np.zeros((3, 3))}, "rank below 3", id="zeros"),
+        pytest.param({"projection": np.eye(3), "T_camera_lidar": np.eye(3)}, "T_camera_lidar: exp", id="3x3"),
+        pytest.param(
+            {"projection": np.eye(3), "T_camera_lidar": np.eye(4) + np.eye(4, k=-3)},
+            "last row",
+            id="transposed",
+        ),
+        pytest.param(
+            {"projection": np.eye(3), "T_camera_lidar": np.diag([np.nan, 1, 1, 1])},
+            "is NaN",
+            id="nan",
+        ),
+    ],
+)
+def test_matrices_that_cannot_be_a_camera_are_refused(arguments, message):
+    with pytest.raises(ldls.CalibrationError, match=message):
+        ldls.Camera(**arguments)
+
+
+def test_an_intrinsic_matrix_stands_for_a_projection():
+    camera = ldls.Camera(projection=[[100, 0, 50], [0, 100, 40], [0, 0, 1]])
+    assert camera.projection.shape == (3, 4)
+    assert not camera.projection.flags.writeable
+
+
+def test_points_behind_the_camera_are_never_projected():
+    points = np.array([[0, 0, -10], [0, 0, 0.05], [0, 0, 1e-30], [0, 0, 5]], np.float32)
+    in_view, pixels = ldls.stages.project(points, pinhole(), image_size=(60, 80))
+    assert in_view.tolist() == [3]
+    assert pixels.tolist() == [[40, 30]]
+
+
+def test_a_scaled_projection_sees_the_same():
+    matrix = pinhole().projection
+    points = np.random.default_rng(0).normal(size=(200, 3)) * [2, 2, 3]
+    one = ldls.stages.project(points, ldls.Camera(projection=matrix), image_size=(60, 80))
+    other = ldls.stages.project(points, ldls.Camera(projection=4 * matrix), image_size=(60, 80))
+    assert one[0].tolist() == other[0].tolist()
+    np.testing.assert_allclose(one[1], other[1])

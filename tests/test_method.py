@@ -1,0 +1,124 @@
+"""The whole method against the float64 oracle and the reference labels of real frames."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ldls
+import oracle
+
+
+@pytest.mark.parametrize("threads", [1, None], ids=["one thread", "all threads"])
+def test_real_frames_get_the_reference_labels(kitti_frame, threads):
+    frame = kitti_frame
+    params = ldls.Params(threads=threads)
+    result = ldls.segment(frame.points, frame.masks, frame.camera, params=params)
+    np.testing.assert_array_equal(result.in_view, frame.expected["in_view"])
+    np.testing.assert_allclose(result.pixels, frame.expected["pixels"], atol=1e-9)
+    in_view = result.in_view
+    np.testing.assert_array_equal(result.diffused_labels[in_view], frame.expected["diffused"])
+    np.testing.assert_array_equal(result.labels[in_view], frame.expected["labels"])
+    z = frame.expected["likelihood"]
+    np.testing.assert_allclose(result.confidence[in_view], z.max(axis=1) / z.sum(axis=1), atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_random_scenes_equal_the_oracle(seed):
+    points, pixels, camera, params = random_scene(np.random.default_rng(seed))
+    expected = oracle.segment(points, pixels, camera.projection @ camera.T_camera_lidar, params)
+    masks = ldls.InstanceMasks.from_array(pixels)
+    result = ldls.segment(points, masks, camera, params=params)
+    np.testing.assert_array_equal(result.in_view, expected.in_view)
+    diffused = result.diffused_labels[result.in_view]
+    best = expected.likelihood.max(axis=1, initial=0)
+    value = np.take_along_axis(expected.likelihood, diffused[:, None], axis=1)[:, 0]
+    # where two labels differ by less than single precision resolves, either is right
+    assert (best - value <= 2e-6 * best).all()
+    kept = oracle.largest_components(expected.edges, diffused) if params.remove_outliers else diffused
+    np.testing.assert_array_equal(result.labels[result.in_view], kept)
+    outside = np.ones(len(points), bool)
+    outside[result.in_view] = False
+    assert (result.labels[outside] == -1).all()
+    assert (result.confidence[outside] == 0).all()
+
+
+def random_scene(generator):
+    """A scene with what goes wrong in life: overlapping and empty masks, points behind, missing and doubled."""
+    height, width = generator.integers(8, 60, 2)
+    focal_px = generator.uniform(0.5, 1.5) * width
+    camera = ldls.Camera(
+        projection=[[focal_px, 0, width / 2, 3], [0, focal_px, height / 2, -2], [0, 0, 1, 0.01]],
+        T_camera_lidar=random_transform(generator),
+    )
+    n = int(generator.integers(0, 400))
+    scene = generator.normal(size=(n, 3)) * [4, 3, 6] + [0, 0, 8]
+    to_lidar = np.linalg.inv(camera.T_camera_lidar)
+    points = (scene @ to_lidar[:3, :3].T + to_lidar[:3, 3]).astype(generator.choice(["f4", "f8"]))
+    if n:
+        points[generator.integers(0, n, n // 5)] = points[generator.integers(0, n, n // 5)]
+        points[generator.integers(0, n, n // 50), generator.integers(3)] = np.nan
+    pixels = np.zeros((generator.integers(0, 6), height, width), bool)
+    for mask in pixels:
+        top, left = generator.integers(0, (height, width))
+        # a side of 0 makes an empty mask
+        mask[top : top + generator.integers(0, height), left : left + generator.integers(0, width)] = True
+    params = ldls.Params(
+        neighbors=int(generator.integers(1, 13)),
+        sigma=generator.uniform(0.2, 2),
+        pixel_weight=10 ** generator.uniform(-3, -1),
+        window=int(generator.choice([1, 3, 5, 7])),
+        iterations=int(generator.choice([1, 20, 200])),
+        remove_outliers=bool(generator.integers(2)),
+    )
+    return points, pixels, camera, params
+
+
+def random_transform(generator):
+    transform = np.eye(4)
+    transform[:3, :3] = Rotation.random(rng=generator).as_matrix()
+    transform[:3, 3] = generator.normal(size=3)
+    return transform
+
+
+def test_results_are_the_same_bits_for_any_number_of_threads(frame_571):
+    results = [
+        ldls.segment(frame_571.points, frame_571.masks, frame_571.camera, params=ldls.Params(threads=threads))
+        for threads in (1, 2, 3, 16)
+    ]
+    for other in results[1:]:
+        assert other.confidence.tobytes() == results[0].confidence.tobytes()
+        assert other.labels.tobytes() == results[0].labels.tobytes()
+        assert other.pixels.tobytes() == results[0].pixels.tobytes()
+
+
+def test_the_stages_together_equal_the_whole(frame_571):
+    from ldls import stages
+
+    frame = frame_571
+    in_view, pixels = stages.project(frame.points, frame.camera, image_size=frame.masks.image_size)
+    indices, squared_distances = stages.neighbors(frame.points[in_view])
+    graph = stages.point_graph(indices, squared_distances)
+    A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, frame.masks))
+    z = stages.diffuse(A, b)
+    np.testing.assert_array_equal(in_view, frame.expected["in_view"])
+    np.testing.assert_allclose(z, frame.expected["likelihood"], atol=1e-5)
+    labels = stages.largest_components(A, z.argmax(axis=1))
+    np.testing.assert_array_equal(labels, frame.expected["labels"])
+
+
+def test_the_converged_solution_is_the_fixed_point(small_scene):
+    points, masks, camera = small_scene
+    result = ldls.segment(points, masks, camera, params=ldls.Params(iterations=None))
+    assert result.report.converged
+    longer = ldls.segment(points, masks, camera, params=ldls.Params(iterations=result.report.products * 4))
+    np.testing.assert_allclose(result.confidence, longer.confidence, atol=2e-3)
+
+
+def test_direct_projection_takes_the_label_of_the_nearest_pixel(small_scene):
+    points, masks, camera = small_scene
+    result = ldls.segment(points, masks, camera)
+    direct = ldls.stages.direct_labels(result.pixels, masks)
+    column, row = np.floor(result.pixels + 0.5).astype(int).T
+    pixels = masks.to_array()
+    expected = np.where(pixels[0, row, column], 1, np.where(pixels[1, row, column], 2, 0))
+    np.testing.assert_array_equal(direct, expected)

@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+
+import ldls
+
+
+def test_defaults_are_the_papers():
+    params = ldls.Params()
+    assert params == ldls.Params.paper()
+    assert (params.neighbors, params.sigma, params.pixel_weight) == (10, 1.0, 0.001)
+    assert (params.window, params.iterations, params.remove_outliers) == (5, 200, True)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("neighbors", 0),
+        ("neighbors", -1),
+        ("neighbors", 2.5),
+        ("neighbors", 10**9),
+        ("neighbors", True),
+        ("sigma", 0.0),
+        ("sigma", -1.0),
+        ("sigma", float("nan")),
+        ("sigma", "wide"),
+        ("pixel_weight", 0.0),
+        ("pixel_weight", float("inf")),
+        ("window", 4),
+        ("window", 0),
+        ("window", 103),
+        ("iterations", 0),
+        ("iterations", 10**9),
+        ("iterations", "many"),
+        ("threads", 0),
+        ("threads", 10**6),
+        ("remove_outliers", 1),
+    ],
+)
+def test_values_out_of_range_are_refused_by_name(name, value):
+    with pytest.raises(ldls.ParameterError, match=f"^{name}: ") as caught:
+        ldls.Params(**{name: value})
+    assert isinstance(caught.value, ValueError)
+    assert caught.value.code == "parameter"
+
+
+def test_an_unknown_parameter_is_a_type_error():
+    with pytest.raises(TypeError, match="neighbours"):
+        ldls.Params(neighbours=10)
+
+
+def test_numpy_numbers_are_numbers():
+    params = ldls.Params(neighbors=np.int64(5), sigma=np.float32(2), iterations=np.uint8(7))
+    assert params.as_tuple()[0] == 5
+
+
+@pytest.mark.parametrize("value", ["0", "many", "-2", ""])
+def test_a_bad_environment_variable_is_named(monkeypatch, value):
+    monkeypatch.setenv("LDLS_NUM_THREADS", value)
+    with pytest.raises(ldls.ParameterError, match="LDLS_NUM_THREADS"):
+        ldls.Params()
+
+
+def test_the_environment_sets_the_threads(monkeypatch):
+    monkeypatch.setenv("LDLS_NUM_THREADS", "3")
+    assert ldls._ldls.default_threads() == 3

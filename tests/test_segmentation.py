@@ -1,0 +1,332 @@
+"""What `segment` accepts, refuses, reports and returns."""
+
+import multiprocessing
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import ldls
+from conftest import pinhole
+from ldls.errors import DuplicateWarning, NoUsablePoints, PrecisionWarning, ScaleWarning
+
+
+def test_shapes_and_types_of_the_result(small_scene):
+    points, masks, camera = small_scene
+    result = ldls.segment(points, masks, camera)
+    n = len(points)
+    assert (result.labels.dtype, result.labels.shape) == (np.int32, (n,))
+    assert (result.diffused_labels.dtype, result.categories.dtype) == (np.int32, np.int32)
+    assert (result.confidence.dtype, result.in_view.dtype) == (np.float32, np.int64)
+    assert set(np.unique(result.labels)) == {0, 1, 2}
+    assert set(np.unique(result.categories)) == {0, 1, 3}
+    assert (result.categories[result.labels == 2] == 3).all()
+    in_view = result.confidence[result.in_view]
+    assert ((in_view > 0) & (in_view <= 1)).all()
+    assert "2 of 2 objects found" in repr(result)
+    assert set(result.timings) == {
+        "project", "pixel_labels", "neighbors", "graph", "diffusion", "components",
+    }  # fmt: skip
+
+
+def test_objects_describe_their_points(small_scene):
+    points, masks, camera = small_scene
+    result = ldls.segment(points, masks, camera)
+    for label, found in enumerate(result.objects, start=1):
+        members = points[result.labels == label]
+        assert (found.label, found.n_points) == (label, len(members))
+        np.testing.assert_allclose(found.centroid, members.mean(axis=0), rtol=1e-5)
+        np.testing.assert_allclose(found.distance_m, np.hypot(*found.centroid[:2]))
+        assert found.box.size[0] >= found.box.size[1]
+    assert [found.name for found in result.objects] == ["person", "car"]
+
+
+@pytest.mark.parametrize("yaw_deg", [-89, -45, 0, 10, 33, 90])
+def test_boxes_find_the_heading_of_a_rectangle(yaw_deg):
+    generator = np.random.default_rng(1)
+    corners = np.array([[2, 1], [2, -1], [-2, 1], [-2, -1]])
+    local = np.vstack([corners, generator.uniform([-2, -1], [2, 1], (100, 2))])
+    yaw = np.deg2rad(yaw_deg)
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    ground = local @ turn.T + [10, -3]
+    height = generator.uniform(-1, 1, (len(ground), 1))
+    box = ldls.objects.fit_upright_box(np.hstack([ground, height]))
+    np.testing.assert_allclose(box.size[:2], [4, 2], atol=1e-9)
+    np.testing.assert_allclose(box.center[:2], [10, -3], atol=1e-9)
+    assert np.rad2deg(box.yaw) == pytest.approx(yaw_deg)
+
+
+@pytest.mark.parametrize(
+    "convert",
+    [
+        pytest.param(np.asfortranarray, id="Fortran order"),
+        pytest.param(lambda p: np.repeat(p, 2, axis=0)[::2], id="every other row"),
+        pytest.param(lambda p: np.ascontiguousarray(p.T).T, id="transposed"),
+        pytest.param(lambda p: p[::-1].copy()[::-1], id="negative strides"),
+        pytest.param(lambda p: p.astype(">f4"), id="big-endian"),
+        pytest.param(lambda p: np.hstack([p, p]), id="more columns"),
+        pytest.param(lambda p: np.hstack([p, p])[:, :3], id="some columns of more"),
+        pytest.param(lambda p: p.tolist(), id="nested lists"),
+        pytest.param(lambda p: misaligned(p), id="misaligned"),
+        pytest.param(lambda p: read_only(p), id="read-only"),
+    ],
+)
+def test_any_layout_gives_the_same_bits(small_scene, convert):
+    points, masks, camera = small_scene
+    expected = ldls.segment(points, masks, camera)
+    result = ldls.segment(convert(points), masks, camera)
+    assert result.labels.tobytes() == expected.labels.tobytes()
+    assert result.confidence.tobytes() == expected.confidence.tobytes()
+
+
+def misaligned(points):
+    moved = np.frombuffer(b"\0" + points.tobytes(), np.uint8)[1:].view(np.float32).reshape(points.shape)
+    assert not moved.flags.aligned
+    return moved
+
+
+def read_only(points):
+    points = points.copy()
+    points.flags.writeable = False
+    return points
+
+
+@pytest.mark.parametrize(
+    ("points", "error", "message"),
+    [
+        pytest.param(np.zeros((3, 100)), ldls.ShapeError, r"got \(3, 100\); transpose", id="(3, N)"),
+        pytest.param(np.zeros((100, 2)), ldls.ShapeError, r"points: .*\(100, 2\)", id="(N, 2)"),
+        pytest.param(np.zeros(9), ldls.ShapeError, r"points: .*\(9,\)", id="(N,)"),
+        pytest.param(np.zeros((2, 3, 4)), ldls.ShapeError, "points", id="3-D"),
+        pytest.param(np.zeros((4, 3), int), ldls.DtypeError, "got int64; pass points.ast", id="int"),
+        pytest.param(np.zeros((4, 3), "f2"), ldls.DtypeError, "got float16", id="float16"),
+        pytest.param(np.zeros((4, 3), complex), ldls.DtypeError, "complex", id="complex"),
+        pytest.param(np.zeros((4, 3), object), ldls.DtypeError, "object", id="object"),
+        pytest.param(np.ma.zeros((4, 3)), ldls.DtypeError, "masked array", id="masked"),
+        pytest.param(np.full((4, 3), 1e30), ldls.InputError, "row 0 has a coordinate of 1e30", id="far"),
+    ],
+)
+def test_points_that_cannot_be_used_are_refused(small_scene, points, error, message):
+    _, masks, camera = small_scene
+    with pytest.raises(error, match=message) as caught:
+        ldls.segment(points, masks, camera)
+    assert isinstance(caught.value, ValueError)
+    assert isinstance(caught.value, TypeError) == (error is ldls.DtypeError)
+
+
+def test_other_arguments_are_refused_by_name(small_scene):
+    points, masks, camera = small_scene
+    with pytest.raises(ldls.InputError, match="^masks: expected InstanceMasks, got ndarray"):
+        ldls.segment(points, masks.to_array(), camera)
+    with pytest.raises(ldls.InputError, match="^camera: expected Camera, got ndarray"):
+        ldls.segment(points, masks, camera.projection)
+    with pytest.raises(ldls.ParameterError, match="^nonfinite: got 'ignore'"):
+        ldls.segment(points, masks, camera, nonfinite="ignore")
+    sized = pinhole(image_size=(80, 60))
+    with pytest.raises(ldls.MaskError, match=r"\(60, 80\), the camera's image is \(80, 60\); swapped"):
+        ldls.segment(points, masks, sized)
+
+
+def test_points_without_coordinates_are_left_out_and_counted(small_scene):
+    points, masks, camera = small_scene
+    clean = ldls.segment(points, masks, camera)
+    holes = np.insert(points, [0, 100, 500], [[np.nan, 0, 9], [0, np.inf, 9], [0, 0, 0]], axis=0)
+    result = ldls.segment(holes, masks, camera)
+    assert (result.report.n_nonfinite, result.report.n_origin) == (2, 1)
+    assert result.labels[[0, 101, 502]].tolist() == [-1, -1, -1]
+    kept = np.delete(result.labels, [0, 101, 502])
+    np.testing.assert_array_equal(kept, clean.labels)
+    with pytest.raises(ldls.NonFiniteError, match="501 of 503 rows are finite, row 0 is the first"):
+        ldls.segment(holes, masks, camera, nonfinite="raise")
+
+
+def test_the_origin_can_be_a_point(small_scene):
+    _, masks, _ = small_scene
+    camera = pinhole(T_camera_lidar=translation([0, 0, 5]))
+    origin = np.zeros((1, 3))
+    assert ldls.segment(origin, masks, camera).labels.tolist() == [-1]
+    assert ldls.segment(origin, masks, camera, keep_origin=True).labels.tolist() == [0]
+
+
+def test_every_point_is_accounted_for(small_scene):
+    points, masks, camera = small_scene
+    scattered = np.concatenate([points, -points, points * [5, 5, 1]]).astype(np.float32)
+    report = ldls.segment(scattered, masks, camera).report
+    assert report.n_points == 1500
+    assert report.n_behind == 500  # the scene mirrored
+    left_out = report.n_nonfinite + report.n_origin + report.n_behind + report.n_outside
+    assert report.n_in_view + left_out == report.n_points
+
+
+@pytest.mark.parametrize(
+    ("points", "expected"),
+    [
+        pytest.param(np.zeros((0, 3), np.float32), [], id="no points"),
+        pytest.param([[0.0, 0, 10]], [0], id="one point"),
+        pytest.param([[-1.5, 0, 10.0], [2.0, 0, 10], [0, 0, 10]], [1, 2, 0], id="fewer than K"),
+        pytest.param([[0.0, 0, -10], [50, 0, 10]], [-1, -1], id="nothing in view"),
+    ],
+)
+def test_clouds_with_next_to_nothing_are_fine(small_scene, points, expected):
+    _, masks, camera = small_scene
+    result = ldls.segment(points, masks, camera)
+    assert result.labels.tolist() == expected
+    assert result.report.k_effective == max(len(result.in_view) - 1, 0)
+    assert len(result.objects) == 2
+
+
+def test_no_masks_make_everything_background(small_scene):
+    points, masks, camera = small_scene
+    none = ldls.InstanceMasks.from_array([], image_size=masks.image_size)
+    result = ldls.segment(points, none, camera)
+    assert (result.labels[result.in_view] == 0).all()
+    assert result.objects == ()
+
+
+def test_empty_and_total_masks_are_reported_and_used(small_scene):
+    points, masks, camera = small_scene
+    pixels = np.stack([np.zeros(masks.image_size, bool), np.ones(masks.image_size, bool)])
+    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera)
+    assert result.report.empty_masks == (1,)
+    assert (result.diffused_labels[result.in_view] == 2).all()
+    assert result.objects[0].box is None
+    assert result.objects[0].distance_m is None
+
+
+def test_more_instances_than_a_byte_counts(small_scene):
+    points, masks_of_scene, camera = small_scene
+    pixels = np.zeros((300, 60, 80), bool)
+    pixels[298] = masks_of_scene.to_array()[0]
+    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera)
+    assert set(np.unique(result.labels)) == {0, 299}
+
+
+def test_copies_get_one_label_whatever_their_order(small_scene):
+    points, masks, camera = small_scene
+    doubled = np.repeat(points, 2, axis=0)
+    result = ldls.segment(doubled, masks, camera)
+    np.testing.assert_array_equal(result.labels[::2], result.labels[1::2])
+    assert result.report.n_duplicates == len(result.in_view)
+    shuffled = np.random.default_rng(0).permutation(len(doubled))
+    again = ldls.segment(doubled[shuffled], masks, camera)
+    np.testing.assert_array_equal(again.labels, result.labels[shuffled])
+
+
+def test_a_cloud_of_copies_is_reported(small_scene):
+    points, masks, camera = small_scene
+    with pytest.warns(DuplicateWarning, match="more copies than neighbours"):
+        result = ldls.segment(np.repeat(points, 12, axis=0), masks, camera)
+    assert np.isfinite(result.confidence).all()
+
+
+def test_map_coordinates_in_double_precision_keep_their_precision(small_scene):
+    points, masks, camera = small_scene
+    points = np.round(points.astype(np.float64) * 1024) / 1024
+    offset = np.array([500_000.0, 5_000_000.0, 100.0])
+    shifted = ldls.Camera(projection=camera.projection, T_camera_lidar=translation(-offset))
+    local = ldls.segment(points, masks, camera)
+    far = ldls.segment(points + offset, masks, shifted)
+    assert far.labels.tobytes() == local.labels.tobytes()
+    assert far.confidence.tobytes() == local.confidence.tobytes()
+    with pytest.warns(PrecisionWarning, match="float32 spacing at 5.0e\\+06 is 0.5 m"):
+        ldls.segment((points + offset).astype(np.float32), masks, shifted)
+
+
+def translation(offset):
+    transform = np.eye(4)
+    transform[:3, 3] = offset
+    return transform
+
+
+def test_millimetres_for_metres_are_suspected(small_scene):
+    points, masks, camera = small_scene
+    with pytest.warns(ScaleWarning, match="are they in metres"):
+        ldls.segment(points.astype(np.float64) * 1e4, masks, camera)
+
+
+def test_a_cloud_of_nans_is_warned_of(small_scene):
+    _, masks, camera = small_scene
+    with pytest.warns(NoUsablePoints, match="0 of 9 rows are finite"):
+        result = ldls.segment(np.full((9, 3), np.nan), masks, camera)
+    assert (result.labels == -1).all()
+
+
+def test_arguments_stay_as_they_are(small_scene):
+    points, masks, camera = small_scene
+    before = points.copy()
+    ldls.segment(points, masks, camera)
+    assert points.tobytes() == before.tobytes()
+
+
+def test_mask_order_does_not_matter(small_scene):
+    points, masks, camera = small_scene
+    pixels = masks.to_array()
+    pixels[1, 25:35, 20:60] = True  # overlaps the first
+    forward = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera)
+    backward = ldls.segment(points, ldls.InstanceMasks.from_array(pixels[::-1]), camera)
+    swapped = np.array([0, 2, 1, -1])[backward.labels]
+    np.testing.assert_array_equal(forward.labels, swapped)
+
+
+def test_many_python_threads_may_call_at_once(small_scene):
+    points, masks, camera = small_scene
+    expected = ldls.segment(points, masks, camera).labels.tobytes()
+    found = []
+
+    def work():
+        found.extend(ldls.segment(points, masks, camera).labels.tobytes() for _ in range(20))
+
+    workers = [threading.Thread(target=work) for _ in range(8)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert found == [expected] * 160
+
+
+def test_other_threads_run_meanwhile(small_scene):
+    _, masks, camera = small_scene
+    points = np.random.default_rng(0).uniform([-4, -3, 9], [4, 3, 11], (200_000, 3))
+    running = threading.Event()
+    done = threading.Event()
+    count = 0
+
+    def work():
+        running.set()
+        ldls.segment(points, masks, camera)
+        done.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    running.wait()
+    while not done.wait(timeout=0.001):
+        count += 1
+    thread.join()
+    assert count > 10, "the GIL was held"
+
+
+def segment_in_child(arguments, answers):
+    answers.put(ldls.segment(*arguments).labels.tobytes())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no fork on Windows")
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+def test_a_forked_child_computes_the_same(small_scene):
+    points, masks, camera = small_scene
+    expected = ldls.segment(points, masks, camera).labels.tobytes()
+    context = multiprocessing.get_context("fork")
+    answers = context.SimpleQueue()
+    child = context.Process(target=segment_in_child, args=((points, masks, camera), answers))
+    child.start()
+    child.join(timeout=10)
+    assert child.exitcode == 0
+    assert answers.get() == expected
+
+
+def test_a_bug_in_a_worker_is_an_internal_error_and_the_next_call_works(small_scene, capfd):
+    points, masks, camera = small_scene
+    with pytest.raises(ldls.InternalError, match=r"panic asked for \(at .*call\.rs:.*please report"):
+        ldls._ldls.panic_in_worker()
+    assert capfd.readouterr().err == ""
+    assert len(ldls.segment(points, masks, camera).labels) == len(points)
