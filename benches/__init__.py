@@ -1,0 +1,1 @@
+"""Comparisons with peers, each in one process with the same threads: `python -m benches`."""
