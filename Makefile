@@ -1,0 +1,44 @@
+# Every target that `make help` prints has a sentence behind ##.
+.DEFAULT_GOAL := help
+
+.PHONY: help
+help: ## Print these targets.
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  \1\t\2/' | expand -t 16
+
+.PHONY: install
+install: ## Install the package, optimised, with what the tests and linters need.
+	pip install '.[dev]'
+
+.PHONY: develop
+develop: ## Build the extension into the source tree, for working on it.
+	maturin develop --release --extras dev
+
+.PHONY: test
+test: ## Run the tests of Python and Rust.
+	pytest
+	cargo test
+
+.PHONY: lint
+lint: ## Run all linters and type checks.
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets -- -D warnings
+	ruff check .
+	ruff format --check .
+	mypy
+	python -m mypy.stubtest ldls._ldls
+
+.PHONY: format
+format: ## Format Rust and Python.
+	cargo fmt --all
+	ruff check --fix .
+	ruff format .
+
+.PHONY: bench
+bench: ## Compare with peers, then time every stage.
+	python -m benches
+	cargo bench
+
+.PHONY: picture
+picture: ## Make the picture of the README anew.
+	ldls demo --out build/demo
+	cp build/demo/demo.png docs/images/demo.png
