@@ -32,8 +32,8 @@ def test_random_scenes_equal_the_oracle(seed):
     diffused = result.diffused_labels[result.in_view]
     best = expected.likelihood.max(axis=1, initial=0)
     value = np.take_along_axis(expected.likelihood, diffused[:, None], axis=1)[:, 0]
-    # where two labels differ by less than single precision resolves, either is right
-    assert (best - value <= 2e-6 * best).all()
+    # where two labels are equal but for the rounding of double precision, either is right
+    assert (best - value <= 1e-12 * best).all()
     kept = oracle.largest_components(expected.edges, diffused) if params.remove_outliers else diffused
     np.testing.assert_array_equal(result.labels[result.in_view], kept)
     outside = np.ones(len(points), bool)
@@ -97,7 +97,8 @@ def test_the_stages_together_equal_the_whole(frame_571):
     frame = frame_571
     in_view, pixels = stages.project(frame.points, frame.camera, image_size=frame.masks.image_size)
     indices, squared_distances = stages.neighbors(frame.points[in_view])
-    graph = stages.point_graph(indices, squared_distances)
+    assert (np.diff(squared_distances, axis=1) >= 0).all()
+    graph = stages.point_graph(frame.points[in_view], indices)
     A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, frame.masks))
     z = stages.diffuse(A, b)
     np.testing.assert_array_equal(in_view, frame.expected["in_view"])
@@ -110,7 +111,7 @@ def test_the_converged_solution_is_the_fixed_point(small_scene):
     points, masks, camera = small_scene
     result = ldls.segment(points, masks, camera, params=ldls.Params(iterations=None))
     assert result.report.converged
-    longer = ldls.segment(points, masks, camera, params=ldls.Params(iterations=result.report.products * 4))
+    longer = ldls.segment(points, masks, camera, params=ldls.Params(iterations=20_000))
     np.testing.assert_allclose(result.confidence, longer.confidence, atol=2e-3)
 
 

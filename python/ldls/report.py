@@ -18,9 +18,10 @@ class Report:
         n_outside: Points in front of the camera but beside the image.
         n_duplicates: Points in view that share their place with another point in view.
         k_effective: Neighbours that each point has: K, or one less than the points in view.
-        products: Products with the graph that the result stands for.
-        residual: Largest change of any likelihood in the last product.
-        converged: Whether that change is at most 1e-6. 200 products of the paper seldom converge, by design.
+        n_refined: Points at which two labels were so near that double precision had to decide.
+        sweeps: Sweeps over the graph that were computed; a series saves most of the products.
+        residual: Largest change of any likelihood that one more product would make.
+        converged: Whether that change is at most 1e-5. The paper's 200 products seldom converge, by design.
         empty_masks: Labels of instances whose mask has no pixel.
     """
 
@@ -32,7 +33,8 @@ class Report:
     n_outside: int
     n_duplicates: int
     k_effective: int
-    products: int
+    n_refined: int
+    sweeps: int
     residual: float
     converged: bool
     empty_masks: tuple[int, ...]

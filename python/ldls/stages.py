@@ -2,7 +2,7 @@
 
     in_view, pixels = stages.project(points, camera, image_size=masks.image_size)
     indices, squared_distances = stages.neighbors(points[in_view])
-    graph = stages.point_graph(indices, squared_distances)
+    graph = stages.point_graph(points[in_view], indices)
     A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, masks))
     z = stages.diffuse(A, b)
     labels = stages.largest_components(A, z.argmax(axis=1))
@@ -76,7 +76,7 @@ def project(
 
 def neighbors(
     points: ArrayLike, k: int = _PAPER.neighbors, *, threads: int | None = None
-) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
     """Indices and squared distances (n, k) of the nearest other points, nearest first (step 3).
 
     Of equally distant points the one of lower index is nearer. With fewer than k other points, k is their number.
@@ -87,15 +87,12 @@ def neighbors(
         threads: As in `Params`.
     """
     Params(neighbors=k)
-    xyz = np.ascontiguousarray(as_points(points)[:, :3], np.float64)
-    if not np.isfinite(xyz).all():
-        raise NonFiniteError("points: expected finite coordinates; leave other rows out first")
-    return _ldls.neighbors(xyz, k, threads)
+    return _ldls.neighbors(_finite_xyz(points), k, threads)
 
 
 def point_graph(
+    points: ArrayLike,
     indices: ArrayLike,
-    squared_distances: ArrayLike,
     *,
     sigma: float = _PAPER.sigma,
     threads: int | None = None,
@@ -103,17 +100,16 @@ def point_graph(
     """Sparse (n, n) weights: 1 to itself and exp(-d^2 / sigma) to its neighbours (step 3); rows not normalised.
 
     Args:
+        points: (n, >= 3) finite, in metres.
         indices: (n, k) neighbours of each point.
-        squared_distances: (n, k) in square metres.
         sigma: In square metres.
         threads: As in `Params`.
     """
     Params(sigma=sigma)
     columns = np.ascontiguousarray(indices, np.uint32)
-    distances = np.ascontiguousarray(squared_distances, np.float32)
-    if columns.ndim != 2 or (columns.size and columns.max() >= len(columns)):
-        raise ShapeError(f"indices: expected (n, k) numbers below n, got shape {columns.shape}")
-    return _csr(_ldls.point_graph(columns, distances, sigma, threads), len(columns))
+    if columns.ndim != 2:
+        raise ShapeError(f"indices: expected (n, k), got shape {columns.shape}")
+    return _csr(_ldls.point_graph(_finite_xyz(points), columns, sigma, threads), len(columns))
 
 
 def pixel_labels(
@@ -163,6 +159,13 @@ def largest_components(graph: csr_array, labels: ArrayLike) -> NDArray[np.int32]
     if array.size and array.min() < 0:
         raise InputError("labels: expected 0 or more; pass the points in view only")
     return _ldls.largest_components(_arrays(graph), np.ascontiguousarray(array, np.uint32))
+
+
+def _finite_xyz(points: ArrayLike) -> NDArray[np.float64]:
+    xyz = np.ascontiguousarray(as_points(points)[:, :3], np.float64)
+    if not np.isfinite(xyz).all():
+        raise NonFiniteError("points: expected finite coordinates; leave other rows out first")
+    return xyz
 
 
 def _csr(arrays: tuple[Any, Any, Any], columns: int) -> csr_array:

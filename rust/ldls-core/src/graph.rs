@@ -1,27 +1,39 @@
 //! The point graph as a sparse matrix (method, steps 3 and 4).
 
-use crate::{Error, Neighbors, PixelLabels, Result};
+use crate::{Error, Neighbors, PixelLabels, Real, Result};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows handled by one task of the thread pool.
 const BLOCK: usize = 1024;
 
-/// Weighted edges between points in compressed sparse rows: row i lists the points that label flows from to point i.
+/// Weighted edges between points in compressed sparse rows: row i lists the points that label flows
+/// from to point i.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PointGraph {
+pub struct PointGraph<T = f32> {
     offsets: Vec<usize>,
     columns: Vec<u32>,
-    weights: Vec<f32>,
+    weights: Vec<T>,
 }
 
-impl PointGraph {
-    /// The graph in which each of `n` points is joined to itself with weight 1 and to its neighbours with weight
-    /// exp(-d^2 / `sigma`), d in metres. Rows are not normalised.
-    pub fn from_neighbors(n: usize, neighbors: &Neighbors, sigma: f64) -> Self {
-        let k = neighbors.k;
+impl<T: Real> PointGraph<T> {
+    /// The graph in which each of `points` (metres) is joined to itself with weight 1 and to its
+    /// neighbours with weight exp(-d^2 / `sigma`). Rows are not normalised.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where `neighbors` is of other points.
+    pub fn from_neighbors(points: &[[f64; 3]], neighbors: &Neighbors, sigma: f64) -> Result<Self> {
+        let (n, k) = (points.len(), neighbors.k);
+        if neighbors.indices.len() != n * k || neighbors.indices.iter().any(|&j| j as usize >= n) {
+            let problem = format!("expected {k} numbers below {n} for each of {n} points");
+            return Err(Error::Mismatch {
+                name: "neighbors",
+                problem,
+            });
+        }
         let degree = k + 1;
         let mut columns = vec![0; n * degree];
-        let mut weights = vec![0.0; n * degree];
+        let mut weights = vec![T::default(); n * degree];
         columns
             .par_chunks_mut(degree)
             .zip(weights.par_chunks_mut(degree))
@@ -29,59 +41,54 @@ impl PointGraph {
             .enumerate()
             .for_each(|(i, (columns, weights))| {
                 columns[0] = i as u32;
-                weights[0] = 1.0;
-                let edges = i * k..(i + 1) * k;
-                columns[1..].copy_from_slice(&neighbors.indices[edges.clone()]);
-                for (weight, &d2) in weights[1..]
-                    .iter_mut()
-                    .zip(&neighbors.squared_distances[edges])
-                {
-                    *weight = (-f64::from(d2) / sigma).exp() as f32;
+                weights[0] = T::from_f64(1.0);
+                columns[1..].copy_from_slice(&neighbors.indices[i * k..(i + 1) * k]);
+                for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
+                    let squared = squared_distance(&points[i], &points[j as usize]);
+                    *weight = T::from_f64(-squared / sigma).exp();
                 }
             });
-        Self {
+        Ok(Self {
             offsets: (0..=n).map(|i| i * degree).collect(),
             columns,
             weights,
-        }
+        })
     }
 
     /// A graph from the three arrays of a sparse matrix.
     ///
     /// # Errors
     /// [`Error::Mismatch`] where the arrays do not describe a square matrix of finite weights.
-    pub fn from_csr(offsets: Vec<usize>, columns: Vec<u32>, weights: Vec<f32>) -> Result<Self> {
+    pub fn from_csr(offsets: Vec<usize>, columns: Vec<u32>, weights: Vec<T>) -> Result<Self> {
         let mismatch = |problem: String| {
             Err(Error::Mismatch {
                 name: "graph",
                 problem,
             })
         };
-        let ascending = offsets.first() == Some(&0)
-            && offsets.is_sorted()
-            && offsets.last() == Some(&columns.len());
-        if !ascending {
-            return mismatch(format!(
-                "indptr must ascend from 0 to the number of entries, {}",
-                columns.len()
-            ));
+        let entries = columns.len();
+        let ascending = offsets.first() == Some(&0) && offsets.is_sorted();
+        if !ascending || offsets.last() != Some(&entries) {
+            let problem = format!("indptr must ascend from 0 to the number of entries, {entries}");
+            return mismatch(problem);
         }
-        if columns.len() != weights.len() {
+        if entries != weights.len() {
             return mismatch(format!(
-                "{} column indices but {} weights",
-                columns.len(),
+                "{entries} column indices but {} weights",
                 weights.len()
             ));
         }
         let n = offsets.len() - 1;
         if let Some(column) = columns.iter().find(|&&column| column as usize >= n) {
-            return mismatch(format!(
-                "column index {column} in a matrix of {n} rows, expected a square matrix"
-            ));
+            let problem = format!("column {column} in {n} rows, expected a square matrix");
+            return mismatch(problem);
         }
-        if let Some(at) = weights.iter().position(|weight| !weight.is_finite()) {
+        if let Some(at) = weights
+            .iter()
+            .position(|weight| !weight.to_f64().is_finite())
+        {
             return mismatch(format!(
-                "entry {at} is {}, expected finite weights",
+                "entry {at} is {:?}, expected finite weights",
                 weights[at]
             ));
         }
@@ -96,7 +103,7 @@ impl PointGraph {
     ///
     /// # Errors
     /// [`Error::Mismatch`] where `labels` is of another number of points.
-    pub fn normalize_rows(&mut self, labels: &mut PixelLabels) -> Result<()> {
+    pub fn normalize_rows(&mut self, labels: &mut PixelLabels<T>) -> Result<()> {
         if labels.rows() != self.len() {
             let problem = format!("{} rows, the graph has {}", labels.rows(), self.len());
             return Err(Error::Mismatch {
@@ -104,17 +111,26 @@ impl PointGraph {
                 problem,
             });
         }
-        for i in 0..self.len() {
-            let edges = &mut self.weights[self.offsets[i]..self.offsets[i + 1]];
-            let pixels = &mut labels.weights[labels.offsets[i]..labels.offsets[i + 1]];
-            let sum = edges.iter().map(|&w| f64::from(w)).sum::<f64>() + f64::from(labels.mass[i]);
+        let scale = |(i, mass): (usize, &T)| {
+            let edges = &self.weights[self.offsets[i]..self.offsets[i + 1]];
+            let sum = edges.iter().map(|w| w.to_f64()).sum::<f64>() + mass.to_f64();
             // a row without edges stays empty rather than become NaN
-            let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-            let normalise = |weight: &mut f32| *weight = (f64::from(*weight) * scale) as f32;
-            edges.iter_mut().for_each(normalise);
-            pixels.iter_mut().for_each(normalise);
-            normalise(&mut labels.mass[i]);
-        }
+            if sum > 0.0 { 1.0 / sum } else { 0.0 }
+        };
+        let scales: Vec<f64> = labels
+            .mass
+            .par_iter()
+            .enumerate()
+            .with_min_len(BLOCK)
+            .map(scale)
+            .collect();
+        scale_rows(&mut self.weights, &self.offsets, &scales);
+        scale_rows(&mut labels.weights, &labels.offsets, &scales);
+        labels
+            .mass
+            .iter_mut()
+            .zip(&scales)
+            .for_each(|(mass, scale)| rescale(mass, *scale));
         Ok(())
     }
 
@@ -130,18 +146,60 @@ impl PointGraph {
 
     /// Columns and weights of row `i`.
     #[inline]
-    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f32)> {
-        let range = self.offsets[i]..self.offsets[i + 1];
-        self.columns[range.clone()]
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, T)> {
+        let (columns, weights) = self.row_slices(i);
+        columns
             .iter()
             .map(|&column| column as usize)
-            .zip(self.weights[range].iter().copied())
+            .zip(weights.iter().copied())
+    }
+
+    /// Columns and weights of row `i`.
+    #[inline(always)]
+    pub(crate) fn row_slices(&self, i: usize) -> (&[u32], &[T]) {
+        let range = self.offsets[i]..self.offsets[i + 1];
+        (&self.columns[range.clone()], &self.weights[range])
+    }
+
+    /// Columns of a range of rows, row after row.
+    pub(crate) fn columns_of(&self, rows: Range<usize>) -> &[u32] {
+        &self.columns[self.offsets[rows.start]..self.offsets[rows.end]]
     }
 
     /// Row starts, column indices and weights.
-    pub fn into_csr(self) -> (Vec<usize>, Vec<u32>, Vec<f32>) {
+    pub fn into_csr(self) -> (Vec<usize>, Vec<u32>, Vec<T>) {
         (self.offsets, self.columns, self.weights)
     }
+}
+
+/// Squared distance of two points, in double precision and always in the same order.
+#[inline]
+pub(crate) fn squared_distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    x * x + y * y + z * z
+}
+
+fn scale_rows<T: Real>(mut values: &mut [T], offsets: &[usize], scales: &[f64]) {
+    let mut blocks = Vec::with_capacity(scales.len().div_ceil(BLOCK));
+    for (block, scales) in scales.chunks(BLOCK).enumerate() {
+        let offsets = &offsets[block * BLOCK..=block * BLOCK + scales.len()];
+        let (head, tail) = values.split_at_mut(offsets[scales.len()] - offsets[0]);
+        blocks.push((head, offsets, scales));
+        values = tail;
+    }
+    blocks
+        .into_par_iter()
+        .for_each(|(values, offsets, scales)| {
+            for (i, &scale) in scales.iter().enumerate() {
+                for value in &mut values[offsets[i] - offsets[0]..offsets[i + 1] - offsets[0]] {
+                    rescale(value, scale);
+                }
+            }
+        });
+}
+
+fn rescale<T: Real>(value: &mut T, scale: f64) {
+    *value = T::from_f64(value.to_f64() * scale);
 }
 
 #[cfg(test)]
@@ -150,13 +208,13 @@ mod tests {
 
     fn chain() -> PointGraph {
         let points: Vec<[f64; 3]> = (0..4).map(|i| [f64::from(i), 0.0, 0.0]).collect();
-        PointGraph::from_neighbors(4, &Neighbors::search(&points, 2), 2.0)
+        PointGraph::from_neighbors(&points, &Neighbors::search(&points, 2), 2.0).unwrap()
     }
 
     #[test]
     fn weights_fall_with_the_squared_distance() {
         let row: Vec<_> = chain().row(0).collect();
-        let weight = |d2: f64| (-d2 / 2.0).exp() as f32;
+        let weight = |d2: f32| (-d2 / 2.0).exp();
         assert_eq!(row, [(0, 1.0), (1, weight(1.0)), (2, weight(4.0))]);
     }
 

@@ -8,17 +8,21 @@
 //! taken by one thread in one order.
 
 mod camera;
+mod chebyshev;
 mod cloud;
 mod components;
 mod diffusion;
 mod error;
 mod graph;
+mod lanes;
 mod masks;
 mod neighbors;
 mod params;
 mod polygon;
+mod real;
 mod rle;
 mod segment;
+mod sweeps;
 
 pub use camera::{Camera, View, ViewCounts};
 pub use cloud::Cloud;
@@ -29,6 +33,7 @@ pub use graph::PointGraph;
 pub use masks::{InstanceMasks, PixelLabels};
 pub use neighbors::Neighbors;
 pub use params::Params;
+pub use real::Real;
 pub use rle::Rle;
 pub use segment::{Report, Segmentation, Timings, segment};
 

@@ -2,7 +2,7 @@
 
 use crate::camera::nearest_pixel;
 use crate::rle::check_size;
-use crate::{Error, Result, Rle};
+use crate::{Error, Real, Result, Rle};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -22,15 +22,15 @@ pub struct InstanceMasks {
 /// The pixel edges of every point, added up by label: row i holds the labels found in the window of point i and the
 /// sum of the weights of the edges that end in each. A pixel under several masks counts for each of them.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct PixelLabels {
+pub struct PixelLabels<T = f32> {
     /// Row i lies at `offsets[i]..offsets[i + 1]`.
     pub offsets: Vec<usize>,
     /// Labels, ascending within a row.
     pub labels: Vec<u32>,
     /// Weight of each of them.
-    pub weights: Vec<f32>,
+    pub weights: Vec<T>,
     /// Sum of the weights of all pixel edges of a point, each pixel once.
-    pub mass: Vec<f32>,
+    pub mass: Vec<T>,
 }
 
 impl InstanceMasks {
@@ -102,16 +102,16 @@ impl InstanceMasks {
     ///
     /// # Errors
     /// [`Error::Mismatch`] where the nearest pixel of a point lies outside the image.
-    pub fn pixel_labels(
+    pub fn pixel_labels<T: Real>(
         &self,
         uv: &[[f64; 2]],
         window: usize,
         pixel_weight: f64,
-    ) -> Result<PixelLabels> {
+    ) -> Result<PixelLabels<T>> {
         let pixels = self.nearest_pixels(uv)?;
         let image = LabelImage::paint(self);
         let n = pixels.len();
-        let blocks: Vec<PixelLabels> = (0..n.div_ceil(BLOCK))
+        let blocks: Vec<PixelLabels<T>> = (0..n.div_ceil(BLOCK))
             .into_par_iter()
             .map(|block| {
                 let mut labels = PixelLabels::default();
@@ -153,7 +153,7 @@ impl InstanceMasks {
     }
 }
 
-impl PixelLabels {
+impl<T: Real> PixelLabels<T> {
     /// Labels from the three arrays of a sparse matrix, and the weight of all pixel edges of each point.
     ///
     /// # Errors
@@ -161,8 +161,8 @@ impl PixelLabels {
     pub fn from_csr(
         offsets: Vec<usize>,
         labels: Vec<u32>,
-        weights: Vec<f32>,
-        mass: Vec<f32>,
+        weights: Vec<T>,
+        mass: Vec<T>,
     ) -> Result<Self> {
         let ascending = offsets.first() == Some(&0)
             && offsets.is_sorted()
@@ -191,10 +191,11 @@ impl PixelLabels {
     fn push(&mut self, counts: &WindowCounts, pixel_weight: f64) {
         for &(label, count) in &counts.labels {
             self.labels.push(label);
-            self.weights.push((pixel_weight * f64::from(count)) as f32);
+            self.weights
+                .push(T::from_f64(pixel_weight * f64::from(count)));
         }
         self.mass
-            .push((pixel_weight * f64::from(counts.pixels)) as f32);
+            .push(T::from_f64(pixel_weight * f64::from(counts.pixels)));
         self.offsets.push(self.labels.len());
     }
 
@@ -221,7 +222,7 @@ impl PixelLabels {
 
     /// Labels and weights of point `i`.
     #[inline]
-    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f32)> {
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, T)> {
         let range = self.offsets[i]..self.offsets[i + 1];
         self.labels[range.clone()]
             .iter()
@@ -363,7 +364,7 @@ mod tests {
     #[test]
     fn a_window_at_the_corner_has_fewer_pixels() {
         let labels = masks(6, 6, &[vec![true; 36]])
-            .pixel_labels(&[[0.0, 0.0]], 5, 1.0)
+            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0)
             .unwrap();
         assert_eq!(
             (labels.mass[0], labels.row(0).collect::<Vec<_>>()),
@@ -377,7 +378,7 @@ mod tests {
             pixels in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 63), 0..4),
             u in -0.5..8.49_f64, v in -0.5..6.49_f64, reach in 0_usize..4,
         ) {
-            let found = masks(7, 9, &pixels).pixel_labels(&[[u, v]], 2 * reach + 1, 1.0).unwrap();
+            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0).unwrap();
             let mut expected = vec![0.0_f32; pixels.len() + 1];
             let mut mass = 0.0;
             for row in 0..7_usize {

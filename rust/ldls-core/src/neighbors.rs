@@ -4,6 +4,7 @@
 //! ties in no order and slows down where many points coincide, so it holds every place once, and this file turns
 //! places back into points.
 
+use crate::graph::squared_distance;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use std::num::NonZero;
@@ -18,8 +19,6 @@ pub struct Neighbors {
     pub k: usize,
     /// Neighbours of point i at `i * k..(i + 1) * k`.
     pub indices: Vec<u32>,
-    /// Their squared distances, in square metres.
-    pub squared_distances: Vec<f32>,
 }
 
 impl Neighbors {
@@ -31,47 +30,50 @@ impl Neighbors {
         }
         let places = Places::new(points);
         let mut indices = vec![0; points.len() * k];
-        let mut squared_distances = vec![0.0; points.len() * k];
-        indices
-            .par_chunks_mut(k * BLOCK)
-            .zip(squared_distances.par_chunks_mut(k * BLOCK))
-            .enumerate()
-            .for_each_init(
-                Vec::new,
-                |candidates, (block, (indices, squared_distances))| {
-                    let rows = indices.chunks_mut(k).zip(squared_distances.chunks_mut(k));
-                    for (point, (indices, squared_distances)) in (block * BLOCK..).zip(rows) {
-                        places.nearest(points[point], point as u32, k, candidates);
-                        for (rank, &(squared_distance, index)) in candidates.iter().enumerate() {
-                            indices[rank] = index;
-                            squared_distances[rank] = squared_distance as f32;
-                        }
+        indices.par_chunks_mut(k * BLOCK).enumerate().for_each_init(
+            Vec::new,
+            |candidates, (block, indices)| {
+                for (point, indices) in (block * BLOCK..).zip(indices.chunks_mut(k)) {
+                    places.nearest(points[point], point as u32, k, candidates);
+                    for (slot, &(_, index)) in indices.iter_mut().zip(candidates.iter()) {
+                        *slot = index;
                     }
-                },
-            );
-        Self {
-            k,
-            indices,
-            squared_distances,
-        }
+                }
+            },
+        );
+        Self { k, indices }
     }
 
-    /// Number of points that share their place with another one.
-    pub fn duplicates(&self) -> usize {
-        self.squared_distances
-            .iter()
-            .step_by(self.k.max(1))
-            .filter(|&&nearest| nearest == 0.0)
+    /// Squared distances of the neighbours of `points`, in square metres, in the order of `indices`.
+    pub fn squared_distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        let rows = self.indices.par_chunks(self.k.max(1)).zip(points);
+        rows.flat_map_iter(|(row, point)| {
+            row.iter()
+                .map(|&j| squared_distance(point, &points[j as usize]))
+        })
+        .collect()
+    }
+
+    /// Number of `points` that share their place with another one.
+    pub fn duplicates(&self, points: &[[f64; 3]]) -> usize {
+        self.coincident(points, 0)
+            .filter(|&coincident| coincident)
             .count()
     }
 
-    /// Whether the `k` neighbours of every point share its place, so that the graph falls into islands.
-    pub fn only_islands(&self) -> bool {
+    /// Whether the `k` neighbours of every one of `points` share its place, so that the graph falls into islands.
+    pub fn only_islands(&self, points: &[[f64; 3]]) -> bool {
         self.k > 0
             && self
-                .squared_distances
-                .chunks(self.k)
-                .all(|row| row[self.k - 1] == 0.0)
+                .coincident(points, self.k - 1)
+                .all(|coincident| coincident)
+    }
+
+    /// Whether the neighbour of each point at `rank` lies where the point lies.
+    fn coincident(&self, points: &[[f64; 3]], rank: usize) -> impl Iterator<Item = bool> {
+        let rows = self.indices.chunks(self.k.max(1));
+        rows.zip(points)
+            .map(move |(row, point)| *point == points[row[rank] as usize])
     }
 }
 
@@ -158,17 +160,12 @@ impl Places {
         k: usize,
         candidates: &mut Vec<(f64, u32)>,
     ) {
-        let squared_distance = squared_distance(from, self.coordinates[place]);
+        let squared_distance = squared_distance(&from, &self.coordinates[place]);
         let members = &self.members[self.offsets[place]..self.offsets[place + 1]];
         // of coincident points no more than k can be neighbours, and those are the first
         let others = members.iter().filter(|&&member| member != index).take(k);
         candidates.extend(others.map(|&member| (squared_distance, member)));
     }
-}
-
-fn squared_distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    x * x + y * y + z * z
 }
 
 /// A number that sorts as `c` does, the same for 0 and -0.
@@ -191,15 +188,12 @@ mod tests {
         for (i, &from) in points.iter().enumerate() {
             let mut row: Vec<(f64, usize)> = (0..points.len())
                 .filter(|&j| j != i)
-                .map(|j| (squared_distance(from, points[j]), j))
+                .map(|j| (squared_distance(&from, &points[j]), j))
                 .collect();
             row.sort_by(|a, b| a.partial_cmp(b).unwrap());
             neighbors
                 .indices
                 .extend(row[..k].iter().map(|&(_, j)| j as u32));
-            neighbors
-                .squared_distances
-                .extend(row[..k].iter().map(|&(d, _)| d as f32));
         }
         neighbors
     }
@@ -232,14 +226,15 @@ mod tests {
 
     #[test]
     fn coincident_points_are_each_others_neighbours() {
-        let neighbors = Neighbors::search(&vec![[1.0, 2.0, 3.0]; 120_000], 10);
+        let points = vec![[1.0, 2.0, 3.0]; 120_000];
+        let neighbors = Neighbors::search(&points, 10);
         assert_eq!(neighbors.indices[..10], [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
         assert_eq!(
             neighbors.indices[119_999 * 10..],
             [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
         );
-        assert_eq!(neighbors.duplicates(), 120_000);
-        assert!(neighbors.only_islands());
+        assert_eq!(neighbors.duplicates(&points), 120_000);
+        assert!(neighbors.only_islands(&points));
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The method on one screen: points, masks and a camera in, one label a point out.
 
 use crate::{
-    Camera, Cloud, Convergence, Error, InstanceMasks, Neighbors, Params, PointGraph, Result, View,
-    ViewCounts, diffuse, keep_largest_components,
+    Camera, Cloud, Convergence, Error, InstanceMasks, Neighbors, Params, PixelLabels, PointGraph,
+    Real, Result, View, ViewCounts, diffuse, keep_largest_components,
 };
 use std::time::{Duration, Instant};
 
@@ -79,17 +79,19 @@ pub fn segment(
 
     let view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
     let project = clock.lap();
-    let mut pixels = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
-    let pixel_labels = clock.lap();
     let nearest = Neighbors::search(&view.points, params.neighbors);
     let neighbors = clock.lap();
-    let mut point_graph = PointGraph::from_neighbors(view.points.len(), &nearest, params.sigma);
-    point_graph.normalize_rows(&mut pixels)?;
+    let pixels = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
+    let pixel_labels = clock.lap();
+    let (a, b) = normalized_graph::<f32>(&view, &nearest, pixels, params)?;
     let graph = clock.lap();
-    let diffused = diffuse(&point_graph, &pixels, masks.len() + 1, params.iterations)?;
+    let diffused = diffuse(&a, &b, masks.len() + 1, params.iterations, || {
+        let pixels = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
+        normalized_graph::<f64>(&view, &nearest, pixels, params)
+    })?;
     let diffusion = clock.lap();
     let kept = if params.remove_outliers {
-        Some(keep_largest_components(&point_graph, &diffused.labels)?)
+        Some(keep_largest_components(&a, &diffused.labels)?)
     } else {
         None
     };
@@ -109,8 +111,8 @@ pub fn segment(
         confidence: scatter(cloud.len(), &view, 0.0, diffused.confidence.iter().copied()),
         report: Report {
             counts: view.counts,
-            duplicates: nearest.duplicates(),
-            only_islands: nearest.only_islands(),
+            duplicates: nearest.duplicates(&view.points),
+            only_islands: nearest.only_islands(&view.points),
             k_effective: nearest.k,
             convergence: diffused.convergence,
         },
@@ -124,6 +126,18 @@ pub fn segment(
         },
         view,
     })
+}
+
+/// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
+fn normalized_graph<T: Real>(
+    view: &View,
+    nearest: &Neighbors,
+    mut pixels: PixelLabels<T>,
+    params: &Params,
+) -> Result<(PointGraph<T>, PixelLabels<T>)> {
+    let mut graph = PointGraph::from_neighbors(&view.points, nearest, params.sigma)?;
+    graph.normalize_rows(&mut pixels)?;
+    Ok((graph, pixels))
 }
 
 fn check_edges(points: usize, neighbors: usize) -> Result<()> {

@@ -130,7 +130,8 @@ fn report(py: Python<'_>, report: &ldls_core::Report) -> PyResult<Py<PyDict>> {
     dict.set_item("n_duplicates", report.duplicates)?;
     dict.set_item("only_islands", report.only_islands)?;
     dict.set_item("k_effective", report.k_effective)?;
-    dict.set_item("products", report.convergence.products)?;
+    dict.set_item("n_refined", report.convergence.refined)?;
+    dict.set_item("sweeps", report.convergence.sweeps)?;
     dict.set_item("residual", report.convergence.residual)?;
     dict.set_item("converged", report.convergence.converged())?;
     dict.set_item("bounds", (report.counts.min, report.counts.max))?;

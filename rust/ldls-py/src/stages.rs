@@ -5,9 +5,9 @@ use crate::arrays::{
     slice,
 };
 use crate::call::run;
-use crate::errors::raise;
 use crate::masks::Masks;
 use crate::segment::camera;
+use ldls_core::PointGraph;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 /// Indices and pixels of the points in view.
 type ViewArrays = (Py<PyArray1<i64>>, Py<PyArray2<f64>>);
 /// Indices and squared distances.
-type NeighborArrays = (Py<PyArray2<u32>>, Py<PyArray2<f32>>);
+type NeighborArrays = (Py<PyArray2<u32>>, Py<PyArray2<f64>>);
 /// Weights by label and weights of all pixel edges.
 type PixelLabelArrays = (CsrArrays, Py<PyArray1<f32>>);
 
@@ -59,6 +59,7 @@ pub fn neighbors(
 ) -> PyResult<NeighborArrays> {
     let points = rows::<3>(py, "points", &points)?;
     let found = run(py, threads, || Ok(ldls_core::Neighbors::search(&points, k)))?;
+    let squared_distances = found.squared_distances(&points);
     if found.k == 0 {
         let shape = [points.len(), 0];
         return Ok((
@@ -68,7 +69,7 @@ pub fn neighbors(
     }
     Ok((
         matrix(py, found.indices, found.k)?,
-        matrix(py, found.squared_distances, found.k)?,
+        matrix(py, squared_distances, found.k)?,
     ))
 }
 
@@ -76,26 +77,19 @@ pub fn neighbors(
 #[pyfunction]
 pub fn point_graph(
     py: Python<'_>,
+    points: PyReadonlyArray2<'_, f64>,
     indices: PyReadonlyArray2<'_, u32>,
-    squared_distances: PyReadonlyArray2<'_, f32>,
     sigma: f64,
     threads: Option<usize>,
 ) -> PyResult<CsrArrays> {
-    let [n, k] = [indices.shape()[0], indices.shape()[1]];
-    if squared_distances.shape() != [n, k] {
-        return Err(raise(
-            py,
-            "ShapeError",
-            "squared_distances: expected the shape of the neighbour indices",
-        ));
-    }
+    let points = rows::<3>(py, "points", &points)?;
+    let k = indices.shape()[1];
     let neighbors = ldls_core::Neighbors {
         k,
         indices: slice(py, "indices", &indices)?.to_vec(),
-        squared_distances: slice(py, "squared_distances", &squared_distances)?.to_vec(),
     };
     let graph = run(py, threads, || {
-        Ok(ldls_core::PointGraph::from_neighbors(n, &neighbors, sigma))
+        PointGraph::<f32>::from_neighbors(&points, &neighbors, sigma)
     })?;
     let (offsets, columns, weights) = graph.into_csr();
     Ok(csr_arrays(py, &offsets, &columns, weights))
@@ -148,7 +142,7 @@ pub fn normalize_rows(
     ))
 }
 
-/// Values of all labels at all points, the number of products and the residual.
+/// Values of all labels at all points, the number of sweeps and the residual.
 #[pyfunction]
 pub fn diffuse(
     py: Python<'_>,
@@ -157,7 +151,7 @@ pub fn diffuse(
     n_labels: usize,
     iterations: Option<usize>,
     threads: Option<usize>,
-) -> PyResult<(Py<PyArray2<f32>>, usize, f32)> {
+) -> PyResult<(Py<PyArray2<f32>>, usize, f64)> {
     let a = graph(py, &point_graph)?;
     let mass = vec![0.0; a.len()];
     let b = labels_of(py, &labels, mass)?;
@@ -166,7 +160,7 @@ pub fn diffuse(
     })?;
     Ok((
         matrix(py, z, n_labels)?,
-        convergence.products,
+        convergence.sweeps,
         convergence.residual,
     ))
 }

@@ -1,0 +1,198 @@
+//! Polynomials of a matrix as Chebyshev series.
+//!
+//! T products z <- A z + b from z = 0 yield p(A) b with p(x) = 1 + x + ... + x^(T - 1), and endlessly many
+//! yield (1 - x)^(-1). Where the spectrum of A lies near a real interval, a Chebyshev series on that
+//! interval comes as near to p(A) b with far fewer products.
+
+use std::f64::consts::PI;
+
+/// A real interval that holds the spectrum of a matrix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// `c_0 T_0 + c_1 T_1 + ...` on an interval.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// The interval, mapped to [-1, 1].
+    pub interval: Interval,
+    /// `c_0`, `c_1` and so on; the degree is one less than their number.
+    pub coefficients: Vec<f64>,
+    /// Sum of the magnitudes of the coefficients left out.
+    pub tail: f64,
+}
+
+/// What is left out of a series may sum to this share of the largest value of the function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance(pub f64);
+
+impl Series {
+    /// The series of 1 + x + ... + x^(`terms` - 1).
+    pub fn of_geometric_sum(terms: usize, interval: Interval, tolerance: Tolerance) -> Self {
+        let sum = |x: f64| {
+            let complement = 1.0 - x;
+            // the closed form loses its digits near 1, where terms are nearly equal
+            if complement.abs() * (terms as f64) < 1e-6 {
+                terms as f64
+            } else {
+                (1.0 - x.powi(terms as i32)) / complement
+            }
+        };
+        let mut nodes = 256;
+        loop {
+            let coefficients = interpolate(sum, interval, nodes);
+            let degree = degree_within(&coefficients, tolerance.0 * sum(interval.high));
+            // a degree well below the number of nodes: nothing aliased
+            if 2 * degree < nodes || nodes >= 1 << 14 {
+                let (kept, rest) = coefficients.split_at((degree + 1).min(terms));
+                let whole = kept.len() == terms;
+                let tail = if whole {
+                    0.0
+                } else {
+                    rest.iter().map(|c| c.abs()).sum()
+                };
+                return Self {
+                    interval,
+                    coefficients: kept.to_vec(),
+                    tail,
+                };
+            }
+            nodes *= 2;
+        }
+    }
+
+    /// The series of 1 / (1 - x), for an interval below 1; at most of degree `most`.
+    pub fn of_resolvent(interval: Interval, tolerance: Tolerance, most: usize) -> Self {
+        // 1 / (a - t) = 2 / sqrt(a^2 - 1) * (1/2 + r T_1(t) + r^2 T_2(t) + ...), r = a - sqrt(a^2 - 1)
+        let half_width = interval.half_width();
+        let a = (1.0 - interval.middle()) / half_width;
+        let root = ((a - 1.0) * (a + 1.0)).sqrt();
+        let ratio = 1.0 / (a + root);
+        let degree = (tolerance.0.ln() / ratio.ln()).ceil();
+        let degree = if degree < most as f64 {
+            degree as usize
+        } else {
+            most
+        };
+        let scale = 2.0 / (root * half_width);
+        let mut coefficients: Vec<f64> =
+            (0..=degree).map(|k| scale * ratio.powi(k as i32)).collect();
+        coefficients[0] /= 2.0;
+        let tail = scale * ratio.powi(degree as i32 + 1) / (1.0 - ratio);
+        Self {
+            interval,
+            coefficients,
+            tail,
+        }
+    }
+
+    /// Highest k of `T_k`.
+    pub fn degree(&self) -> usize {
+        self.coefficients.len() - 1
+    }
+}
+
+impl Interval {
+    /// Half the distance of the ends.
+    pub fn half_width(&self) -> f64 {
+        (self.high - self.low) / 2.0
+    }
+
+    /// Mean of the ends.
+    pub fn middle(&self) -> f64 {
+        f64::midpoint(self.high, self.low)
+    }
+}
+
+/// Coefficients 0 to `nodes` - 1 of the polynomial that equals `function` at `nodes` Chebyshev nodes.
+fn interpolate(function: impl Fn(f64) -> f64, interval: Interval, nodes: usize) -> Vec<f64> {
+    let angle = |j: usize| (j as f64 + 0.5) * PI / nodes as f64;
+    let values: Vec<f64> = (0..nodes)
+        .map(|j| function(interval.middle() + interval.half_width() * angle(j).cos()))
+        .collect();
+    // cos(k (j + 1/2) pi / n) takes 4 n values only
+    let cosines: Vec<f64> = (0..4 * nodes)
+        .map(|i| (i as f64 * PI / (2 * nodes) as f64).cos())
+        .collect();
+    let coefficient = |k: usize| {
+        let sum: f64 = (0..nodes)
+            .map(|j| values[j] * cosines[k * (2 * j + 1) % (4 * nodes)])
+            .sum();
+        sum * if k == 0 { 1.0 } else { 2.0 } / nodes as f64
+    };
+    // the upper half would be aliases of higher terms
+    (0..nodes / 2).map(coefficient).collect()
+}
+
+/// Least degree behind which the coefficients sum to at most `remainder`.
+fn degree_within(coefficients: &[f64], remainder: f64) -> usize {
+    let mut tail = 0.0;
+    for degree in (1..coefficients.len()).rev() {
+        tail += coefficients[degree].abs();
+        if tail > remainder {
+            return degree;
+        }
+    }
+    0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INTERVAL: Interval = Interval {
+        low: -0.8,
+        high: 0.998,
+    };
+
+    fn evaluate(series: &Series, x: f64) -> f64 {
+        let t = (x - series.interval.middle()) / series.interval.half_width();
+        let terms = series.coefficients.iter().enumerate();
+        terms.map(|(k, c)| c * (k as f64 * t.acos()).cos()).sum()
+    }
+
+    fn points() -> impl Iterator<Item = f64> {
+        (0..=1000).map(|i| INTERVAL.low + f64::from(i) / 1000.0 * 2.0 * INTERVAL.half_width())
+    }
+
+    #[test]
+    fn a_series_equals_the_sum_of_powers() {
+        for (terms, most) in [(1, 0), (2, 1), (7, 6), (200, 64), (5000, 700)] {
+            let series = Series::of_geometric_sum(terms, INTERVAL, Tolerance(1e-7));
+            let largest: f64 = (0..terms).map(|k| INTERVAL.high.powi(k as i32)).sum();
+            for x in points() {
+                let sum: f64 = (0..terms).map(|k| x.powi(k as i32)).sum();
+                assert!(
+                    (evaluate(&series, x) - sum).abs() <= 1.1e-7 * largest,
+                    "{terms} terms at {x}"
+                );
+            }
+            assert!(
+                series.degree() <= most,
+                "{terms} terms took degree {}",
+                series.degree()
+            );
+        }
+    }
+
+    #[test]
+    fn a_series_equals_the_resolvent() {
+        let series = Series::of_resolvent(INTERVAL, Tolerance(1e-9), 10_000);
+        for x in points() {
+            let expected = 1.0 / (1.0 - x);
+            assert!(
+                (evaluate(&series, x) - expected).abs() < 1e-6 * 500.0,
+                "at {x}"
+            );
+        }
+        assert!(series.degree() < 500);
+        assert_eq!(
+            Series::of_resolvent(INTERVAL, Tolerance(1e-9), 10).degree(),
+            10
+        );
+    }
+}

@@ -1,0 +1,140 @@
+//! Which labels share a sweep over the graph, and where in a row of values each of them lies.
+
+use crate::{PixelLabels, Real};
+
+/// Values of up to 2 * `HALF` labels at one point: 64 bytes, one cache line, in two halves that a sweep
+/// can leave out where they hold nothing but zeros.
+pub(crate) type Row<T, const HALF: usize> = [[T; HALF]; 2];
+
+/// What one lane carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Lane {
+    /// The likelihoods of a label.
+    Label(u32),
+    /// All labels with random signs, of which only the last term of the series is summed: to see what
+    /// the terms left out may amount to.
+    Probe,
+}
+
+/// The lanes of each pass over the graph.
+///
+/// Labels without a seed need no lane. The first half of the first pass, which the background keeps busy
+/// everywhere, takes the labels with the most seeds; the others follow in the order of where they lie, so
+/// that the labels of a half are neighbours and the half is zero over most of the cloud.
+pub(crate) fn plan<T: Real>(b: &PixelLabels<T>, labels: &[u32], lanes: usize) -> Vec<Vec<Lane>> {
+    let seeds = seeds_of(b, labels);
+    let mut rest: Vec<&Seeds> = seeds
+        .iter()
+        .filter(|seeds| seeds.label > 0 && seeds.count > 0)
+        .collect();
+    rest.sort_by_key(|seeds| std::cmp::Reverse(seeds.count));
+    let mut order = vec![Lane::Probe];
+    order.extend(
+        seeds
+            .iter()
+            .filter(|seeds| seeds.label == 0)
+            .map(|_| Lane::Label(0)),
+    );
+    let first = (lanes / 2 - order.len()).min(rest.len());
+    order.extend(rest.drain(..first).map(|seeds| Lane::Label(seeds.label)));
+    rest.sort_by_key(|seeds| (seeds.row_sum / seeds.count, seeds.label));
+    order.extend(rest.iter().map(|seeds| Lane::Label(seeds.label)));
+    order.chunks(lanes).map(<[Lane]>::to_vec).collect()
+}
+
+/// Seeds of one label.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seeds {
+    label: u32,
+    count: u64,
+    /// Sum of the row numbers, which say where the label lies: near rows are near points.
+    row_sum: u64,
+}
+
+fn seeds_of<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
+    let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
+    let mut all: Vec<Seeds> = (0..n_labels as u32)
+        .map(|label| Seeds {
+            label,
+            ..Seeds::default()
+        })
+        .collect();
+    for i in 0..b.rows() {
+        for (label, _) in b.row(i).filter(|&(label, _)| label < n_labels) {
+            all[label].count += 1;
+            all[label].row_sum += i as u64;
+        }
+    }
+    labels.iter().map(|&label| all[label as usize]).collect()
+}
+
+/// The seeds of the labels of one pass by lane, row after row.
+pub(crate) struct LaneSeeds<T> {
+    offsets: Vec<u32>,
+    entries: Vec<(u32, T)>,
+    /// Lane of the probe, and its seeds.
+    pub(crate) probe: Option<(usize, Vec<T>)>,
+}
+
+impl<T: Real> LaneSeeds<T> {
+    pub(crate) fn new(b: &PixelLabels<T>, pass: &[Lane]) -> Self {
+        let lane_of = |label: usize| {
+            pass.iter()
+                .position(|lane| *lane == Lane::Label(label as u32))
+        };
+        let n_labels = b.labels.iter().max().map_or(0, |&label| label as usize + 1);
+        let lanes: Vec<Option<usize>> = (0..n_labels).map(lane_of).collect();
+        let mut seeds = Self {
+            offsets: Vec::with_capacity(b.rows() + 1),
+            entries: Vec::with_capacity(b.labels.len()),
+            probe: pass
+                .iter()
+                .position(|lane| *lane == Lane::Probe)
+                .map(|lane| (lane, probe_seeds(b))),
+        };
+        seeds.offsets.push(0);
+        for i in 0..b.rows() {
+            let row = b
+                .row(i)
+                .filter_map(|(label, weight)| Some((lanes[label]? as u32, weight)));
+            seeds.entries.extend(row);
+            seeds.offsets.push(seeds.entries.len() as u32);
+        }
+        seeds
+    }
+
+    /// For each block of `block` rows, bit 0 where the first half of its lanes has seeds, bit 1 for the second.
+    pub(crate) fn halves(&self, block: usize, half: usize) -> Vec<u8> {
+        let rows = self.offsets.len() - 1;
+        let probed = self.probe.as_ref();
+        let everywhere = probed.map_or(0, |(lane, _)| 1 << (lane / half));
+        let of_block = |first: usize| {
+            let entries =
+                self.offsets[first] as usize..self.offsets[rows.min(first + block)] as usize;
+            self.entries[entries]
+                .iter()
+                .fold(everywhere, |bits, (lane, _)| {
+                    bits | 1 << (*lane as usize / half)
+                })
+        };
+        (0..rows).step_by(block).map(of_block).collect()
+    }
+
+    /// Lane and weight of each seed of row `i`.
+    #[inline(always)]
+    pub(crate) fn row(&self, i: usize) -> &[(u32, T)] {
+        &self.entries[self.offsets[i] as usize..self.offsets[i + 1] as usize]
+    }
+}
+
+fn probe_seeds<T: Real>(b: &PixelLabels<T>) -> Vec<T> {
+    let signed = |(label, weight): (usize, T)| T::from_f64(random_sign(label)) * weight;
+    (0..b.rows()).map(|i| b.row(i).map(signed).sum()).collect()
+}
+
+/// Plus or minus one, without a pattern.
+fn random_sign(label: usize) -> f64 {
+    // the multiplier of Knuth's multiplicative hash
+    let hash = (label as u32).wrapping_add(1).wrapping_mul(2_654_435_769);
+    if hash & 0x8000 == 0 { 1.0 } else { -1.0 }
+}
