@@ -46,8 +46,8 @@ impl Series {
         loop {
             let coefficients = interpolate(sum, interval, nodes);
             let degree = degree_within(&coefficients, tolerance.0 * sum(interval.high));
-            // a degree well below the number of nodes: nothing aliased
-            if 2 * degree < nodes || nodes >= 1 << 14 {
+            // far from the last coefficient: those that were cut off are smaller still
+            if 4 * degree < 3 * coefficients.len() || nodes >= 1 << 14 {
                 let (kept, rest) = coefficients.split_at((degree + 1).min(terms));
                 let whole = kept.len() == terms;
                 let tail = if whole {
@@ -108,23 +108,30 @@ impl Interval {
     }
 }
 
-/// Coefficients 0 to `nodes` - 1 of the polynomial that equals `function` at `nodes` Chebyshev nodes.
+/// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes; the
+/// upper half would be aliases of higher terms.
 fn interpolate(function: impl Fn(f64) -> f64, interval: Interval, nodes: usize) -> Vec<f64> {
-    let angle = |j: usize| (j as f64 + 0.5) * PI / nodes as f64;
-    let values: Vec<f64> = (0..nodes)
-        .map(|j| function(interval.middle() + interval.half_width() * angle(j).cos()))
+    let t: Vec<f64> = (0..nodes)
+        .map(|j| ((j as f64 + 0.5) * PI / nodes as f64).cos())
         .collect();
-    // cos(k (j + 1/2) pi / n) takes 4 n values only
-    let cosines: Vec<f64> = (0..4 * nodes)
-        .map(|i| (i as f64 * PI / (2 * nodes) as f64).cos())
-        .collect();
+    let x = t
+        .iter()
+        .map(|t| interval.middle() + interval.half_width() * t);
+    let values: Vec<f64> = x.map(function).collect();
+    // T_0 and T_1 at the nodes; T_(k + 1) = 2 t T_k - T_(k - 1)
+    let (mut current, mut next) = (vec![1.0; nodes], t.clone());
     let coefficient = |k: usize| {
-        let sum: f64 = (0..nodes)
-            .map(|j| values[j] * cosines[k * (2 * j + 1) % (4 * nodes)])
+        let sum: f64 = values
+            .iter()
+            .zip(&current)
+            .map(|(value, current)| value * current)
             .sum();
+        for ((current, next), t) in current.iter_mut().zip(&mut next).zip(&t) {
+            let after = 2.0 * t * *next - *current;
+            (*current, *next) = (*next, after);
+        }
         sum * if k == 0 { 1.0 } else { 2.0 } / nodes as f64
     };
-    // the upper half would be aliases of higher terms
     (0..nodes / 2).map(coefficient).collect()
 }
 

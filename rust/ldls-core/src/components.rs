@@ -2,12 +2,22 @@
 
 use crate::{Error, PointGraph, Result};
 
-/// Turns every point that is not in the largest connected component of its label into background (0). Edges are taken
-/// as undirected; of components of one size, the one with the lowest point index is kept.
+/// Turns every point that is not in the largest connected component of its label into background (0). Edges are
+/// taken as undirected; of components of one size, the one with the lowest point index is kept.
 ///
 /// # Errors
 /// [`Error::Mismatch`] where `labels` is of another length than the graph.
 pub fn keep_largest_components(graph: &PointGraph, labels: &[u32]) -> Result<Vec<u32>> {
+    let indices: Vec<u32> = (0..labels.len() as u32).collect();
+    keep_largest_by_index(graph, labels, &indices)
+}
+
+/// The same for points whose rows are not in the order of their `indices`.
+pub(crate) fn keep_largest_by_index(
+    graph: &PointGraph,
+    labels: &[u32],
+    indices: &[u32],
+) -> Result<Vec<u32>> {
     if labels.len() != graph.len() {
         let problem = format!(
             "{} labels, the graph has {} points",
@@ -26,7 +36,7 @@ pub fn keep_largest_components(graph: &PointGraph, labels: &[u32]) -> Result<Vec
         }
     }
     let components: Vec<u32> = (0..labels.len() as u32).map(|i| sets.root(i)).collect();
-    let largest = largest_of_each(labels, &components);
+    let largest = largest_of_each(labels, &components, indices);
     let kept = |(&label, &component): (&u32, &u32)| {
         if largest[label as usize].root == component {
             label
@@ -37,28 +47,40 @@ pub fn keep_largest_components(graph: &PointGraph, labels: &[u32]) -> Result<Vec
     Ok(labels.iter().zip(&components).map(kept).collect())
 }
 
-/// Root and size of one component.
-#[derive(Debug, Clone, Copy, Default)]
+/// One component: its root, its size, and the lowest index of a point in it.
+#[derive(Debug, Clone, Copy)]
 struct Component {
     root: u32,
     size: u32,
+    first: u32,
 }
 
-fn largest_of_each(labels: &[u32], components: &[u32]) -> Vec<Component> {
-    let mut sizes = vec![0; labels.len()];
-    for &root in components {
-        sizes[root as usize] += 1;
+impl Component {
+    const NONE: Self = Self {
+        root: u32::MAX,
+        size: 0,
+        first: u32::MAX,
+    };
+}
+
+fn largest_of_each(labels: &[u32], components: &[u32], indices: &[u32]) -> Vec<Component> {
+    let mut found = vec![Component::NONE; labels.len()];
+    for (&root, &index) in components.iter().zip(indices) {
+        let component = &mut found[root as usize];
+        let first = component.first.min(index);
+        *component = Component {
+            root,
+            size: component.size + 1,
+            first,
+        };
     }
     let n_labels = labels.iter().max().map_or(1, |&label| label as usize + 1);
-    let mut largest = vec![Component::default(); n_labels];
-    // roots come in ascending order, so that of equal sizes the lowest index stays
-    for (root, &size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0) {
-        let best = &mut largest[labels[root] as usize];
-        if size > best.size {
-            *best = Component {
-                root: root as u32,
-                size,
-            };
+    let mut largest = vec![Component::NONE; n_labels];
+    for component in found.into_iter().filter(|component| component.size > 0) {
+        let best = &mut largest[labels[component.root as usize] as usize];
+        let larger = component.size > best.size;
+        if larger || (component.size == best.size && component.first < best.first) {
+            *best = component;
         }
     }
     largest
@@ -116,6 +138,12 @@ mod tests {
             keep_largest_components(&chain(5), &[3, 3, 0, 3, 3]).unwrap(),
             [3, 3, 0, 0, 0]
         );
+    }
+
+    #[test]
+    fn rows_may_come_in_another_order_than_indices() {
+        let kept = keep_largest_by_index(&chain(5), &[3, 3, 0, 3, 3], &[4, 3, 2, 1, 0]).unwrap();
+        assert_eq!(kept, [0, 0, 0, 3, 3]);
     }
 
     #[test]

@@ -11,6 +11,8 @@ const BLOCK: usize = 1024;
 /// from to point i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointGraph<T = f32> {
+    /// Edges of each point, if all have as many.
+    degree: Option<usize>,
     offsets: Vec<usize>,
     columns: Vec<u32>,
     weights: Vec<T>,
@@ -48,8 +50,10 @@ impl<T: Real> PointGraph<T> {
                     *weight = T::from_f64(-squared / sigma).exp();
                 }
             });
+        let offsets = (0..=n).map(|i| i * degree).collect();
         Ok(Self {
-            offsets: (0..=n).map(|i| i * degree).collect(),
+            degree: Some(degree),
+            offsets,
             columns,
             weights,
         })
@@ -93,6 +97,7 @@ impl<T: Real> PointGraph<T> {
             ));
         }
         Ok(Self {
+            degree: None,
             offsets,
             columns,
             weights,
@@ -144,26 +149,26 @@ impl<T: Real> PointGraph<T> {
         self.len() == 0
     }
 
+    /// Edges of each point, if it is known that all have as many.
+    pub(crate) fn degree(&self) -> Option<usize> {
+        self.degree
+    }
+
     /// Columns and weights of row `i`.
     #[inline]
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, T)> {
-        let (columns, weights) = self.row_slices(i);
+        let (columns, weights) = self.slices(i..i + 1);
         columns
             .iter()
             .map(|&column| column as usize)
             .zip(weights.iter().copied())
     }
 
-    /// Columns and weights of row `i`.
+    /// Columns and weights of `rows`, row after row.
     #[inline(always)]
-    pub(crate) fn row_slices(&self, i: usize) -> (&[u32], &[T]) {
-        let range = self.offsets[i]..self.offsets[i + 1];
+    pub(crate) fn slices(&self, rows: Range<usize>) -> (&[u32], &[T]) {
+        let range = self.offsets[rows.start]..self.offsets[rows.end];
         (&self.columns[range.clone()], &self.weights[range])
-    }
-
-    /// Columns of a range of rows, row after row.
-    pub(crate) fn columns_of(&self, rows: Range<usize>) -> &[u32] {
-        &self.columns[self.offsets[rows.start]..self.offsets[rows.end]]
     }
 
     /// Row starts, column indices and weights.

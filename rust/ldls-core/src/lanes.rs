@@ -1,10 +1,32 @@
 //! Which labels share a sweep over the graph, and where in a row of values each of them lies.
 
 use crate::{PixelLabels, Real};
+use std::ops::Range;
 
-/// Values of up to 2 * `HALF` labels at one point: 64 bytes, one cache line, in two halves that a sweep
-/// can leave out where they hold nothing but zeros.
-pub(crate) type Row<T, const HALF: usize> = [[T; HALF]; 2];
+/// Values of up to 2 * `HALF` labels at one point: one cache line, in two halves that a sweep can leave out
+/// where they hold nothing but zeros.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(crate) struct Row<T, const HALF: usize>(pub(crate) [[T; HALF]; 2]);
+
+impl<T: Real, const HALF: usize> Row<T, HALF> {
+    /// Zeros.
+    pub(crate) fn zero() -> Self {
+        Self([[T::default(); HALF]; 2])
+    }
+
+    /// The value of each lane.
+    #[inline(always)]
+    pub(crate) fn lanes(&self) -> &[T] {
+        self.0.as_flattened()
+    }
+
+    /// The value of each lane.
+    #[inline(always)]
+    pub(crate) fn lanes_mut(&mut self) -> &mut [T] {
+        self.0.as_flattened_mut()
+    }
+}
 
 /// What one lane carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +42,8 @@ pub(crate) enum Lane {
 ///
 /// Labels without a seed need no lane. The first half of the first pass, which the background keeps busy
 /// everywhere, takes the labels with the most seeds; the others follow in the order of where they lie, so
-/// that the labels of a half are neighbours and the half is zero over most of the cloud.
+/// that the labels of a half are neighbours and the half is zero over most of the cloud. The probe and the
+/// background come first, whether or not the background is among `labels`.
 pub(crate) fn plan<T: Real>(b: &PixelLabels<T>, labels: &[u32], lanes: usize) -> Vec<Vec<Lane>> {
     let seeds = seeds_of(b, labels);
     let mut rest: Vec<&Seeds> = seeds
@@ -68,10 +91,18 @@ fn seeds_of<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
     labels.iter().map(|&label| all[label as usize]).collect()
 }
 
+/// Where the background lies in the first pass.
+pub(crate) const BACKGROUND_LANE: usize = 1;
+
 /// The seeds of the labels of one pass by lane, row after row.
 pub(crate) struct LaneSeeds<T> {
+    /// Seeds of the background, which nearly every row has; zeros in later passes.
+    pub(crate) background: Vec<T>,
     offsets: Vec<u32>,
-    entries: Vec<(u32, T)>,
+    /// Row, lane and weight of each seed.
+    entries: Vec<(u32, u32, T)>,
+    /// Values up to this magnitude are too small to matter.
+    pub(crate) least: T,
     /// Lane of the probe, and its seeds.
     pub(crate) probe: Option<(usize, Vec<T>)>,
 }
@@ -81,23 +112,27 @@ impl<T: Real> LaneSeeds<T> {
         let lane_of = |label: usize| {
             pass.iter()
                 .position(|lane| *lane == Lane::Label(label as u32))
+                .map(|lane| lane as u32)
         };
         let n_labels = b.labels.iter().max().map_or(0, |&label| label as usize + 1);
-        let lanes: Vec<Option<usize>> = (0..n_labels).map(lane_of).collect();
+        let lanes: Vec<Option<u32>> = (0..n_labels).map(lane_of).collect();
+        let probe = pass.iter().position(|lane| *lane == Lane::Probe);
         let mut seeds = Self {
+            background: vec![T::default(); b.rows()],
+            least: T::from_f64(T::NEGLIGIBLE * largest_weight(b)),
             offsets: Vec::with_capacity(b.rows() + 1),
-            entries: Vec::with_capacity(b.labels.len()),
-            probe: pass
-                .iter()
-                .position(|lane| *lane == Lane::Probe)
-                .map(|lane| (lane, probe_seeds(b))),
+            entries: Vec::new(),
+            probe: probe.map(|lane| (lane, probe_seeds(b))),
         };
+        if pass.get(BACKGROUND_LANE) == Some(&Lane::Label(0)) {
+            seeds.background = (0..b.rows()).map(|i| background_of(b, i)).collect();
+        }
         seeds.offsets.push(0);
         for i in 0..b.rows() {
-            let row = b
-                .row(i)
-                .filter_map(|(label, weight)| Some((lanes[label]? as u32, weight)));
-            seeds.entries.extend(row);
+            let others = b.row(i).filter(|&(label, _)| label > 0);
+            let in_pass =
+                others.filter_map(|(label, weight)| Some((i as u32, lanes[label]?, weight)));
+            seeds.entries.extend(in_pass);
             seeds.offsets.push(seeds.entries.len() as u32);
         }
         seeds
@@ -113,18 +148,31 @@ impl<T: Real> LaneSeeds<T> {
                 self.offsets[first] as usize..self.offsets[rows.min(first + block)] as usize;
             self.entries[entries]
                 .iter()
-                .fold(everywhere, |bits, (lane, _)| {
+                .fold(everywhere, |bits, (_, lane, _)| {
                     bits | 1 << (*lane as usize / half)
                 })
         };
         (0..rows).step_by(block).map(of_block).collect()
     }
 
-    /// Lane and weight of each seed of row `i`.
+    /// Row, lane and weight of each seed of `rows`, but for the background's.
     #[inline(always)]
-    pub(crate) fn row(&self, i: usize) -> &[(u32, T)] {
-        &self.entries[self.offsets[i] as usize..self.offsets[i + 1] as usize]
+    pub(crate) fn of_rows(&self, rows: Range<usize>) -> &[(u32, u32, T)] {
+        &self.entries[self.offsets[rows.start] as usize..self.offsets[rows.end] as usize]
     }
+}
+
+fn largest_weight<T: Real>(b: &PixelLabels<T>) -> f64 {
+    b.weights
+        .iter()
+        .map(|weight| weight.to_f64())
+        .fold(0.0, f64::max)
+}
+
+fn background_of<T: Real>(b: &PixelLabels<T>, i: usize) -> T {
+    b.row(i)
+        .find(|&(label, _)| label == 0)
+        .map_or(T::default(), |(_, weight)| weight)
 }
 
 fn probe_seeds<T: Real>(b: &PixelLabels<T>) -> Vec<T> {

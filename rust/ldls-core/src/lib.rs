@@ -14,6 +14,7 @@ mod components;
 mod diffusion;
 mod error;
 mod graph;
+mod kdtree;
 mod lanes;
 mod masks;
 mod neighbors;

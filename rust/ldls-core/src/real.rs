@@ -21,6 +21,9 @@ pub trait Real:
     + MulAssign
     + 'static
 {
+    /// Share of the largest seed below which a likelihood is lost in the rounding of what it competes with.
+    const NEGLIGIBLE: f64;
+
     /// The nearest value of this precision.
     fn from_f64(x: f64) -> Self;
     /// The same value in double precision.
@@ -31,6 +34,8 @@ pub trait Real:
 }
 
 impl Real for f32 {
+    const NEGLIGIBLE: f64 = 1e-12;
+
     fn from_f64(x: f64) -> Self {
         x as f32
     }
@@ -43,6 +48,8 @@ impl Real for f32 {
 }
 
 impl Real for f64 {
+    const NEGLIGIBLE: f64 = 1e-24;
+
     fn from_f64(x: f64) -> Self {
         x
     }

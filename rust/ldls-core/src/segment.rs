@@ -1,8 +1,10 @@
 //! The method on one screen: points, masks and a camera in, one label a point out.
 
+use crate::components::keep_largest_by_index;
+use crate::kdtree::KdTree;
 use crate::{
     Camera, Cloud, Convergence, Error, InstanceMasks, Neighbors, Params, PixelLabels, PointGraph,
-    Real, Result, View, ViewCounts, diffuse, keep_largest_components,
+    Real, Result, View, ViewCounts, diffuse,
 };
 use std::time::{Duration, Instant};
 
@@ -79,28 +81,37 @@ pub fn segment(
 
     let view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
     let project = clock.lap();
-    let nearest = Neighbors::search(&view.points, params.neighbors);
+    // from here on, rows are in the order of the tree: near points are near in memory
+    let tree = KdTree::new(&view.points);
+    let points = tree.arrange(&view.points);
+    let nearest = Neighbors::search_tree(&tree, &points, params.neighbors);
     let neighbors = clock.lap();
-    let pixels = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
+    let uv = tree.arrange(&view.uv);
+    let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight)?;
     let pixel_labels = clock.lap();
-    let (a, b) = normalized_graph::<f32>(&view, &nearest, pixels, params)?;
+    let (a, b) = normalized_graph::<f32>(&points, &nearest, pixels, params)?;
     let graph = clock.lap();
     let diffused = diffuse(&a, &b, masks.len() + 1, params.iterations, || {
-        let pixels = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
-        normalized_graph::<f64>(&view, &nearest, pixels, params)
+        let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight)?;
+        normalized_graph::<f64>(&points, &nearest, pixels, params)
     })?;
     let diffusion = clock.lap();
     let kept = if params.remove_outliers {
-        Some(keep_largest_components(&a, &diffused.labels)?)
+        Some(keep_largest_by_index(&a, &diffused.labels, &tree.order)?)
     } else {
         None
     };
     let components = clock.lap();
 
+    let rows: Vec<u32> = tree
+        .order
+        .iter()
+        .map(|&index| view.indices[index as usize])
+        .collect();
     let whole_cloud = |labels: &[u32]| {
         scatter(
             cloud.len(),
-            &view,
+            &rows,
             OUT_OF_VIEW,
             labels.iter().map(|&m| m as i32),
         )
@@ -108,18 +119,18 @@ pub fn segment(
     Ok(Segmentation {
         labels: whole_cloud(kept.as_ref().unwrap_or(&diffused.labels)),
         diffused_labels: whole_cloud(&diffused.labels),
-        confidence: scatter(cloud.len(), &view, 0.0, diffused.confidence.iter().copied()),
+        confidence: scatter(cloud.len(), &rows, 0.0, diffused.confidence.iter().copied()),
         report: Report {
             counts: view.counts,
-            duplicates: nearest.duplicates(&view.points),
-            only_islands: nearest.only_islands(&view.points),
+            duplicates: nearest.duplicates(&points),
+            only_islands: nearest.only_islands(&points),
             k_effective: nearest.k,
             convergence: diffused.convergence,
         },
         timings: Timings {
             project,
-            pixel_labels,
             neighbors,
+            pixel_labels,
             graph,
             diffusion,
             components,
@@ -130,12 +141,12 @@ pub fn segment(
 
 /// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
 fn normalized_graph<T: Real>(
-    view: &View,
+    points: &[[f64; 3]],
     nearest: &Neighbors,
     mut pixels: PixelLabels<T>,
     params: &Params,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
-    let mut graph = PointGraph::from_neighbors(&view.points, nearest, params.sigma)?;
+    let mut graph = PointGraph::from_neighbors(points, nearest, params.sigma)?;
     graph.normalize_rows(&mut pixels)?;
     Ok((graph, pixels))
 }
@@ -152,16 +163,16 @@ fn check_edges(points: usize, neighbors: usize) -> Result<()> {
     })
 }
 
-/// Values of the points in view, laid out over the whole cloud.
+/// `values` laid out over the whole cloud, each in its row.
 fn scatter<T: Copy>(
     n: usize,
-    view: &View,
+    rows: &[u32],
     elsewhere: T,
     values: impl Iterator<Item = T>,
 ) -> Vec<T> {
     let mut all = vec![elsewhere; n];
-    for (&index, value) in view.indices.iter().zip(values) {
-        all[index as usize] = value;
+    for (&row, value) in rows.iter().zip(values) {
+        all[row as usize] = value;
     }
     all
 }

@@ -3,7 +3,7 @@
 //! A sweep works on blocks of consecutive rows. Values spread from the seeds by one edge a sweep, so at first
 //! most halves of most blocks are zero; those are left out, at no loss.
 
-use crate::lanes::{LaneSeeds, Row};
+use crate::lanes::{BACKGROUND_LANE, LaneSeeds, Row};
 use crate::{PointGraph, Real};
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -12,6 +12,9 @@ use rayon::prelude::*;
 const BLOCK: usize = 16;
 /// Blocks handled by one task of the thread pool.
 const BLOCKS_A_TASK: usize = 32;
+
+/// Edges of a point with the paper's parameters: 10 neighbours and itself.
+const PAPER_DEGREE: usize = 11;
 
 /// Number of floats that make half a cache line.
 pub(crate) const HALF_F32: usize = 8;
@@ -27,154 +30,241 @@ pub(crate) struct Step<T> {
     pub(crate) back: T,
 }
 
+/// What the rows of a step are computed from.
+pub(crate) struct Inputs<'a, T, const HALF: usize> {
+    a: &'a PointGraph<T>,
+    seeds: &'a LaneSeeds<T>,
+    step: Step<T>,
+    z: &'a [Row<T, HALF>],
+    /// One where the background lies, zero elsewhere: its seeds are added to all lanes at once, since a single
+    /// lane would have to wait for the row to reach memory.
+    background_lanes: [[T; HALF]; 2],
+}
+
+impl<'a, T: Real, const HALF: usize> Inputs<'a, T, HALF> {
+    fn new(
+        a: &'a PointGraph<T>,
+        seeds: &'a LaneSeeds<T>,
+        step: Step<T>,
+        z: &'a [Row<T, HALF>],
+    ) -> Self {
+        assert_eq!(a.len(), z.len(), "a row of values for each point");
+        let mut background_lanes = [[T::default(); HALF]; 2];
+        background_lanes[0][BACKGROUND_LANE] = T::from_f64(1.0);
+        Self {
+            a,
+            seeds,
+            step,
+            z,
+            background_lanes,
+        }
+    }
+}
+
+/// Consecutive blocks of rows that a step computes.
+pub(crate) struct Task<'a, T, const HALF: usize> {
+    /// Number of the first block.
+    first: usize,
+    next: &'a mut [Row<T, HALF>],
+    /// Halves of each block that may become anything but zeros.
+    active: &'a [u8],
+    /// Halves of each block that are.
+    filled: &'a mut [u8],
+}
+
 /// A precision for which sweeps are compiled.
 pub(crate) trait Sweep<const HALF: usize>: Real {
-    /// Applies `step` to the blocks of `next` from block `first` on, each where `active` has its bit set.
-    fn step_blocks(
-        a: &PointGraph<Self>,
-        seeds: &LaneSeeds<Self>,
-        step: Step<Self>,
-        z: &[Row<Self, HALF>],
-        next: &mut [Row<Self, HALF>],
-        first: usize,
-        active: &[u8],
-    );
+    /// Computes the active halves of the blocks of `task`.
+    fn step_blocks(inputs: &Inputs<Self, HALF>, task: Task<Self, HALF>);
 }
 
 impl Sweep<HALF_F32> for f32 {
-    fn step_blocks(
-        a: &PointGraph<f32>,
-        seeds: &LaneSeeds<f32>,
-        step: Step<f32>,
-        z: &[Row<f32, HALF_F32>],
-        next: &mut [Row<f32, HALF_F32>],
-        first: usize,
-        active: &[u8],
-    ) {
-        step_f32(a, seeds, step, z, next, first, active);
+    fn step_blocks(inputs: &Inputs<f32, HALF_F32>, task: Task<f32, HALF_F32>) {
+        step_f32(inputs, task);
     }
 }
 
 impl Sweep<HALF_F64> for f64 {
-    fn step_blocks(
-        a: &PointGraph<f64>,
-        seeds: &LaneSeeds<f64>,
-        step: Step<f64>,
-        z: &[Row<f64, HALF_F64>],
-        next: &mut [Row<f64, HALF_F64>],
-        first: usize,
-        active: &[u8],
-    ) {
-        step_f64(a, seeds, step, z, next, first, active);
+    fn step_blocks(inputs: &Inputs<f64, HALF_F64>, task: Task<f64, HALF_F64>) {
+        step_f64(inputs, task);
     }
 }
 
+// without fused multiply-add, which is not faster here, results are the same bits on every processor
 #[multiversion(targets("x86_64+avx2"))]
-fn step_f32(
-    a: &PointGraph<f32>,
-    seeds: &LaneSeeds<f32>,
-    step: Step<f32>,
-    z: &[Row<f32, HALF_F32>],
-    next: &mut [Row<f32, HALF_F32>],
-    first: usize,
-    active: &[u8],
-) {
-    step_all(a, seeds, step, z, next, first, active);
+fn step_f32(inputs: &Inputs<f32, HALF_F32>, task: Task<f32, HALF_F32>) {
+    step_all(inputs, task);
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn step_f64(
-    a: &PointGraph<f64>,
-    seeds: &LaneSeeds<f64>,
-    step: Step<f64>,
-    z: &[Row<f64, HALF_F64>],
-    next: &mut [Row<f64, HALF_F64>],
-    first: usize,
-    active: &[u8],
-) {
-    step_all(a, seeds, step, z, next, first, active);
+fn step_f64(inputs: &Inputs<f64, HALF_F64>, task: Task<f64, HALF_F64>) {
+    step_all(inputs, task);
 }
 
 #[inline(always)]
-fn step_all<T: Real, const HALF: usize>(
-    a: &PointGraph<T>,
-    seeds: &LaneSeeds<T>,
-    step: Step<T>,
-    z: &[Row<T, HALF>],
-    next: &mut [Row<T, HALF>],
-    first: usize,
-    active: &[u8],
+fn step_all<T: Real, const HALF: usize>(inputs: &Inputs<T, HALF>, task: Task<T, HALF>) {
+    let states = task.active.iter().zip(task.filled);
+    for (block, (rows, (&active, filled))) in task.next.chunks_mut(BLOCK).zip(states).enumerate() {
+        let start = (task.first + block) * BLOCK;
+        match active {
+            0 => continue,
+            1 => step_rows::<T, HALF, true, false>(inputs, start, rows),
+            2 => step_rows::<T, HALF, false, true>(inputs, start, rows),
+            _ => step_rows::<T, HALF, true, true>(inputs, start, rows),
+        }
+        for &(i, lane, weight) in inputs.seeds.of_rows(start..start + rows.len()) {
+            rows[i as usize - start].lanes_mut()[lane as usize] += inputs.step.seeds * weight;
+        }
+        if active & !*filled != 0 {
+            *filled |= halves_in_use(rows);
+        }
+    }
+}
+
+fn halves_in_use<T: Real, const HALF: usize>(rows: &[Row<T, HALF>]) -> u8 {
+    let used = |half: usize| rows.iter().any(|row| row.0[half] != [T::default(); HALF]);
+    u8::from(used(0)) | u8::from(used(1)) << 1
+}
+
+/// Computes `FIRST` and `SECOND` halves of `rows`, which begin with row `start`.
+#[inline(always)]
+fn step_rows<T: Real, const HALF: usize, const FIRST: bool, const SECOND: bool>(
+    inputs: &Inputs<T, HALF>,
+    start: usize,
+    rows: &mut [Row<T, HALF>],
 ) {
-    for (block, (rows, halves)) in next.chunks_mut(BLOCK).zip(active).enumerate() {
-        let start = (first + block) * BLOCK;
-        for (i, row) in (start..).zip(rows) {
-            match halves {
-                0 => break,
-                1 => step_half(a, step, z, i, row, 0),
-                2 => step_half(a, step, z, i, row, 1),
-                _ => step_row(a, step, z, i, row),
-            }
-            for &(lane, weight) in seeds.row(i) {
-                row.as_flattened_mut()[lane as usize] += step.seeds * weight;
-            }
+    let range = start..start + rows.len();
+    let background = &inputs.seeds.background[range.clone()];
+    let points = rows
+        .iter_mut()
+        .zip(&inputs.z[range.clone()])
+        .zip(background);
+    if inputs.a.degree() == Some(PAPER_DEGREE) {
+        // with a number of edges known beforehand there is no loop over them, and less to check
+        let (columns, weights) = inputs.a.slices(range);
+        let columns = columns.as_chunks::<PAPER_DEGREE>().0;
+        let edges = columns.iter().zip(weights.as_chunks::<PAPER_DEGREE>().0);
+        for (((row, z), &background), (columns, weights)) in points.zip(edges) {
+            step_row::<T, HALF, FIRST, SECOND>(inputs, columns, weights, z, background, row);
+        }
+    } else {
+        for (i, ((row, z), &background)) in range.zip(points) {
+            let (columns, weights) = inputs.a.slices(i..i + 1);
+            step_row::<T, HALF, FIRST, SECOND>(inputs, columns, weights, z, background, row);
         }
     }
 }
 
 #[inline(always)]
-fn step_row<T: Real, const HALF: usize>(
-    a: &PointGraph<T>,
-    step: Step<T>,
-    z: &[Row<T, HALF>],
-    i: usize,
+fn step_row<T: Real, const HALF: usize, const FIRST: bool, const SECOND: bool>(
+    inputs: &Inputs<T, HALF>,
+    columns: &[u32],
+    weights: &[T],
+    z: &Row<T, HALF>,
+    background: T,
     row: &mut Row<T, HALF>,
 ) {
+    if FIRST && SECOND {
+        let [first, second] = weighted_sums(inputs.z, columns, weights);
+        row.0[0] = finish(
+            inputs,
+            &first,
+            &z.0[0],
+            &row.0[0],
+            background,
+            &inputs.background_lanes[0],
+        );
+        row.0[1] = finish(
+            inputs,
+            &second,
+            &z.0[1],
+            &row.0[1],
+            background,
+            &inputs.background_lanes[1],
+        );
+    } else {
+        let half = usize::from(SECOND);
+        let sum = weighted_sum(inputs.z, columns, weights, half);
+        let lanes = &inputs.background_lanes[half];
+        row.0[half] = finish(inputs, &sum, &z.0[half], &row.0[half], background, lanes);
+    }
+}
+
+/// Weighted sums of both halves of the rows of `z` that `columns` name.
+#[inline(always)]
+#[expect(
+    unsafe_code,
+    reason = "the check of every column takes a sixth of the time of a sweep"
+)]
+fn weighted_sums<T: Real, const HALF: usize>(
+    z: &[Row<T, HALF>],
+    columns: &[u32],
+    weights: &[T],
+) -> [[T; HALF]; 2] {
     // one row, one thread: sums keep their order, so results do too
-    let mut sum = [[T::default(); HALF]; 2];
-    let (columns, weights) = a.row_slices(i);
-    for (&j, &weight) in columns.iter().zip(weights) {
-        let values = &z[j as usize];
+    let mut sums = [[T::default(); HALF]; 2];
+    for (&column, &weight) in columns.iter().zip(weights) {
+        // SAFETY: a `PointGraph` has no column beyond its last row, and `Inputs::new` sees to as many in `z`
+        let values = unsafe { z.get_unchecked(column as usize) };
         for half in 0..2 {
             for lane in 0..HALF {
-                sum[half][lane] += weight * values[half][lane];
+                sums[half][lane] += weight * values.0[half][lane];
             }
         }
     }
-    for half in 0..2 {
-        finish(step, &sum[half], &z[i][half], &mut row[half]);
-    }
+    sums
 }
 
+/// Weighted sum of one half of the rows of `z` that `columns` name.
 #[inline(always)]
-fn step_half<T: Real, const HALF: usize>(
-    a: &PointGraph<T>,
-    step: Step<T>,
+#[expect(
+    unsafe_code,
+    reason = "the check of every column takes a sixth of the time of a sweep"
+)]
+fn weighted_sum<T: Real, const HALF: usize>(
     z: &[Row<T, HALF>],
-    i: usize,
-    row: &mut Row<T, HALF>,
+    columns: &[u32],
+    weights: &[T],
     half: usize,
-) {
+) -> [T; HALF] {
+    // one row, one thread: sums keep their order, so results do too
     let mut sum = [T::default(); HALF];
-    let (columns, weights) = a.row_slices(i);
-    for (&j, &weight) in columns.iter().zip(weights) {
-        let values = &z[j as usize][half];
-        for lane in 0..HALF {
-            sum[lane] += weight * values[lane];
+    for (&column, &weight) in columns.iter().zip(weights) {
+        // SAFETY: a `PointGraph` has no column beyond its last row, and `Inputs::new` sees to as many in `z`
+        let values = unsafe { z.get_unchecked(column as usize) };
+        for (sum, value) in sum.iter_mut().zip(&values.0[half]) {
+            *sum += weight * *value;
         }
     }
-    finish(step, &sum, &z[i][half], &mut row[half]);
+    sum
 }
 
+/// The values of a half after the step; those too small to matter become zero.
 #[inline(always)]
 fn finish<T: Real, const HALF: usize>(
-    step: Step<T>,
+    inputs: &Inputs<T, HALF>,
     sum: &[T; HALF],
     z: &[T; HALF],
-    row: &mut [T; HALF],
-) {
+    before: &[T; HALF],
+    background: T,
+    background_lanes: &[T; HALF],
+) -> [T; HALF] {
+    let Step {
+        seeds,
+        along,
+        stay,
+        back,
+    } = inputs.step;
+    let background = seeds * background;
+    let least = inputs.seeds.least;
+    let mut next = [T::default(); HALF];
     for lane in 0..HALF {
-        row[lane] = step.along * sum[lane] - step.stay * z[lane] - step.back * row[lane];
+        let seed = background * background_lanes[lane];
+        let value = seed + along * sum[lane] - stay * z[lane] - back * before[lane];
+        let counts = value > least || value < T::default() - least;
+        next[lane] = if counts { value } else { T::default() };
     }
+    next
 }
 
 /// The blocks of a graph: which of them values flow to from each.
@@ -189,7 +279,10 @@ impl Blocks {
         let sources: Vec<Vec<u32>> = (0..count)
             .into_par_iter()
             .with_min_len(BLOCKS_A_TASK)
-            .map(|block| sources_of(a, block))
+            .map_init(
+                || vec![u32::MAX; count],
+                |met, block| sources_of(a, block, met),
+            )
             .collect();
         let mut offsets = vec![0_u32; count + 1];
         for &source in sources.iter().flatten() {
@@ -219,12 +312,14 @@ impl Blocks {
     }
 }
 
-fn sources_of<T: Real>(a: &PointGraph<T>, block: usize) -> Vec<u32> {
+/// Blocks that the rows of `block` have an edge from. `met` says for every block at which one it was last met.
+fn sources_of<T: Real>(a: &PointGraph<T>, block: usize, met: &mut [u32]) -> Vec<u32> {
     let rows = block * BLOCK..a.len().min((block + 1) * BLOCK);
-    let mut sources: Vec<u32> = Vec::with_capacity(32);
-    for &column in a.columns_of(rows) {
+    let mut sources = Vec::with_capacity(32);
+    for &column in a.slices(rows).0 {
         let source = column / BLOCK as u32;
-        if !sources.contains(&source) {
+        if met[source as usize] != block as u32 {
+            met[source as usize] = block as u32;
             sources.push(source);
         }
     }
@@ -240,10 +335,12 @@ pub(crate) struct State<'a, T, const HALF: usize> {
     pub(crate) z: Vec<Row<T, HALF>>,
     /// Values before it, which the next step overwrites.
     pub(crate) previous: Vec<Row<T, HALF>>,
-    /// Halves of each block that may hold anything but zeros.
+    /// Halves of each block that may hold anything but zeros: bit 0 for the first, bit 1 for the second.
     active: Vec<u8>,
     /// Halves of each block that do.
     filled: Vec<u8>,
+    /// Halves of each block that do and have made active the blocks that they flow to.
+    passed_on: Vec<u8>,
 }
 
 impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
@@ -254,21 +351,22 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
         blocks: &'a Blocks,
         scale: T,
     ) -> Self {
-        let mut z = vec![[[T::default(); HALF]; 2]; a.len()];
+        let mut z = vec![Row::zero(); a.len()];
         z.par_iter_mut()
             .enumerate()
             .with_min_len(BLOCK * BLOCKS_A_TASK)
             .for_each(|(i, row)| {
-                for &(lane, weight) in seeds.row(i) {
-                    row.as_flattened_mut()[lane as usize] = scale * weight;
+                for &(_, lane, weight) in seeds.of_rows(i..i + 1) {
+                    row.lanes_mut()[lane as usize] = scale * weight;
                 }
+                row.0[0][BACKGROUND_LANE] += scale * seeds.background[i];
                 if let Some((lane, seeds)) = &seeds.probe {
-                    row.as_flattened_mut()[*lane] = seeds[i];
+                    row.lanes_mut()[*lane] = seeds[i];
                 }
             });
-        let previous = vec![[[T::default(); HALF]; 2]; a.len()];
+        let previous = vec![Row::zero(); a.len()];
         let active = seeds.halves(BLOCK, HALF);
-        let filled = vec![0; blocks.len()];
+        let (filled, passed_on) = (active.clone(), vec![0; blocks.len()]);
         let mut state = Self {
             a,
             seeds,
@@ -277,6 +375,7 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
             previous,
             active,
             filled,
+            passed_on,
         };
         state.spread();
         state
@@ -289,39 +388,39 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
 
     /// Applies `step`; what was z becomes the previous values.
     pub(crate) fn step(&mut self, step: Step<T>) {
-        let (a, seeds, z) = (self.a, self.seeds, &self.z);
-        self.previous
-            .par_chunks_mut(BLOCK * BLOCKS_A_TASK)
-            .zip(self.active.par_chunks(BLOCKS_A_TASK))
+        let inputs = Inputs::new(self.a, self.seeds, step, &self.z);
+        let next = self.previous.par_chunks_mut(BLOCK * BLOCKS_A_TASK);
+        let states = self
+            .active
+            .par_chunks(BLOCKS_A_TASK)
+            .zip(self.filled.par_chunks_mut(BLOCKS_A_TASK));
+        next.zip(states)
             .enumerate()
-            .for_each(|(task, (next, active))| {
-                T::step_blocks(a, seeds, step, z, next, task * BLOCKS_A_TASK, active);
+            .for_each(|(task, (next, (active, filled)))| {
+                T::step_blocks(
+                    &inputs,
+                    Task {
+                        first: task * BLOCKS_A_TASK,
+                        next,
+                        active,
+                        filled,
+                    },
+                );
             });
         std::mem::swap(&mut self.z, &mut self.previous);
         self.spread();
     }
 
-    /// Lets the blocks that values have newly reached pass them on.
+    /// Makes active the blocks that newly filled ones flow to.
     fn spread(&mut self) {
         for block in 0..self.blocks.len() {
-            let unsure = self.active[block] & !self.filled[block];
-            if unsure == 0 {
-                continue;
-            }
-            let reached = unsure & self.halves_in_use(block);
-            self.filled[block] |= reached;
-            for &target in self.blocks.targets(block) {
-                self.active[target as usize] |= reached;
+            let new = self.filled[block] & !self.passed_on[block];
+            if new != 0 {
+                self.passed_on[block] |= new;
+                for &target in self.blocks.targets(block) {
+                    self.active[target as usize] |= new;
+                }
             }
         }
-    }
-
-    fn halves_in_use(&self, block: usize) -> u8 {
-        let rows = &self.z[block * BLOCK..self.z.len().min((block + 1) * BLOCK)];
-        let used = |half: usize| {
-            rows.iter()
-                .any(|row| row[half].iter().any(|&value| value != T::default()))
-        };
-        u8::from(used(0)) | u8::from(used(1)) << 1
     }
 }
