@@ -20,8 +20,9 @@ class Report:
         k_effective: Neighbours that each point has: K, or one less than the points in view.
         n_refined: Points at which two labels were so near that double precision had to decide.
         sweeps: Sweeps over the graph that were computed; a series saves most of the products.
-        residual: Largest change of any likelihood that one more product would make.
-        converged: Whether that change is at most 1e-5. The paper's 200 products seldom converge, by design.
+        residual: Largest change of any likelihood that one more product would make; None where the number of
+            iterations was given.
+        converged: Whether that change is at most 1e-5; False where the number of iterations was given.
         empty_masks: Labels of instances whose mask has no pixel.
     """
 
@@ -35,6 +36,6 @@ class Report:
     k_effective: int
     n_refined: int
     sweeps: int
-    residual: float
+    residual: float | None
     converged: bool
     empty_masks: tuple[int, ...]

@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ldls_core::{
-    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, diffuse,
+    Camera, Cloud, InstanceMasks, Neighbors, Params, PixelLabels, PointGraph, Rle, diffuse,
     keep_largest_components, segment,
 };
 use std::hint::black_box;
@@ -56,6 +56,11 @@ fn masks() -> InstanceMasks {
     InstanceMasks::new(HEIGHT, WIDTH, rles.collect()).expect("masks")
 }
 
+/// Double precision, which no point of the street needs.
+fn never() -> ldls_core::Result<(PointGraph<f64>, PixelLabels<f64>)> {
+    unreachable!("single precision tells the winner")
+}
+
 fn stages(criterion: &mut Criterion) {
     let (camera, masks, params) = (camera(), masks(), Params::paper());
     for n in SIZES {
@@ -69,10 +74,11 @@ fn stages(criterion: &mut Criterion) {
             .pixel_labels(&view.uv, params.window, params.pixel_weight)
             .expect("labels");
         let neighbors = Neighbors::search(&view.points, params.neighbors);
-        let mut graph = PointGraph::from_neighbors(view.points.len(), &neighbors, params.sigma);
+        let mut graph = PointGraph::<f32>::from_neighbors(&view.points, &neighbors, params.sigma)
+            .expect("a graph");
         graph.normalize_rows(&mut labels).expect("rows");
         let diffused =
-            diffuse(&graph, &labels, masks.len() + 1, params.iterations).expect("labels");
+            diffuse(&graph, &labels, masks.len() + 1, params.iterations, never).expect("labels");
 
         let mut group = criterion.benchmark_group("stage");
         group
@@ -82,22 +88,32 @@ fn stages(criterion: &mut Criterion) {
             b.iter(|| black_box(camera.view(cloud, HEIGHT, WIDTH, false)));
         });
         group.bench_function(BenchmarkId::new("pixel labels", n), |b| {
-            b.iter(|| black_box(masks.pixel_labels(&view.uv, params.window, params.pixel_weight)));
+            b.iter(|| {
+                black_box(masks.pixel_labels::<f32>(&view.uv, params.window, params.pixel_weight))
+            });
         });
         group.bench_function(BenchmarkId::new("neighbors", n), |b| {
             b.iter(|| black_box(Neighbors::search(&view.points, params.neighbors)));
         });
         group.bench_function(BenchmarkId::new("graph", n), |b| {
             b.iter(|| {
-                black_box(PointGraph::from_neighbors(
-                    view.points.len(),
+                black_box(PointGraph::<f32>::from_neighbors(
+                    &view.points,
                     &neighbors,
                     params.sigma,
                 ))
             });
         });
         group.bench_function(BenchmarkId::new("diffusion", n), |b| {
-            b.iter(|| black_box(diffuse(&graph, &labels, masks.len() + 1, params.iterations)));
+            b.iter(|| {
+                black_box(diffuse(
+                    &graph,
+                    &labels,
+                    masks.len() + 1,
+                    params.iterations,
+                    never,
+                ))
+            });
         });
         group.bench_function(BenchmarkId::new("components", n), |b| {
             b.iter(|| black_box(keep_largest_components(&graph, &diffused.labels)));

@@ -12,11 +12,11 @@ use crate::{Error, PixelLabels, PointGraph, Real, Result};
 use rayon::prelude::*;
 
 /// What a series in single precision may leave out.
-const TOLERANCE_F32: Tolerance = Tolerance(5e-8);
+const TOLERANCE_F32: Tolerance = Tolerance(1e-7);
 /// What a series in double precision may leave out.
 const TOLERANCE_F64: Tolerance = Tolerance(1e-13);
 /// Rounding of single precision, as a share of the largest likelihood of a point; 1e-5 on real frames.
-const ROUNDING: f32 = 5e-5;
+const ROUNDING: f32 = 2.5e-5;
 /// By how much the terms that a series leaves out may exceed what the probe says of them.
 const CAUTION: f64 = 1.0;
 /// Error from which on a series is given up for plain products.
@@ -35,8 +35,8 @@ const BLOCK: usize = 2048;
 pub struct Convergence {
     /// Sweeps over the graph that were computed for a label.
     pub sweeps: usize,
-    /// Largest change of any likelihood that one more product would make.
-    pub residual: f64,
+    /// Largest change of any likelihood that one more product would make, where that bounded the run.
+    pub residual: Option<f64>,
     /// Largest error of a likelihood from the terms that the series leaves out.
     pub error: f64,
     /// Points whose label was decided in double precision.
@@ -61,19 +61,25 @@ enum Scheme {
     Products(usize),
     /// Products until nothing changes.
     UntilConverged,
-    /// A Chebyshev series.
+    /// A Chebyshev series that stands for so many products.
     Series(Series),
+    /// A Chebyshev series that stands for endlessly many.
+    ConvergedSeries(Series),
 }
 
 impl Convergence {
-    /// Whether one more product would change next to nothing.
+    /// Whether the run went on until one more product would change next to nothing.
     pub fn converged(&self) -> bool {
-        self.residual <= CONVERGED
+        self.residual.is_some_and(|residual| residual <= CONVERGED)
     }
 
     fn merge(&mut self, other: Self) {
         self.sweeps = self.sweeps.max(other.sweeps);
-        self.residual = self.residual.max(other.residual);
+        self.residual = self
+            .residual
+            .into_iter()
+            .chain(other.residual)
+            .reduce(f64::max);
         self.error = self.error.max(other.error);
     }
 }
@@ -189,7 +195,7 @@ fn for_each_pass<T: Sweep<HALF>, const HALF: usize>(
 struct Pass<T, const HALF: usize> {
     z: Vec<Row<T, HALF>>,
     sweeps: usize,
-    residual: f64,
+    residual: Option<f64>,
     /// What the terms left out may amount to.
     error: f64,
 }
@@ -208,7 +214,7 @@ impl Scheme {
                 }
             }
             (Some(interval), None) if interval.high < 1.0 => {
-                Self::Series(Series::of_resolvent(interval, tolerance, MOST_SWEEPS))
+                Self::ConvergedSeries(Series::of_resolvent(interval, tolerance, MOST_SWEEPS))
             }
             (_, Some(products)) => Self::Products(products),
             (_, None) => Self::UntilConverged,
@@ -224,7 +230,8 @@ impl Scheme {
         match self {
             Self::Products(products) => run_products(a, seeds, blocks, *products),
             Self::UntilConverged => run_until_converged(a, seeds, blocks),
-            Self::Series(series) => run_series(a, seeds, blocks, series),
+            Self::Series(series) => run_series(a, seeds, blocks, series, false),
+            Self::ConvergedSeries(series) => run_series(a, seeds, blocks, series, true),
         }
     }
 }
@@ -253,7 +260,12 @@ fn run_products<T: Sweep<HALF>, const HALF: usize>(
     for _ in 1..products {
         state.step(step(PRODUCT));
     }
-    last_product(state, products, 0.0)
+    Pass {
+        z: state.z,
+        sweeps: products,
+        residual: None,
+        error: 0.0,
+    }
 }
 
 fn run_until_converged<T: Sweep<HALF>, const HALF: usize>(
@@ -270,12 +282,13 @@ fn run_until_converged<T: Sweep<HALF>, const HALF: usize>(
     last_product(state, sweeps, 0.0)
 }
 
-/// Clenshaw's recurrence: y_k = c_k b + 2 X y_(k+1) - y_(k+2), X = (A - middle) / half width.
+/// Clenshaw's recurrence: `y_k = c_k b + 2 X y_(k+1) - y_(k+2)`, `X = (A - middle) / half width`.
 fn run_series<T: Sweep<HALF>, const HALF: usize>(
     a: &PointGraph<T>,
     seeds: &LaneSeeds<T>,
     blocks: &Blocks,
     series: &Series,
+    until_converged: bool,
 ) -> Pass<T, HALF> {
     let (middle, half_width) = (series.interval.middle(), series.interval.half_width());
     let degree = series.degree();
@@ -287,7 +300,15 @@ fn run_series<T: Sweep<HALF>, const HALF: usize>(
         state.step(step((series.coefficients[k], along, stay, 1.0)));
     }
     let error = CAUTION * series.tail * largest_probe(&state);
-    last_product(state, degree, error)
+    if until_converged {
+        return last_product(state, degree, error);
+    }
+    Pass {
+        z: state.z,
+        sweeps: degree,
+        residual: None,
+        error,
+    }
 }
 
 /// One more product, for the residual; the values are those before it.
@@ -301,7 +322,7 @@ fn last_product<T: Sweep<HALF>, const HALF: usize>(
     Pass {
         z: state.previous,
         sweeps: sweeps + 1,
-        residual,
+        residual: Some(residual),
         error,
     }
 }

@@ -50,10 +50,10 @@ pub struct Report {
 pub struct Timings {
     /// Projection to pixels.
     pub project: Duration,
+    /// K nearest neighbours, and the order of their tree.
+    pub neighbors: Duration,
     /// Labels of the pixels around each point.
     pub pixel_labels: Duration,
-    /// K nearest neighbours.
-    pub neighbors: Duration,
     /// Point graph and row sums.
     pub graph: Duration,
     /// Diffusion and argmax.

@@ -141,8 +141,8 @@ fn report(py: Python<'_>, report: &ldls_core::Report) -> PyResult<Py<PyDict>> {
 fn timings(py: Python<'_>, timings: &Timings) -> PyResult<Py<PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("project", timings.project.as_secs_f64())?;
-    dict.set_item("pixel_labels", timings.pixel_labels.as_secs_f64())?;
     dict.set_item("neighbors", timings.neighbors.as_secs_f64())?;
+    dict.set_item("pixel_labels", timings.pixel_labels.as_secs_f64())?;
     dict.set_item("graph", timings.graph.as_secs_f64())?;
     dict.set_item("diffusion", timings.diffusion.as_secs_f64())?;
     dict.set_item("components", timings.components.as_secs_f64())?;

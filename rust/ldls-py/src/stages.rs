@@ -151,7 +151,7 @@ pub fn diffuse(
     n_labels: usize,
     iterations: Option<usize>,
     threads: Option<usize>,
-) -> PyResult<(Py<PyArray2<f32>>, usize, f64)> {
+) -> PyResult<(Py<PyArray2<f32>>, usize, Option<f64>)> {
     let a = graph(py, &point_graph)?;
     let mass = vec![0.0; a.len()];
     let b = labels_of(py, &labels, mass)?;
