@@ -1,33 +1,46 @@
-"""`python -m benches`: how much faster than what else one would use."""
+"""`python -m benches`: how much faster than what else one would use, and how time and memory grow."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
+from collections.abc import Callable
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 import ldls
-from benches import scipy_pipeline
-from benches.frames import Frame, frame
+from benches.frames import Frame, frame, tiled_frame
 from benches.measuring import medians
+
+MISSING = "not measured: run pip install '.[bench]'"
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benches", description=__doc__)
     parser.add_argument("--runs", type=int, default=20, help="rounds of each comparison (default: 20)")
-    parser.add_argument("--threads", type=int, default=None, help="threads of ldls (default: all cores)")
+    parser.add_argument("--threads", type=int, default=None, help="threads of all sides (default: all cores)")
+    parser.add_argument("--most", type=int, default=1_000_000, help="points of the largest cloud (default: 1000000)")
+    parser.add_argument("sections", nargs="*", choices=[[], *SECTIONS], help="what to measure (default: all)")
     options = parser.parse_args()
-    measured = frame()
     threads = options.threads or ldls._ldls.default_threads()
-    Console(width=100).print(against_scipy(measured, threads, options.runs))
+    # pykdtree reads it when it is first imported
+    os.environ["OMP_NUM_THREADS"] = str(threads)
+    console, measured = Console(width=100), frame()
+    for section in options.sections or SECTIONS:
+        try:
+            console.print(SECTIONS[section](measured, threads, options.runs, options.most))
+        except ImportError as error:
+            console.print(f"{section}: {error.name} is {MISSING}")
 
 
-def against_scipy(measured: Frame, threads: int, runs: int) -> Table:
+def against_scipy(measured: Frame, threads: int, runs: int, _most: int) -> Table:
     """Each stage and the whole of `ldls.segment` against the plain SciPy pipeline."""
+    from benches import scipy_pipeline
+
     params = ldls.Params(threads=threads)
     dense = measured.masks.to_array()
     stages: dict[str, list[dict[str, float]]] = {"scipy": [], "ldls": []}
@@ -44,18 +57,123 @@ def against_scipy(measured: Frame, threads: int, runs: int) -> Table:
 
     whole = medians({"scipy": run_scipy, "ldls": run_ldls}, runs=runs)
     differ = int((labels["scipy"] != labels["ldls"]).sum())
-    table = Table(
-        title=f"{measured.name}: {len(labels['ldls']):,} points in view, {len(measured.masks)} instances",
-        caption=f"medians of {runs} runs, ldls on {threads} threads; labels that differ: {differ}",
+    table = _table(
+        f"{measured.name}: {len(labels['ldls']):,} points in view, {len(measured.masks)} instances",
+        ["stage", "plain scipy float64, ms", "ldls, ms", "ratio"],
+        f"medians of {runs} runs, ldls on {threads} threads; labels that differ: {differ}",
     )
-    table.add_column("stage")
-    for heading in ("plain scipy float64, ms", "ldls, ms", "ratio"):
-        table.add_column(heading, justify="right")
     for stage in scipy_pipeline.STAGES:
         peer, own = (statistics.median(run[stage] for run in stages[side][1:]) for side in ("scipy", "ldls"))
         _add_ratio(table, stage, peer, own)
     table.add_section()
     _add_ratio(table, "ldls.segment", whole["scipy"], whole["ldls"])
+    return table
+
+
+def against_learners(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+    """`ldls.segment` against project + DBSCAN and against label spreading."""
+    from benches import learners
+
+    dense, params = measured.masks.to_array(), ldls.Params(threads=threads)
+    peers: dict[str, tuple[Callable[..., object], int]] = {
+        "project + DBSCAN (scikit-learn)": (learners.project_and_cluster, runs),
+        "LabelSpreading (scikit-learn), 200 iterations": (learners.spread_labels, min(runs, 3)),
+    }
+    table = _table(
+        f"{measured.name}: the whole frame",
+        ["peer", "peer, ms", "ldls, ms", "ratio"],
+        f"{threads} threads on both sides",
+    )
+    for name, (peer, rounds) in peers.items():
+        found = medians(
+            {
+                "peer": lambda peer=peer: peer(measured, dense),  # type: ignore[misc]
+                "ldls": lambda: ldls.segment(measured.points, measured.masks, measured.camera, params=params),
+            },
+            runs=rounds,
+        )
+        _add_ratio(table, name, found["peer"], found["ldls"])
+    return table
+
+
+def neighbors(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+    """Nearest neighbours against pykdtree, SciPy and small_gicp."""
+    from benches import neighbor_peers
+
+    table = _table(
+        "10 nearest neighbours of every point, tree included, ms",
+        ["cloud", "points", "ldls", "pykdtree", "scipy", "small_gicp", "pykdtree / ldls"],
+        f"medians, {threads} threads on all sides",
+    )
+    sweep = np.ascontiguousarray(measured.points[:, :3])
+    for name, cloud in neighbor_peers.clouds(sweep, measured.in_view()).items():
+        rounds = runs if len(cloud) < 500_000 else min(runs, 5)
+        found = medians(neighbor_peers.searches(cloud, threads), runs=rounds)
+        times = [f"{found[peer] * 1e3:.1f}" for peer in ("ldls", "pykdtree", "scipy", "small_gicp")]
+        table.add_row(name, f"{len(cloud):,}", *times, f"{found['pykdtree'] / found['ldls']:.2f} x")
+    return table
+
+
+def growth(measured: Frame, threads: int, runs: int, most: int) -> Table:
+    """How time and memory grow with the number of points, all in view of one camera, 20 instances."""
+    from benches import memory
+
+    params = ldls.Params(threads=threads)
+    table = _table(
+        "time and memory against points", ["points", "s", "over 100,000", "extra bytes a point"], f"{threads} threads"
+    )
+    base = 0.0
+    for n in (n for n in (10_000, 100_000, 1_000_000, 10_000_000) if n <= most):
+        tiled = tiled_frame(measured.in_view(), n)
+        run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
+        seconds = medians(run, runs=runs if n <= 100_000 else 3)["ldls"]
+        base = seconds if n == 100_000 else base
+        ratio = f"{seconds / base:.1f} x" if base else ""
+        table.add_row(f"{n:,}", f"{seconds:.4f}", ratio, f"{memory.extra_bytes(n) / n:.0f}")
+    return table
+
+
+def instances(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+    """How time grows with the number of instances."""
+    params = ldls.Params(threads=threads)
+    table = _table("time against instances, 100,000 points", ["instances", "ms"], f"{threads} threads")
+    for count in (0, 1, 5, 20, 100, 500):
+        tiled = tiled_frame(measured.in_view(), 100_000, count)
+        run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
+        table.add_row(str(count), f"{medians(run, runs=min(runs, 5))['ldls'] * 1e3:.1f}")
+    return table
+
+
+def thread_scaling(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+    """How time falls with the number of threads."""
+    table = _table(f"time against threads: {measured.name}", ["threads", "ms", "ratio to one"], "")
+    counts = [count for count in (1, 2, 4, 8, 16) if count <= threads]
+
+    def run(count: int) -> Callable[[], object]:
+        params = ldls.Params(threads=count)
+        return lambda: ldls.segment(measured.points, measured.masks, measured.camera, params=params)
+
+    found = {count: medians({"ldls": run(count)}, runs=runs)["ldls"] for count in counts}
+    for count, seconds in found.items():
+        table.add_row(str(count), f"{seconds * 1e3:.2f}", f"{found[1] / seconds:.2f} x")
+    return table
+
+
+SECTIONS = {
+    "scipy": against_scipy,
+    "learners": against_learners,
+    "neighbors": neighbors,
+    "growth": growth,
+    "instances": instances,
+    "threads": thread_scaling,
+}
+
+
+def _table(title: str, headings: list[str], caption: str) -> Table:
+    table = Table(title=title, caption=caption)
+    table.add_column(headings[0])
+    for heading in headings[1:]:
+        table.add_column(heading, justify="right")
     return table
 
 

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 import ldls
 from ldls.simulation import street_scene
 
+TILE_M = 100.0
+"""Distance of the copies of a sweep in a tiled cloud: no copy touches another."""
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -21,6 +24,11 @@ class Frame:
     points: NDArray[np.float32]
     masks: ldls.InstanceMasks
     camera: ldls.Camera
+
+    def in_view(self) -> NDArray[np.float32]:
+        """(n, 3) points that the camera sees."""
+        rows, _ = ldls.stages.project(self.points, self.camera, image_size=self.masks.image_size)
+        return np.ascontiguousarray(self.points[rows, :3])
 
 
 def frame() -> Frame:
@@ -35,6 +43,35 @@ def frame() -> Frame:
         masks=ldls.InstanceMasks.from_coco(training / "masks/000571.json"),
         camera=ldls.Camera.from_kitti(training / "calib/000571.txt"),
     )
+
+
+def tiled_points(points: NDArray[np.float32], n: int) -> NDArray[np.float32]:
+    """`n` points: copies of `points` (m, 3) side by side on the ground."""
+    copies = -(-n // len(points))
+    side = int(np.ceil(np.sqrt(copies)))
+    offsets = np.array([[i // side, i % side - side / 2, 0] for i in range(copies)], np.float32) * TILE_M
+    return (points[None] + offsets[:, None]).reshape(-1, 3)[:n]
+
+
+def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Frame:
+    """`n` points tiled from `points`, all in view of one camera far behind them, and square masks over the image."""
+    height, width = 1080, 1920
+    cloud = tiled_points(points, n)
+    middle, reach = (cloud.max(axis=0) + cloud.min(axis=0)) / 2, np.ptp(cloud, axis=0).max() + 200
+    back_m, focal_px = 2 * reach, 2 * height
+    transform = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
+    transform[:3, 3] = -transform[:3, :3] @ [cloud[:, 0].min() - back_m, middle[1], middle[2]]
+    camera = ldls.Camera(
+        projection=[[focal_px, 0, width / 2], [0, focal_px, height / 2], [0, 0, 1]], T_camera_lidar=transform
+    )
+    _, pixels = ldls.stages.project(cloud, camera, image_size=(height, width))
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    pixels_of = np.random.default_rng(0).uniform(low, high, (instances, 2)).astype(int)
+    half = np.maximum(((high - low) / 40).astype(int), 3)
+    masks = np.zeros((instances, height, width), bool)
+    for mask, (u, v) in zip(masks, pixels_of, strict=True):
+        mask[max(v - half[1], 0) : v + half[1] + 1, max(u - half[0], 0) : u + half[0] + 1] = True
+    return Frame(f"{n:,} points tiled", cloud, ldls.InstanceMasks.from_array(masks), camera)
 
 
 def _simulated() -> Frame:

@@ -19,7 +19,7 @@ STAGES = ("project", "pixel_labels", "neighbors", "graph", "diffusion", "compone
 def segment(frame: Frame, params: Params, dense_masks: NDArray[np.bool_]) -> tuple[NDArray[np.int64], dict[str, float]]:
     """Labels of the points in view, and seconds a stage. Dense masks are made beforehand and cost nothing here."""
     laps = [time.perf_counter()]
-    xyz, pixels = _project(frame, dense_masks.shape[1:])
+    xyz, pixels = project(frame, dense_masks.shape[1:])
     laps.append(time.perf_counter())
     counts, mass = _pixel_labels(pixels, dense_masks, params)
     laps.append(time.perf_counter())
@@ -37,7 +37,8 @@ def segment(frame: Frame, params: Params, dense_masks: NDArray[np.bool_]) -> tup
     return labels, dict(zip(STAGES, np.diff(laps).tolist(), strict=True))
 
 
-def _project(frame: Frame, image_size: tuple[int, ...]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def project(frame: Frame, image_size: tuple[int, ...]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(n, 3) points in view and their pixels (n, 2), column and row."""
     matrix = frame.camera.projection @ frame.camera.T_camera_lidar
     xyz = frame.points[:, :3].astype(np.float64)
     u, v, depth = matrix[:, :3] @ xyz.T + matrix[:, 3:]
