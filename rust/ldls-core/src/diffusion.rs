@@ -178,7 +178,8 @@ fn for_each_pass<T: Sweep<HALF>, const HALF: usize>(
     let mut scheme = Scheme::choose(a, iterations, tolerance);
     let blocks = Blocks::new(a);
     let mut convergence = Convergence::default();
-    for lanes in plan(b, labels, 2 * HALF) {
+    let probe = HALF == HALF_F32;
+    for lanes in plan(b, labels, 2 * HALF, probe) {
         let seeds = LaneSeeds::new(b, &lanes);
         let mut pass = scheme.run(a, &seeds, &blocks);
         if !matches!(scheme, Scheme::Products(_)) && !pass.is_sound(&lanes, largest_overlap(b)) {

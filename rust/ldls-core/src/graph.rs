@@ -1,8 +1,10 @@
 //! The point graph as a sparse matrix (method, steps 3 and 4).
 
+use crate::neighbors::Adjacency;
 use crate::{Error, Neighbors, PixelLabels, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Rows handled by one task of the thread pool.
 const BLOCK: usize = 1024;
@@ -11,11 +13,36 @@ const BLOCK: usize = 1024;
 /// from to point i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointGraph<T = f32> {
-    /// Edges of each point, if all have as many.
-    degree: Option<usize>,
-    offsets: Vec<usize>,
-    columns: Vec<u32>,
+    rows: Rows,
+    /// Shared by the graphs of one cloud in both precisions.
+    columns: Arc<Vec<u32>>,
     weights: Vec<T>,
+}
+
+/// Where the rows of a sparse matrix lie.
+#[derive(Debug, Clone, PartialEq)]
+enum Rows {
+    /// All of one length.
+    Uniform { count: usize, degree: usize },
+    /// Row i at `offsets[i]..offsets[i + 1]`.
+    Varied { offsets: Vec<usize> },
+}
+
+impl Rows {
+    fn count(&self) -> usize {
+        match self {
+            Self::Uniform { count, .. } => *count,
+            Self::Varied { offsets } => offsets.len() - 1,
+        }
+    }
+
+    #[inline(always)]
+    fn range(&self, rows: Range<usize>) -> Range<usize> {
+        match self {
+            Self::Uniform { degree, .. } => rows.start * degree..rows.end * degree,
+            Self::Varied { offsets } => offsets[rows.start]..offsets[rows.end],
+        }
+    }
 }
 
 impl<T: Real> PointGraph<T> {
@@ -33,30 +60,41 @@ impl<T: Real> PointGraph<T> {
                 problem,
             });
         }
-        let degree = k + 1;
-        let mut columns = vec![0; n * degree];
-        let mut weights = vec![T::default(); n * degree];
-        columns
+        let row = |i: usize| {
+            std::iter::once(i as u32).chain(neighbors.indices[i * k..(i + 1) * k].iter().copied())
+        };
+        let columns = (0..n).flat_map(row).collect();
+        Ok(Self::from_adjacency(
+            points,
+            &Adjacency {
+                degree: k + 1,
+                columns: Arc::new(columns),
+            },
+            sigma,
+        ))
+    }
+
+    /// The same from rows that begin with the point itself.
+    pub(crate) fn from_adjacency(points: &[[f64; 3]], adjacency: &Adjacency, sigma: f64) -> Self {
+        let (count, degree) = (points.len(), adjacency.degree);
+        let mut weights = vec![T::default(); count * degree];
+        let rows = weights
             .par_chunks_mut(degree)
-            .zip(weights.par_chunks_mut(degree))
-            .with_min_len(BLOCK)
-            .enumerate()
-            .for_each(|(i, (columns, weights))| {
-                columns[0] = i as u32;
+            .zip(adjacency.columns.par_chunks(degree))
+            .zip(points);
+        rows.with_min_len(BLOCK)
+            .for_each(|((weights, columns), point)| {
                 weights[0] = T::from_f64(1.0);
-                columns[1..].copy_from_slice(&neighbors.indices[i * k..(i + 1) * k]);
                 for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
-                    let squared = squared_distance(&points[i], &points[j as usize]);
+                    let squared = squared_distance(point, &points[j as usize]);
                     *weight = T::from_f64(-squared / sigma).exp();
                 }
             });
-        let offsets = (0..=n).map(|i| i * degree).collect();
-        Ok(Self {
-            degree: Some(degree),
-            offsets,
-            columns,
+        Self {
+            rows: Rows::Uniform { count, degree },
+            columns: Arc::clone(&adjacency.columns),
             weights,
-        })
+        }
     }
 
     /// A graph from the three arrays of a sparse matrix.
@@ -97,9 +135,8 @@ impl<T: Real> PointGraph<T> {
             ));
         }
         Ok(Self {
-            degree: None,
-            offsets,
-            columns,
+            rows: Rows::Varied { offsets },
+            columns: Arc::new(columns),
             weights,
         })
     }
@@ -117,7 +154,7 @@ impl<T: Real> PointGraph<T> {
             });
         }
         let scale = |(i, mass): (usize, &T)| {
-            let edges = &self.weights[self.offsets[i]..self.offsets[i + 1]];
+            let edges = &self.weights[self.rows.range(i..i + 1)];
             let sum = edges.iter().map(|w| w.to_f64()).sum::<f64>() + mass.to_f64();
             // a row without edges stays empty rather than become NaN
             if sum > 0.0 { 1.0 / sum } else { 0.0 }
@@ -129,8 +166,9 @@ impl<T: Real> PointGraph<T> {
             .with_min_len(BLOCK)
             .map(scale)
             .collect();
-        scale_rows(&mut self.weights, &self.offsets, &scales);
-        scale_rows(&mut labels.weights, &labels.offsets, &scales);
+        scale_rows(&mut self.weights, &scales, |rows| self.rows.range(rows));
+        let range = |rows: Range<usize>| labels.offsets[rows.start]..labels.offsets[rows.end];
+        scale_rows(&mut labels.weights, &scales, range);
         labels
             .mass
             .iter_mut()
@@ -141,7 +179,7 @@ impl<T: Real> PointGraph<T> {
 
     /// Number of points.
     pub fn len(&self) -> usize {
-        self.offsets.len() - 1
+        self.rows.count()
     }
 
     /// Whether there is no point.
@@ -151,7 +189,10 @@ impl<T: Real> PointGraph<T> {
 
     /// Edges of each point, if it is known that all have as many.
     pub(crate) fn degree(&self) -> Option<usize> {
-        self.degree
+        match self.rows {
+            Rows::Uniform { degree, .. } => Some(degree),
+            Rows::Varied { .. } => None,
+        }
     }
 
     /// Columns and weights of row `i`.
@@ -167,13 +208,16 @@ impl<T: Real> PointGraph<T> {
     /// Columns and weights of `rows`, row after row.
     #[inline(always)]
     pub(crate) fn slices(&self, rows: Range<usize>) -> (&[u32], &[T]) {
-        let range = self.offsets[rows.start]..self.offsets[rows.end];
+        let range = self.rows.range(rows);
         (&self.columns[range.clone()], &self.weights[range])
     }
 
     /// Row starts, column indices and weights.
     pub fn into_csr(self) -> (Vec<usize>, Vec<u32>, Vec<T>) {
-        (self.offsets, self.columns, self.weights)
+        let offsets = (0..=self.len())
+            .map(|i| self.rows.range(i..i).start)
+            .collect();
+        (offsets, Arc::unwrap_or_clone(self.columns), self.weights)
     }
 }
 
@@ -184,23 +228,28 @@ pub(crate) fn squared_distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     x * x + y * y + z * z
 }
 
-fn scale_rows<T: Real>(mut values: &mut [T], offsets: &[usize], scales: &[f64]) {
+/// Multiplies the values of each row, which lie at `range` of it, by its scale.
+fn scale_rows<T: Real>(
+    mut values: &mut [T],
+    scales: &[f64],
+    range: impl Fn(Range<usize>) -> Range<usize> + Sync,
+) {
     let mut blocks = Vec::with_capacity(scales.len().div_ceil(BLOCK));
     for (block, scales) in scales.chunks(BLOCK).enumerate() {
-        let offsets = &offsets[block * BLOCK..=block * BLOCK + scales.len()];
-        let (head, tail) = values.split_at_mut(offsets[scales.len()] - offsets[0]);
-        blocks.push((head, offsets, scales));
+        let first = block * BLOCK;
+        let (head, tail) = values.split_at_mut(range(first..first + scales.len()).len());
+        blocks.push((head, first, scales));
         values = tail;
     }
-    blocks
-        .into_par_iter()
-        .for_each(|(values, offsets, scales)| {
-            for (i, &scale) in scales.iter().enumerate() {
-                for value in &mut values[offsets[i] - offsets[0]..offsets[i + 1] - offsets[0]] {
-                    rescale(value, scale);
-                }
-            }
-        });
+    blocks.into_par_iter().for_each(|(values, first, scales)| {
+        let start = range(first..first).start;
+        for (i, &scale) in (first..).zip(scales) {
+            let row = range(i..i + 1);
+            values[row.start - start..row.end - start]
+                .iter_mut()
+                .for_each(|value| rescale(value, scale));
+        }
+    });
 }
 
 fn rescale<T: Real>(value: &mut T, scale: f64) {

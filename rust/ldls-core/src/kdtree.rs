@@ -80,17 +80,22 @@ impl KdTree {
 
     /// `values` of the points, in the order of the tree.
     pub(crate) fn arrange<T: Copy + Send + Sync>(&self, values: &[T]) -> Vec<T> {
-        self.order
-            .par_iter()
-            .with_min_len(PARALLEL)
-            .map(|&index| values[index as usize])
-            .collect()
+        arrange(&self.order, values)
     }
 
     /// Number of points.
     pub(crate) fn len(&self) -> usize {
         self.order.len()
     }
+}
+
+/// `values` in the order of the tree.
+pub(crate) fn arrange<T: Copy + Send + Sync>(order: &[u32], values: &[T]) -> Vec<T> {
+    order
+        .par_iter()
+        .with_min_len(PARALLEL)
+        .map(|&index| values[index as usize])
+        .collect()
 }
 
 impl Leaf {

@@ -42,24 +42,28 @@ pub(crate) enum Lane {
 ///
 /// Labels without a seed need no lane. The first half of the first pass, which the background keeps busy
 /// everywhere, takes the labels with the most seeds; the others follow in the order of where they lie, so
-/// that the labels of a half are neighbours and the half is zero over most of the cloud. The probe and the
-/// background come first, whether or not the background is among `labels`.
-pub(crate) fn plan<T: Real>(b: &PixelLabels<T>, labels: &[u32], lanes: usize) -> Vec<Vec<Lane>> {
+/// that the labels of a half are neighbours and the half is zero over most of the cloud.
+pub(crate) fn plan<T: Real>(
+    b: &PixelLabels<T>,
+    labels: &[u32],
+    lanes: usize,
+    probe: bool,
+) -> Vec<Vec<Lane>> {
     let seeds = seeds_of(b, labels);
     let mut rest: Vec<&Seeds> = seeds
         .iter()
         .filter(|seeds| seeds.label > 0 && seeds.count > 0)
         .collect();
     rest.sort_by_key(|seeds| std::cmp::Reverse(seeds.count));
-    let mut order = vec![Lane::Probe];
-    order.extend(
-        seeds
-            .iter()
-            .filter(|seeds| seeds.label == 0)
-            .map(|_| Lane::Label(0)),
-    );
-    let first = (lanes / 2 - order.len()).min(rest.len());
-    order.extend(rest.drain(..first).map(|seeds| Lane::Label(seeds.label)));
+    let background = seeds
+        .iter()
+        .filter(|seeds| seeds.label == 0)
+        .map(|_| Lane::Label(0));
+    let mut order: Vec<Lane> = background.chain(probe.then_some(Lane::Probe)).collect();
+    if !order.is_empty() {
+        let first = (lanes / 2 - order.len()).min(rest.len());
+        order.extend(rest.drain(..first).map(|seeds| Lane::Label(seeds.label)));
+    }
     rest.sort_by_key(|seeds| (seeds.row_sum / seeds.count, seeds.label));
     order.extend(rest.iter().map(|seeds| Lane::Label(seeds.label)));
     order.chunks(lanes).map(<[Lane]>::to_vec).collect()
@@ -91,12 +95,12 @@ fn seeds_of<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
     labels.iter().map(|&label| all[label as usize]).collect()
 }
 
-/// Where the background lies in the first pass.
-pub(crate) const BACKGROUND_LANE: usize = 1;
+/// Where the background lies in the pass that has it.
+pub(crate) const BACKGROUND_LANE: usize = 0;
 
 /// The seeds of the labels of one pass by lane, row after row.
 pub(crate) struct LaneSeeds<T> {
-    /// Seeds of the background, which nearly every row has; zeros in later passes.
+    /// Seeds of the background, which nearly every row has; zeros where it is in another pass.
     pub(crate) background: Vec<T>,
     offsets: Vec<u32>,
     /// Row, lane and weight of each seed.
@@ -142,7 +146,9 @@ impl<T: Real> LaneSeeds<T> {
     pub(crate) fn halves(&self, block: usize, half: usize) -> Vec<u8> {
         let rows = self.offsets.len() - 1;
         let probed = self.probe.as_ref();
-        let everywhere = probed.map_or(0, |(lane, _)| 1 << (lane / half));
+        let probed = probed.map_or(0, |(lane, _)| 1 << (lane / half));
+        let full = self.background.iter().any(|&weight| weight > T::default());
+        let everywhere = probed | u8::from(full) << (BACKGROUND_LANE / half);
         let of_block = |first: usize| {
             let entries =
                 self.offsets[first] as usize..self.offsets[rows.min(first + block)] as usize;

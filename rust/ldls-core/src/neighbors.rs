@@ -11,6 +11,7 @@ use crate::graph::squared_distance;
 use crate::kdtree::{Boxes, FAN, KdTree};
 use multiversion::multiversion;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Leaves handled by one task of the thread pool.
 const LEAVES_A_TASK: usize = 16;
@@ -33,33 +34,16 @@ impl Neighbors {
     /// of them.
     pub fn search(points: &[[f64; 3]], k: usize) -> Self {
         let tree = KdTree::new(points);
-        let by_position = Self::search_tree(&tree, &tree.arrange(points), k);
-        let k = by_position.k;
+        let found = Adjacency::search(&tree, &tree.arrange(points), k);
+        let k = found.degree - 1;
         let mut indices = vec![0; points.len() * k];
         if k > 0 {
-            for (&index, row) in tree.order.iter().zip(by_position.indices.chunks(k)) {
+            for (&index, row) in tree.order.iter().zip(found.columns.chunks(found.degree)) {
                 let slots = &mut indices[index as usize * k..][..k];
-                for (slot, &position) in slots.iter_mut().zip(row) {
+                for (slot, &position) in slots.iter_mut().zip(&row[1..]) {
                     *slot = tree.order[position as usize];
                 }
             }
-        }
-        Self { k, indices }
-    }
-
-    /// The same for `points` in the order of their `tree`: rows and neighbours are positions in it.
-    pub(crate) fn search_tree(tree: &KdTree, points: &[[f64; 3]], k: usize) -> Self {
-        let k = k.min(points.len().saturating_sub(1));
-        let mut indices = vec![0; points.len() * k];
-        if k > 0 {
-            let row_of_task = k * FAN * LEAVES_A_TASK;
-            let tasks = indices.par_chunks_mut(row_of_task).enumerate();
-            tasks.for_each(|(task, rows)| {
-                let mut places = k + 1 + SPARE;
-                for (leaf, rows) in (task * LEAVES_A_TASK..).zip(rows.chunks_mut(k * FAN)) {
-                    places = search_leaf(tree, points, k, leaf, places, rows);
-                }
-            });
         }
         Self { k, indices }
     }
@@ -74,26 +58,63 @@ impl Neighbors {
         };
         rows.flat_map_iter(of_row).collect()
     }
+}
+
+/// The points themselves and their nearest neighbours, as positions in the order of a tree.
+#[derive(Debug, Clone)]
+pub(crate) struct Adjacency {
+    /// Length of a row: the neighbours and the point itself.
+    pub(crate) degree: usize,
+    /// Row after row, each the point itself first, then its neighbours, the nearest first.
+    pub(crate) columns: Arc<Vec<u32>>,
+}
+
+impl Adjacency {
+    /// The `k` nearest neighbours of `points`, which are in the order of their `tree`.
+    pub(crate) fn search(tree: &KdTree, points: &[[f64; 3]], k: usize) -> Self {
+        let degree = k.min(points.len().saturating_sub(1)) + 1;
+        let mut columns = vec![0; points.len() * degree];
+        let tasks = columns
+            .par_chunks_mut(degree * FAN * LEAVES_A_TASK)
+            .enumerate();
+        tasks.for_each(|(task, rows)| {
+            let mut places = degree + SPARE;
+            for (leaf, rows) in (task * LEAVES_A_TASK..).zip(rows.chunks_mut(degree * FAN)) {
+                for (position, row) in (leaf * FAN..).zip(rows.chunks_mut(degree)) {
+                    row[0] = position as u32;
+                }
+                if degree > 1 {
+                    places = search_leaf(tree, points, degree, leaf, places, rows);
+                }
+            }
+        });
+        Self {
+            degree,
+            columns: Arc::new(columns),
+        }
+    }
 
     /// Number of `points` that share their place with another one.
-    pub fn duplicates(&self, points: &[[f64; 3]]) -> usize {
-        self.coincident(points, 0)
+    pub(crate) fn duplicates(&self, points: &[[f64; 3]]) -> usize {
+        self.coincident(points, 1)
             .filter(|&coincident| coincident)
             .count()
     }
 
-    /// Whether the `k` neighbours of every one of `points` share its place, so that the graph falls into
-    /// islands.
-    pub fn only_islands(&self, points: &[[f64; 3]]) -> bool {
-        self.k > 0
+    /// Whether all neighbours of every one of `points` share its place, so that the graph falls into islands.
+    pub(crate) fn only_islands(&self, points: &[[f64; 3]]) -> bool {
+        self.degree > 1
             && self
-                .coincident(points, self.k - 1)
+                .coincident(points, self.degree - 1)
                 .all(|coincident| coincident)
     }
 
-    /// Whether the neighbour of each point at `rank` lies where the point lies.
+    /// Whether the neighbour of each point at `rank` lies where the point lies; empty where there is none.
     fn coincident(&self, points: &[[f64; 3]], rank: usize) -> impl Iterator<Item = bool> {
-        let rows = self.indices.chunks(self.k.max(1));
+        let rows = self
+            .columns
+            .chunks(self.degree)
+            .filter(move |row| row.len() > rank);
         rows.zip(points)
             .map(move |(row, point)| *point == points[row[rank] as usize])
     }
@@ -104,12 +125,12 @@ impl Neighbors {
 fn search_leaf(
     tree: &KdTree,
     points: &[[f64; 3]],
-    k: usize,
+    degree: usize,
     leaf: usize,
     places: usize,
     rows: &mut [u32],
 ) -> usize {
-    let count = rows.len() / k;
+    let count = rows.len() / degree;
     let mut unsure = u32::MAX >> (32 - count);
     let mut enough = places;
     // ties at the last neighbour are more than a list holds: a longer one holds more of them
@@ -118,16 +139,15 @@ fn search_leaf(
             enough = size;
         }
         if unsure != 0 {
-            unsure = search(tree, points, k, leaf, unsure, rows);
+            unsure = search(tree, points, degree, leaf, unsure, rows);
         }
     }
     for slot in (0..count).filter(|slot| unsure >> slot & 1 == 1) {
         search_alone(
             tree,
             points,
-            k,
             leaf * FAN + slot,
-            &mut rows[slot * k..(slot + 1) * k],
+            &mut rows[slot * degree + 1..(slot + 1) * degree],
         );
     }
     enough
@@ -148,12 +168,12 @@ const SEARCHES: [(usize, LeafSearch); 4] = [
 fn search_with<const LEN: usize>(
     tree: &KdTree,
     points: &[[f64; 3]],
-    k: usize,
+    degree: usize,
     leaf: usize,
     wanted: u32,
     rows: &mut [u32],
 ) -> u32 {
-    let mut search = Search::<LEN>::new(tree, k, leaf, wanted);
+    let mut search = Search::<LEN>::new(tree, degree - 1, leaf, wanted);
     run(&mut search);
     let mut unsure = 0;
     for slot in (0..FAN).filter(|slot| wanted >> slot & 1 == 1) {
@@ -164,7 +184,7 @@ fn search_with<const LEN: usize>(
                 points,
                 search.candidates(slot),
                 position,
-                &mut rows[slot * k..(slot + 1) * k],
+                &mut rows[slot * degree + 1..(slot + 1) * degree],
             )
         {
             unsure |= 1 << slot;
@@ -472,8 +492,8 @@ fn precedes(a: Candidate, b: Candidate) -> bool {
 }
 
 /// Fills `row` with the neighbours of the point at `position`, in double precision throughout.
-fn search_alone(tree: &KdTree, points: &[[f64; 3]], k: usize, position: usize, row: &mut [u32]) {
-    let from = points[position];
+fn search_alone(tree: &KdTree, points: &[[f64; 3]], position: usize, row: &mut [u32]) {
+    let (from, k) = (points[position], row.len());
     let mut search = Alone {
         tree,
         points,
@@ -624,8 +644,9 @@ mod tests {
             neighbors.indices[119_999 * 10..],
             [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
         );
-        assert_eq!(neighbors.duplicates(&points), 120_000);
-        assert!(neighbors.only_islands(&points));
+        let adjacency = Adjacency::search(&KdTree::new(&points), &points, 10);
+        assert_eq!(adjacency.duplicates(&points), 120_000);
+        assert!(adjacency.only_islands(&points));
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! The method on one screen: points, masks and a camera in, one label a point out.
 
 use crate::components::keep_largest_by_index;
-use crate::kdtree::KdTree;
+use crate::kdtree::{KdTree, arrange};
+use crate::neighbors::Adjacency;
 use crate::{
-    Camera, Cloud, Convergence, Error, InstanceMasks, Neighbors, Params, PixelLabels, PointGraph,
-    Real, Result, View, ViewCounts, diffuse,
+    Camera, Cloud, Convergence, Error, InstanceMasks, Params, PixelLabels, PointGraph, Real,
+    Result, View, ViewCounts, diffuse,
 };
 use std::time::{Duration, Instant};
 
@@ -79,35 +80,36 @@ pub fn segment(
     check_edges(cloud.len(), params.neighbors)?;
     let mut clock = Stopwatch::start();
 
-    let view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
+    let mut view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
     let project = clock.lap();
     // from here on, rows are in the order of the tree: near points are near in memory
     let tree = KdTree::new(&view.points);
-    let points = tree.arrange(&view.points);
-    let nearest = Neighbors::search_tree(&tree, &points, params.neighbors);
+    let points = tree.arrange(&std::mem::take(&mut view.points));
+    let adjacency = Adjacency::search(&tree, &points, params.neighbors);
+    let order = tree.order;
     let neighbors = clock.lap();
-    let uv = tree.arrange(&view.uv);
-    let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight)?;
+    let pixels = masks.pixel_labels(
+        &arrange(&order, &view.uv),
+        params.window,
+        params.pixel_weight,
+    )?;
     let pixel_labels = clock.lap();
-    let (a, b) = normalized_graph::<f32>(&points, &nearest, pixels, params)?;
+    let (a, b) = normalized_graph::<f32>(&points, &adjacency, pixels, params)?;
     let graph = clock.lap();
     let diffused = diffuse(&a, &b, masks.len() + 1, params.iterations, || {
+        let uv = arrange(&order, &view.uv);
         let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight)?;
-        normalized_graph::<f64>(&points, &nearest, pixels, params)
+        normalized_graph::<f64>(&points, &adjacency, pixels, params)
     })?;
     let diffusion = clock.lap();
     let kept = if params.remove_outliers {
-        Some(keep_largest_by_index(&a, &diffused.labels, &tree.order)?)
+        Some(keep_largest_by_index(&a, &diffused.labels, &order)?)
     } else {
         None
     };
     let components = clock.lap();
 
-    let rows: Vec<u32> = tree
-        .order
-        .iter()
-        .map(|&index| view.indices[index as usize])
-        .collect();
+    let rows = arrange(&order, &view.indices);
     let whole_cloud = |labels: &[u32]| {
         scatter(
             cloud.len(),
@@ -122,9 +124,9 @@ pub fn segment(
         confidence: scatter(cloud.len(), &rows, 0.0, diffused.confidence.iter().copied()),
         report: Report {
             counts: view.counts,
-            duplicates: nearest.duplicates(&points),
-            only_islands: nearest.only_islands(&points),
-            k_effective: nearest.k,
+            duplicates: adjacency.duplicates(&points),
+            only_islands: adjacency.only_islands(&points),
+            k_effective: adjacency.degree - 1,
             convergence: diffused.convergence,
         },
         timings: Timings {
@@ -142,11 +144,11 @@ pub fn segment(
 /// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
 fn normalized_graph<T: Real>(
     points: &[[f64; 3]],
-    nearest: &Neighbors,
+    adjacency: &Adjacency,
     mut pixels: PixelLabels<T>,
     params: &Params,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
-    let mut graph = PointGraph::from_neighbors(points, nearest, params.sigma)?;
+    let mut graph = PointGraph::from_adjacency(points, adjacency, params.sigma);
     graph.normalize_rows(&mut pixels)?;
     Ok((graph, pixels))
 }
