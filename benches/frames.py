@@ -54,23 +54,27 @@ def tiled_points(points: NDArray[np.float32], n: int) -> NDArray[np.float32]:
 
 
 def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Frame:
-    """`n` points tiled from `points`, all in view of one camera far behind them, and square masks over the image."""
-    height, width = 1080, 1920
+    """`n` points tiled from `points`, all in view of one camera high above them, and masks in a grid."""
+    size = 2000
     cloud = tiled_points(points, n)
-    middle, reach = (cloud.max(axis=0) + cloud.min(axis=0)) / 2, np.ptp(cloud, axis=0).max() + 200
-    back_m, focal_px = 2 * reach, 2 * height
-    transform = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
-    transform[:3, 3] = -transform[:3, :3] @ [cloud[:, 0].min() - back_m, middle[1], middle[2]]
+    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    height_m = 2 * float(np.max(high - low)) + 50
+    transform = np.array([[0, -1, 0, 0], [-1, 0, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1.0]])
+    transform[:3, 3] = -transform[:3, :3] @ [*(low + high)[:2] / 2, low[2] + height_m]
+    focal_px = size * 0.9 * 2
     camera = ldls.Camera(
-        projection=[[focal_px, 0, width / 2], [0, focal_px, height / 2], [0, 0, 1]], T_camera_lidar=transform
+        projection=[[focal_px, 0, size / 2], [0, focal_px, size / 2], [0, 0, 1]], T_camera_lidar=transform
     )
-    _, pixels = ldls.stages.project(cloud, camera, image_size=(height, width))
+    _, pixels = ldls.stages.project(cloud, camera, image_size=(size, size))
     low, high = pixels.min(axis=0), pixels.max(axis=0)
-    pixels_of = np.random.default_rng(0).uniform(low, high, (instances, 2)).astype(int)
-    half = np.maximum(((high - low) / 40).astype(int), 3)
-    masks = np.zeros((instances, height, width), bool)
-    for mask, (u, v) in zip(masks, pixels_of, strict=True):
-        mask[max(v - half[1], 0) : v + half[1] + 1, max(u - half[0], 0) : u + half[0] + 1] = True
+    # a grid of masks over what the points fill, each half as wide and high as its cell: instances seldom overlap
+    columns = int(np.ceil(np.sqrt(2 * instances)))
+    rows = -(-instances // max(columns, 1))
+    cell, quarter = (high - low) / np.maximum([columns, rows], 1), 0.25
+    masks = np.zeros((instances, size, size), bool)
+    for m, mask in enumerate(masks):
+        left, top = (low + cell * [m % columns + quarter, m // columns + quarter]).astype(int)
+        mask[top : top + max(int(cell[1] / 2), 1), left : left + max(int(cell[0] / 2), 1)] = True
     return Frame(f"{n:,} points tiled", cloud, ldls.InstanceMasks.from_array(masks), camera)
 
 
