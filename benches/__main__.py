@@ -6,6 +6,7 @@ import argparse
 import os
 import statistics
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 from rich.console import Console
@@ -27,14 +28,24 @@ def main() -> None:
     parser.add_argument("sections", nargs="*", choices=[[], *SECTIONS], help="what to measure (default: all)")
     options = parser.parse_args()
     threads = options.threads or ldls._ldls.default_threads()
-    # pykdtree reads it when it is first imported
-    os.environ["OMP_NUM_THREADS"] = str(threads)
+    # read when the peers are first imported; threads that spin when their work is done would slow the next one's
+    os.environ |= {"OMP_NUM_THREADS": str(threads), "OMP_WAIT_POLICY": "PASSIVE"}
     console, measured = Console(width=100), frame()
-    for section in options.sections or SECTIONS:
-        try:
-            console.print(SECTIONS[section](measured, threads, options.runs, options.most))
-        except ImportError as error:
-            console.print(f"{section}: {error.name} is {MISSING}")
+    with quiet_blas():
+        for section in options.sections or SECTIONS:
+            try:
+                console.print(SECTIONS[section](measured, threads, options.runs, options.most))
+            except ImportError as error:
+                console.print(f"{section}: {error.name} is {MISSING}")
+
+
+def quiet_blas() -> AbstractContextManager[object]:
+    """Keeps NumPy's BLAS to one thread: its products here are tiny, and its idle threads spin on the others' cores."""
+    try:
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return nullcontext()
+    return threadpool_limits(1, user_api="blas")  # type: ignore[no-any-return]
 
 
 def against_scipy(measured: Frame, threads: int, runs: int, _most: int) -> Table:

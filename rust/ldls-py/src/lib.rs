@@ -13,6 +13,10 @@ mod masks;
 mod segment;
 mod stages;
 
+/// Keeps the memory of a frame for the next one, where the system's allocator would give it back and fetch it anew.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Core of `ldls`; private, use `ldls`.
 #[pyo3::pymodule]
 mod _ldls {
