@@ -6,7 +6,7 @@
 //! is such that the series cannot be trusted, the products are run as they stand.
 
 use crate::chebyshev::{Interval, Series, Tolerance};
-use crate::lanes::{Lane, LaneSeeds, Row, plan};
+use crate::lanes::{Lane, LaneSeeds, Values, plan};
 use crate::sweeps::{Blocks, HALF_F32, HALF_F64, State, Step, Sweep};
 use crate::{Error, PixelLabels, PointGraph, Real, Result};
 use rayon::prelude::*;
@@ -137,9 +137,9 @@ pub fn likelihoods(
     let mut all = vec![0.0; a.len() * n_labels];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let convergence = for_each_pass::<f32, HALF_F32>(a, b, &labels, iterations, |lanes, z| {
-        for (row, values) in all.chunks_mut(n_labels).zip(z) {
+        for (i, row) in all.chunks_mut(n_labels).enumerate() {
             for (label, lane) in labels_of(lanes) {
-                row[label as usize] = values.lanes()[lane];
+                row[label as usize] = z.get(i, lane);
             }
         }
     });
@@ -168,7 +168,7 @@ fn for_each_pass<T: Sweep<HALF>, const HALF: usize>(
     b: &PixelLabels<T>,
     labels: &[u32],
     iterations: Option<usize>,
-    mut done: impl FnMut(&[Lane], &[Row<T, HALF>]),
+    mut done: impl FnMut(&[Lane], &Values<T, HALF>),
 ) -> Convergence {
     let tolerance = if HALF == HALF_F64 {
         TOLERANCE_F64
@@ -194,7 +194,7 @@ fn for_each_pass<T: Sweep<HALF>, const HALF: usize>(
 
 /// What one pass came to.
 struct Pass<T, const HALF: usize> {
-    z: Vec<Row<T, HALF>>,
+    z: Values<T, HALF>,
     sweeps: usize,
     residual: Option<f64>,
     /// What the terms left out may amount to.
@@ -361,24 +361,30 @@ fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<Interval> {
 }
 
 fn largest_change<T: Sweep<HALF>, const HALF: usize>(state: &State<T, HALF>) -> f64 {
-    let probe = state.probe();
-    let change = |(new, old): (&Row<T, HALF>, &Row<T, HALF>)| {
-        let pairs = new.lanes().iter().zip(old.lanes()).enumerate();
-        pairs
-            .filter(|(lane, _)| Some(*lane) != probe)
-            .map(|(_, (new, old))| (*new - *old).to_f64().abs())
-            .fold(0.0, f64::max)
+    let lanes = (0..2 * HALF).filter(|lane| Some(*lane) != state.probe());
+    let change_at = |lane, i| {
+        (state.z.get(i, lane) - state.previous.get(i, lane))
+            .to_f64()
+            .abs()
     };
-    let rows = state.z.par_iter().zip(&state.previous).with_min_len(BLOCK);
-    rows.map(change).reduce(|| 0.0, f64::max)
+    let points = (0..state.z.len()).into_par_iter().with_min_len(BLOCK);
+    lanes
+        .map(|lane| {
+            points
+                .clone()
+                .map(|i| change_at(lane, i))
+                .reduce(|| 0.0, f64::max)
+        })
+        .fold(0.0, f64::max)
 }
 
 fn largest_probe<T: Sweep<HALF>, const HALF: usize>(state: &State<T, HALF>) -> f64 {
     let Some(lane) = state.probe() else {
         return 0.0;
     };
-    let magnitude = |row: &Row<T, HALF>| row.lanes()[lane].to_f64().abs();
-    state.z.iter().map(magnitude).fold(0.0, f64::max)
+    (0..state.z.len())
+        .map(|i| state.z.get(i, lane).to_f64().abs())
+        .fold(0.0, f64::max)
 }
 
 /// Most labels that a pixel edge counts for, taken over a window: what the likelihoods of a point may sum to.
@@ -414,15 +420,19 @@ impl<T: Real, const HALF: usize> Pass<T, HALF> {
     /// Whether little is left out, and no likelihood is negative or too large.
     fn is_sound(&self, lanes: &[Lane], overlap: f64) -> bool {
         let slack = f64::from(SLACK);
-        let row_is_sound = |row: &Row<T, HALF>| {
+        let row_is_sound = |i: usize| {
             let mut sum = 0.0;
             labels_of(lanes).all(|(_, lane)| {
-                let value = row.lanes()[lane].to_f64();
+                let value = self.z.get(i, lane).to_f64();
                 sum += value;
                 value >= -slack
             }) && sum <= overlap + slack
         };
-        self.error <= LARGEST_ERROR && self.z.par_iter().with_min_len(BLOCK).all(row_is_sound)
+        self.error <= LARGEST_ERROR
+            && (0..self.z.len())
+                .into_par_iter()
+                .with_min_len(BLOCK)
+                .all(row_is_sound)
     }
 }
 
@@ -437,14 +447,14 @@ fn labels_of(lanes: &[Lane]) -> impl Iterator<Item = (u32, usize)> {
         })
 }
 
-fn update<const HALF: usize>(best: &mut [Best], lanes: &[Lane], z: &[Row<f32, HALF>]) {
+fn update<const HALF: usize>(best: &mut [Best], lanes: &[Lane], z: &Values<f32, HALF>) {
     let lanes: Vec<(u32, usize)> = labels_of(lanes).collect();
     best.par_iter_mut()
-        .zip(z)
+        .enumerate()
         .with_min_len(BLOCK)
-        .for_each(|(best, row)| {
+        .for_each(|(i, best)| {
             for &(label, lane) in &lanes {
-                best.offer(label, row.lanes()[lane]);
+                best.offer(label, z.get(i, lane));
             }
         });
 }
@@ -539,11 +549,11 @@ impl Contested {
         &self,
         refined: &mut [(u32, f64)],
         lanes: &[Lane],
-        z: &[Row<f64, HALF>],
+        z: &Values<f64, HALF>,
     ) {
         for (&point, best) in self.points.iter().zip(refined) {
             for (label, lane) in labels_of(lanes) {
-                let value = z[point as usize].lanes()[lane];
+                let value = z.get(point as usize, lane);
                 if value > best.1 || (value == best.1 && label < best.0) {
                     *best = (label, value);
                 }

@@ -3,28 +3,38 @@
 use crate::{PixelLabels, Real};
 use std::ops::Range;
 
-/// Values of up to 2 * `HALF` labels at one point: one cache line, in two halves that a sweep can leave out
-/// where they hold nothing but zeros.
+/// Values of half the lanes at one point: 32 bytes.
 #[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub(crate) struct Row<T, const HALF: usize>(pub(crate) [[T; HALF]; 2]);
+#[repr(C, align(32))]
+pub(crate) struct Half<T, const HALF: usize>(pub(crate) [T; HALF]);
 
-impl<T: Real, const HALF: usize> Row<T, HALF> {
-    /// Zeros.
-    pub(crate) fn zero() -> Self {
-        Self([[T::default(); HALF]; 2])
+/// Values of all lanes at all points, in two halves: where one of them holds nothing but zeros, a sweep leaves it
+/// out and does not touch its memory.
+#[derive(Debug, Clone)]
+pub(crate) struct Values<T, const HALF: usize>(pub(crate) [Vec<Half<T, HALF>>; 2]);
+
+impl<T: Real, const HALF: usize> Values<T, HALF> {
+    /// Zeros at `points` points.
+    pub(crate) fn zero(points: usize) -> Self {
+        let half = || vec![Half([T::default(); HALF]); points];
+        Self([half(), half()])
     }
 
-    /// The value of each lane.
+    /// The value of `lane` at point `i`.
     #[inline(always)]
-    pub(crate) fn lanes(&self) -> &[T] {
-        self.0.as_flattened()
+    pub(crate) fn get(&self, i: usize, lane: usize) -> T {
+        self.0[lane / HALF][i].0[lane % HALF]
     }
 
-    /// The value of each lane.
+    /// The place of the value of `lane` at point `i`.
     #[inline(always)]
-    pub(crate) fn lanes_mut(&mut self) -> &mut [T] {
-        self.0.as_flattened_mut()
+    pub(crate) fn get_mut(&mut self, i: usize, lane: usize) -> &mut T {
+        &mut self.0[lane / HALF][i].0[lane % HALF]
+    }
+
+    /// Number of points.
+    pub(crate) fn len(&self) -> usize {
+        self.0[0].len()
     }
 }
 

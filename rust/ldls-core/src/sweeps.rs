@@ -3,10 +3,11 @@
 //! A sweep works on blocks of consecutive rows. Values spread from the seeds by one edge a sweep, so at first
 //! most halves of most blocks are zero; those are left out, at no loss.
 
-use crate::lanes::{BACKGROUND_LANE, LaneSeeds, Row};
+use crate::lanes::{BACKGROUND_LANE, Half, LaneSeeds, Values};
 use crate::{PointGraph, Real};
 use multiversion::multiversion;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows of a block.
 const BLOCK: usize = 16;
@@ -35,10 +36,10 @@ pub(crate) struct Inputs<'a, T, const HALF: usize> {
     a: &'a PointGraph<T>,
     seeds: &'a LaneSeeds<T>,
     step: Step<T>,
-    z: &'a [Row<T, HALF>],
+    z: &'a Values<T, HALF>,
     /// One where the background lies, zero elsewhere: its seeds are added to all lanes at once, since a single
     /// lane would have to wait for the row to reach memory.
-    background_lanes: [[T; HALF]; 2],
+    background_lanes: [T; HALF],
 }
 
 impl<'a, T: Real, const HALF: usize> Inputs<'a, T, HALF> {
@@ -46,11 +47,14 @@ impl<'a, T: Real, const HALF: usize> Inputs<'a, T, HALF> {
         a: &'a PointGraph<T>,
         seeds: &'a LaneSeeds<T>,
         step: Step<T>,
-        z: &'a [Row<T, HALF>],
+        z: &'a Values<T, HALF>,
     ) -> Self {
-        assert_eq!(a.len(), z.len(), "a row of values for each point");
-        let mut background_lanes = [[T::default(); HALF]; 2];
-        background_lanes[0][BACKGROUND_LANE] = T::from_f64(1.0);
+        assert!(
+            z.0.iter().all(|half| half.len() == a.len()),
+            "values for each point"
+        );
+        let mut background_lanes = [T::default(); HALF];
+        background_lanes[BACKGROUND_LANE] = T::from_f64(1.0);
         Self {
             a,
             seeds,
@@ -65,7 +69,7 @@ impl<'a, T: Real, const HALF: usize> Inputs<'a, T, HALF> {
 pub(crate) struct Task<'a, T, const HALF: usize> {
     /// Number of the first block.
     first: usize,
-    next: &'a mut [Row<T, HALF>],
+    next: [&'a mut [Half<T, HALF>]; 2],
     /// Halves of each block that may become anything but zeros.
     active: &'a [u8],
     /// Halves of each block that are.
@@ -103,136 +107,84 @@ fn step_f64(inputs: &Inputs<f64, HALF_F64>, task: Task<f64, HALF_F64>) {
 
 #[inline(always)]
 fn step_all<T: Real, const HALF: usize>(inputs: &Inputs<T, HALF>, task: Task<T, HALF>) {
+    let [first, second] = task.next;
+    let rows = first.chunks_mut(BLOCK).zip(second.chunks_mut(BLOCK));
     let states = task.active.iter().zip(task.filled);
-    for (block, (rows, (&active, filled))) in task.next.chunks_mut(BLOCK).zip(states).enumerate() {
-        let start = (task.first + block) * BLOCK;
-        match active {
-            0 => continue,
-            1 => step_rows::<T, HALF, true, false>(inputs, start, rows),
-            2 => step_rows::<T, HALF, false, true>(inputs, start, rows),
-            _ => step_rows::<T, HALF, true, true>(inputs, start, rows),
+    for (block, ((first, second), (&active, filled))) in rows.zip(states).enumerate() {
+        if active == 0 {
+            continue;
         }
-        for &(i, lane, weight) in inputs.seeds.of_rows(start..start + rows.len()) {
-            rows[i as usize - start].lanes_mut()[lane as usize] += inputs.step.seeds * weight;
+        let start = (task.first + block) * BLOCK;
+        let range = start..start + first.len();
+        if active & 1 != 0 {
+            step_rows::<T, HALF, 0>(inputs, range.clone(), first);
+        }
+        if active & 2 != 0 {
+            step_rows::<T, HALF, 1>(inputs, range.clone(), second);
+        }
+        for &(i, lane, weight) in inputs.seeds.of_rows(range) {
+            let rows = if (lane as usize) < HALF {
+                &mut *first
+            } else {
+                &mut *second
+            };
+            rows[i as usize - start].0[lane as usize % HALF] += inputs.step.seeds * weight;
         }
         if active & !*filled != 0 {
-            *filled |= halves_in_use(rows);
+            *filled |= u8::from(in_use(first)) | u8::from(in_use(second)) << 1;
         }
     }
 }
 
-fn halves_in_use<T: Real, const HALF: usize>(rows: &[Row<T, HALF>]) -> u8 {
-    let used = |half: usize| rows.iter().any(|row| row.0[half] != [T::default(); HALF]);
-    u8::from(used(0)) | u8::from(used(1)) << 1
+fn in_use<T: Real, const HALF: usize>(rows: &[Half<T, HALF>]) -> bool {
+    rows.iter().any(|row| row.0 != [T::default(); HALF])
 }
 
-/// Computes `FIRST` and `SECOND` halves of `rows`, which begin with row `start`.
+/// Computes one half of the rows of `range`.
 #[inline(always)]
-fn step_rows<T: Real, const HALF: usize, const FIRST: bool, const SECOND: bool>(
+fn step_rows<T: Real, const HALF: usize, const WHICH: usize>(
     inputs: &Inputs<T, HALF>,
-    start: usize,
-    rows: &mut [Row<T, HALF>],
+    range: Range<usize>,
+    rows: &mut [Half<T, HALF>],
 ) {
-    let range = start..start + rows.len();
+    let z = &inputs.z.0[WHICH];
     let background = &inputs.seeds.background[range.clone()];
-    let points = rows
-        .iter_mut()
-        .zip(&inputs.z[range.clone()])
-        .zip(background);
+    let points = rows.iter_mut().zip(&z[range.clone()]).zip(background);
     if inputs.a.degree() == Some(PAPER_DEGREE) {
         // with a number of edges known beforehand there is no loop over them, and less to check
         let (columns, weights) = inputs.a.slices(range);
         let columns = columns.as_chunks::<PAPER_DEGREE>().0;
         let edges = columns.iter().zip(weights.as_chunks::<PAPER_DEGREE>().0);
-        for (((row, z), &background), (columns, weights)) in points.zip(edges) {
-            step_row::<T, HALF, FIRST, SECOND>(inputs, columns, weights, z, background, row);
+        for (((row, own), &background), (columns, weights)) in points.zip(edges) {
+            let sum = weighted_sum(z, columns, weights);
+            row.0 = finish::<T, HALF, WHICH>(inputs, &sum, &own.0, &row.0, background);
         }
     } else {
-        for (i, ((row, z), &background)) in range.zip(points) {
+        for (i, ((row, own), &background)) in range.zip(points) {
             let (columns, weights) = inputs.a.slices(i..i + 1);
-            step_row::<T, HALF, FIRST, SECOND>(inputs, columns, weights, z, background, row);
+            let sum = weighted_sum(z, columns, weights);
+            row.0 = finish::<T, HALF, WHICH>(inputs, &sum, &own.0, &row.0, background);
         }
     }
 }
 
-#[inline(always)]
-fn step_row<T: Real, const HALF: usize, const FIRST: bool, const SECOND: bool>(
-    inputs: &Inputs<T, HALF>,
-    columns: &[u32],
-    weights: &[T],
-    z: &Row<T, HALF>,
-    background: T,
-    row: &mut Row<T, HALF>,
-) {
-    if FIRST && SECOND {
-        let [first, second] = weighted_sums(inputs.z, columns, weights);
-        row.0[0] = finish(
-            inputs,
-            &first,
-            &z.0[0],
-            &row.0[0],
-            background,
-            &inputs.background_lanes[0],
-        );
-        row.0[1] = finish(
-            inputs,
-            &second,
-            &z.0[1],
-            &row.0[1],
-            background,
-            &inputs.background_lanes[1],
-        );
-    } else {
-        let half = usize::from(SECOND);
-        let sum = weighted_sum(inputs.z, columns, weights, half);
-        let lanes = &inputs.background_lanes[half];
-        row.0[half] = finish(inputs, &sum, &z.0[half], &row.0[half], background, lanes);
-    }
-}
-
-/// Weighted sums of both halves of the rows of `z` that `columns` name.
-#[inline(always)]
-#[expect(
-    unsafe_code,
-    reason = "the check of every column takes a sixth of the time of a sweep"
-)]
-fn weighted_sums<T: Real, const HALF: usize>(
-    z: &[Row<T, HALF>],
-    columns: &[u32],
-    weights: &[T],
-) -> [[T; HALF]; 2] {
-    // one row, one thread: sums keep their order, so results do too
-    let mut sums = [[T::default(); HALF]; 2];
-    for (&column, &weight) in columns.iter().zip(weights) {
-        // SAFETY: a `PointGraph` has no column beyond its last row, and `Inputs::new` sees to as many in `z`
-        let values = unsafe { z.get_unchecked(column as usize) };
-        for half in 0..2 {
-            for lane in 0..HALF {
-                sums[half][lane] += weight * values.0[half][lane];
-            }
-        }
-    }
-    sums
-}
-
-/// Weighted sum of one half of the rows of `z` that `columns` name.
+/// Weighted sum of the rows of `z` that `columns` name.
 #[inline(always)]
 #[expect(
     unsafe_code,
     reason = "the check of every column takes a sixth of the time of a sweep"
 )]
 fn weighted_sum<T: Real, const HALF: usize>(
-    z: &[Row<T, HALF>],
+    z: &[Half<T, HALF>],
     columns: &[u32],
     weights: &[T],
-    half: usize,
 ) -> [T; HALF] {
     // one row, one thread: sums keep their order, so results do too
     let mut sum = [T::default(); HALF];
     for (&column, &weight) in columns.iter().zip(weights) {
         // SAFETY: a `PointGraph` has no column beyond its last row, and `Inputs::new` sees to as many in `z`
         let values = unsafe { z.get_unchecked(column as usize) };
-        for (sum, value) in sum.iter_mut().zip(&values.0[half]) {
+        for (sum, value) in sum.iter_mut().zip(&values.0) {
             *sum += weight * *value;
         }
     }
@@ -241,13 +193,12 @@ fn weighted_sum<T: Real, const HALF: usize>(
 
 /// The values of a half after the step; those too small to matter become zero.
 #[inline(always)]
-fn finish<T: Real, const HALF: usize>(
+fn finish<T: Real, const HALF: usize, const WHICH: usize>(
     inputs: &Inputs<T, HALF>,
     sum: &[T; HALF],
     z: &[T; HALF],
     before: &[T; HALF],
     background: T,
-    background_lanes: &[T; HALF],
 ) -> [T; HALF] {
     let Step {
         seeds,
@@ -255,12 +206,13 @@ fn finish<T: Real, const HALF: usize>(
         stay,
         back,
     } = inputs.step;
-    let background = seeds * background;
-    let least = inputs.seeds.least;
+    let (background, least) = (seeds * background, inputs.seeds.least);
     let mut next = [T::default(); HALF];
     for lane in 0..HALF {
-        let seed = background * background_lanes[lane];
-        let value = seed + along * sum[lane] - stay * z[lane] - back * before[lane];
+        let mut value = along * sum[lane] - stay * z[lane] - back * before[lane];
+        if WHICH == BACKGROUND_LANE / HALF {
+            value += background * inputs.background_lanes[lane];
+        }
         let counts = value > least || value < T::default() - least;
         next[lane] = if counts { value } else { T::default() };
     }
@@ -332,9 +284,9 @@ pub(crate) struct State<'a, T, const HALF: usize> {
     seeds: &'a LaneSeeds<T>,
     blocks: &'a Blocks,
     /// Values after the last step.
-    pub(crate) z: Vec<Row<T, HALF>>,
+    pub(crate) z: Values<T, HALF>,
     /// Values before it, which the next step overwrites.
-    pub(crate) previous: Vec<Row<T, HALF>>,
+    pub(crate) previous: Values<T, HALF>,
     /// Halves of each block that may hold anything but zeros: bit 0 for the first, bit 1 for the second.
     active: Vec<u8>,
     /// Halves of each block that do.
@@ -351,20 +303,19 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
         blocks: &'a Blocks,
         scale: T,
     ) -> Self {
-        let mut z = vec![Row::zero(); a.len()];
-        z.par_iter_mut()
-            .enumerate()
-            .with_min_len(BLOCK * BLOCKS_A_TASK)
-            .for_each(|(i, row)| {
-                for &(_, lane, weight) in seeds.of_rows(i..i + 1) {
-                    row.lanes_mut()[lane as usize] = scale * weight;
-                }
-                row.0[0][BACKGROUND_LANE] += scale * seeds.background[i];
-                if let Some((lane, seeds)) = &seeds.probe {
-                    row.lanes_mut()[*lane] = seeds[i];
-                }
-            });
-        let previous = vec![Row::zero(); a.len()];
+        let (mut z, previous) = (Values::zero(a.len()), Values::zero(a.len()));
+        for &(i, lane, weight) in seeds.of_rows(0..a.len()) {
+            *z.get_mut(i as usize, lane as usize) = scale * weight;
+        }
+        for (row, &weight) in z.0[0].iter_mut().zip(&seeds.background) {
+            row.0[BACKGROUND_LANE] += scale * weight;
+        }
+        if let Some((lane, seeds)) = &seeds.probe {
+            seeds
+                .iter()
+                .enumerate()
+                .for_each(|(i, &seed)| *z.get_mut(i, *lane) = seed);
+        }
         let active = seeds.halves(BLOCK, HALF);
         let (filled, passed_on) = (active.clone(), vec![0; blocks.len()]);
         let mut state = Self {
@@ -389,19 +340,22 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
     /// Applies `step`; what was z becomes the previous values.
     pub(crate) fn step(&mut self, step: Step<T>) {
         let inputs = Inputs::new(self.a, self.seeds, step, &self.z);
-        let next = self.previous.par_chunks_mut(BLOCK * BLOCKS_A_TASK);
+        let [first, second] = &mut self.previous.0;
+        let rows = BLOCK * BLOCKS_A_TASK;
+        let next = first.par_chunks_mut(rows).zip(second.par_chunks_mut(rows));
         let states = self
             .active
             .par_chunks(BLOCKS_A_TASK)
             .zip(self.filled.par_chunks_mut(BLOCKS_A_TASK));
         next.zip(states)
             .enumerate()
-            .for_each(|(task, (next, (active, filled)))| {
+            .for_each(|(task, ((first, second), (active, filled)))| {
+                let first_block = task * BLOCKS_A_TASK;
                 T::step_blocks(
                     &inputs,
                     Task {
-                        first: task * BLOCKS_A_TASK,
-                        next,
+                        first: first_block,
+                        next: [first, second],
                         active,
                         filled,
                     },
