@@ -7,7 +7,7 @@
 
 use crate::chebyshev::{Interval, Series, Tolerance};
 use crate::lanes::{Lane, LaneSeeds, Values, plan};
-use crate::sweeps::{Blocks, HALF_F32, HALF_F64, State, Step, Sweep};
+use crate::sweeps::{Blocks, State, Step, Sweep, WIDTH_F32, WIDTH_F64};
 use crate::{Error, PixelLabels, PointGraph, Real, Result};
 use rayon::prelude::*;
 
@@ -100,7 +100,7 @@ pub fn diffuse(
     check(a, b, n_labels)?;
     let mut best = vec![Best::default(); a.len()];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let mut convergence = for_each_pass::<f32, HALF_F32>(a, b, &labels, iterations, |lanes, z| {
+    let mut convergence = for_each_pass::<f32, WIDTH_F32>(a, b, &labels, iterations, |lanes, z| {
         update(&mut best, lanes, z);
     });
     let contested = Contested::among(&best, convergence.error);
@@ -108,7 +108,7 @@ pub fn diffuse(
         let (a, b) = exact()?;
         let labels = contested.labels(&best, n_labels);
         let mut refined = vec![(0, f64::NEG_INFINITY); contested.points.len()];
-        for_each_pass::<f64, HALF_F64>(&a, &b, &labels, iterations, |lanes, z| {
+        for_each_pass::<f64, WIDTH_F64>(&a, &b, &labels, iterations, |lanes, z| {
             contested.refine(&mut refined, lanes, z);
         });
         for (&point, &(label, _)) in contested.points.iter().zip(&refined) {
@@ -136,7 +136,7 @@ pub fn likelihoods(
     check(a, b, n_labels)?;
     let mut all = vec![0.0; a.len() * n_labels];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let convergence = for_each_pass::<f32, HALF_F32>(a, b, &labels, iterations, |lanes, z| {
+    let convergence = for_each_pass::<f32, WIDTH_F32>(a, b, &labels, iterations, |lanes, z| {
         for (i, row) in all.chunks_mut(n_labels).enumerate() {
             for (label, lane) in labels_of(lanes) {
                 row[label as usize] = z.get(i, lane);
@@ -163,14 +163,14 @@ fn check(a: &PointGraph, b: &PixelLabels, n_labels: usize) -> Result<()> {
 }
 
 /// Calls `done` with the lanes of each pass and their values at all points.
-fn for_each_pass<T: Sweep<HALF>, const HALF: usize>(
+fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     b: &PixelLabels<T>,
     labels: &[u32],
     iterations: Option<usize>,
-    mut done: impl FnMut(&[Lane], &Values<T, HALF>),
+    mut done: impl FnMut(&[Lane], &Values<T, WIDTH>),
 ) -> Convergence {
-    let tolerance = if HALF == HALF_F64 {
+    let tolerance = if WIDTH == WIDTH_F64 {
         TOLERANCE_F64
     } else {
         TOLERANCE_F32
@@ -178,8 +178,8 @@ fn for_each_pass<T: Sweep<HALF>, const HALF: usize>(
     let mut scheme = Scheme::choose(a, iterations, tolerance);
     let blocks = Blocks::new(a);
     let mut convergence = Convergence::default();
-    let probe = HALF == HALF_F32;
-    for lanes in plan(b, labels, 2 * HALF, probe) {
+    let probe = WIDTH == WIDTH_F32;
+    for lanes in plan(b, labels, WIDTH, probe) {
         let seeds = LaneSeeds::new(b, &lanes);
         let mut pass = scheme.run(a, &seeds, &blocks);
         if !matches!(scheme, Scheme::Products(_)) && !pass.is_sound(&lanes, largest_overlap(b)) {
@@ -193,8 +193,8 @@ fn for_each_pass<T: Sweep<HALF>, const HALF: usize>(
 }
 
 /// What one pass came to.
-struct Pass<T, const HALF: usize> {
-    z: Values<T, HALF>,
+struct Pass<T, const WIDTH: usize> {
+    z: Values<T, WIDTH>,
     sweeps: usize,
     residual: Option<f64>,
     /// What the terms left out may amount to.
@@ -222,12 +222,12 @@ impl Scheme {
         }
     }
 
-    fn run<T: Sweep<HALF>, const HALF: usize>(
+    fn run<T: Sweep<WIDTH>, const WIDTH: usize>(
         &self,
         a: &PointGraph<T>,
         seeds: &LaneSeeds<T>,
         blocks: &Blocks,
-    ) -> Pass<T, HALF> {
+    ) -> Pass<T, WIDTH> {
         match self {
             Self::Products(products) => run_products(a, seeds, blocks, *products),
             Self::UntilConverged => run_until_converged(a, seeds, blocks),
@@ -250,12 +250,12 @@ fn step<T: Real>((seeds, along, stay, back): (f64, f64, f64, f64)) -> Step<T> {
     }
 }
 
-fn run_products<T: Sweep<HALF>, const HALF: usize>(
+fn run_products<T: Sweep<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &LaneSeeds<T>,
     blocks: &Blocks,
     products: usize,
-) -> Pass<T, HALF> {
+) -> Pass<T, WIDTH> {
     // from z = 0 the first product yields b
     let mut state = State::new(a, seeds, blocks, T::from_f64(1.0));
     for _ in 1..products {
@@ -269,11 +269,11 @@ fn run_products<T: Sweep<HALF>, const HALF: usize>(
     }
 }
 
-fn run_until_converged<T: Sweep<HALF>, const HALF: usize>(
+fn run_until_converged<T: Sweep<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &LaneSeeds<T>,
     blocks: &Blocks,
-) -> Pass<T, HALF> {
+) -> Pass<T, WIDTH> {
     let mut state = State::new(a, seeds, blocks, T::from_f64(1.0));
     let mut sweeps = 1;
     while largest_change(&state) > CONVERGED && sweeps < MOST_SWEEPS {
@@ -284,13 +284,13 @@ fn run_until_converged<T: Sweep<HALF>, const HALF: usize>(
 }
 
 /// Clenshaw's recurrence: `y_k = c_k b + 2 X y_(k+1) - y_(k+2)`, `X = (A - middle) / half width`.
-fn run_series<T: Sweep<HALF>, const HALF: usize>(
+fn run_series<T: Sweep<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &LaneSeeds<T>,
     blocks: &Blocks,
     series: &Series,
     until_converged: bool,
-) -> Pass<T, HALF> {
+) -> Pass<T, WIDTH> {
     let (middle, half_width) = (series.interval.middle(), series.interval.half_width());
     let degree = series.degree();
     let mut state = State::new(a, seeds, blocks, T::from_f64(series.coefficients[degree]));
@@ -313,11 +313,11 @@ fn run_series<T: Sweep<HALF>, const HALF: usize>(
 }
 
 /// One more product, for the residual; the values are those before it.
-fn last_product<T: Sweep<HALF>, const HALF: usize>(
-    mut state: State<T, HALF>,
+fn last_product<T: Sweep<WIDTH>, const WIDTH: usize>(
+    mut state: State<T, WIDTH>,
     sweeps: usize,
     error: f64,
-) -> Pass<T, HALF> {
+) -> Pass<T, WIDTH> {
     state.step(step(PRODUCT));
     let residual = largest_change(&state);
     Pass {
@@ -360,14 +360,14 @@ fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<Interval> {
     (found.low < found.high).then_some(found)
 }
 
-fn largest_change<T: Sweep<HALF>, const HALF: usize>(state: &State<T, HALF>) -> f64 {
-    let lanes = (0..2 * HALF).filter(|lane| Some(*lane) != state.probe());
+fn largest_change<T: Sweep<WIDTH>, const WIDTH: usize>(state: &State<T, WIDTH>) -> f64 {
+    let lanes = (0..state.z.lanes()).filter(|lane| Some(*lane) != state.probe());
     let change_at = |lane, i| {
         (state.z.get(i, lane) - state.previous.get(i, lane))
             .to_f64()
             .abs()
     };
-    let points = (0..state.z.len()).into_par_iter().with_min_len(BLOCK);
+    let points = (0..state.points()).into_par_iter().with_min_len(BLOCK);
     lanes
         .map(|lane| {
             points
@@ -378,11 +378,11 @@ fn largest_change<T: Sweep<HALF>, const HALF: usize>(state: &State<T, HALF>) -> 
         .fold(0.0, f64::max)
 }
 
-fn largest_probe<T: Sweep<HALF>, const HALF: usize>(state: &State<T, HALF>) -> f64 {
+fn largest_probe<T: Sweep<WIDTH>, const WIDTH: usize>(state: &State<T, WIDTH>) -> f64 {
     let Some(lane) = state.probe() else {
         return 0.0;
     };
-    (0..state.z.len())
+    (0..state.points())
         .map(|i| state.z.get(i, lane).to_f64().abs())
         .fold(0.0, f64::max)
 }
@@ -401,7 +401,7 @@ fn largest_overlap<T: Real>(b: &PixelLabels<T>) -> f64 {
     (0..b.rows()).map(overlap).fold(1.0, f64::max)
 }
 
-impl<T: Real, const HALF: usize> Pass<T, HALF> {
+impl<T: Real, const WIDTH: usize> Pass<T, WIDTH> {
     fn convergence(&self) -> Convergence {
         let Self {
             sweeps,
@@ -429,7 +429,7 @@ impl<T: Real, const HALF: usize> Pass<T, HALF> {
             }) && sum <= overlap + slack
         };
         self.error <= LARGEST_ERROR
-            && (0..self.z.len())
+            && (0..self.z.0[0].len())
                 .into_par_iter()
                 .with_min_len(BLOCK)
                 .all(row_is_sound)
@@ -447,7 +447,7 @@ fn labels_of(lanes: &[Lane]) -> impl Iterator<Item = (u32, usize)> {
         })
 }
 
-fn update<const HALF: usize>(best: &mut [Best], lanes: &[Lane], z: &Values<f32, HALF>) {
+fn update<const WIDTH: usize>(best: &mut [Best], lanes: &[Lane], z: &Values<f32, WIDTH>) {
     let lanes: Vec<(u32, usize)> = labels_of(lanes).collect();
     best.par_iter_mut()
         .enumerate()
@@ -545,11 +545,11 @@ impl Contested {
     }
 
     /// Keeps the best label of each point and its value in `refined`.
-    fn refine<const HALF: usize>(
+    fn refine<const WIDTH: usize>(
         &self,
         refined: &mut [(u32, f64)],
         lanes: &[Lane],
-        z: &Values<f64, HALF>,
+        z: &Values<f64, WIDTH>,
     ) {
         for (&point, best) in self.points.iter().zip(refined) {
             for (label, lane) in labels_of(lanes) {

@@ -3,38 +3,56 @@
 use crate::{PixelLabels, Real};
 use std::ops::Range;
 
-/// Values of half the lanes at one point: 32 bytes.
+/// Values of a group of lanes at one point: 32 bytes.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(32))]
-pub(crate) struct Half<T, const HALF: usize>(pub(crate) [T; HALF]);
+pub(crate) struct Group<T, const WIDTH: usize>(pub(crate) [T; WIDTH]);
 
-/// Values of all lanes at all points, in two halves: where one of them holds nothing but zeros, a sweep leaves it
-/// out and does not touch its memory.
+/// Values of all lanes at all points, group by group: where one holds nothing but zeros, a sweep leaves it out and
+/// does not touch its memory.
 #[derive(Debug, Clone)]
-pub(crate) struct Values<T, const HALF: usize>(pub(crate) [Vec<Half<T, HALF>>; 2]);
+pub(crate) struct Values<T, const WIDTH: usize>(pub(crate) Vec<Vec<Group<T, WIDTH>>>);
 
-impl<T: Real, const HALF: usize> Values<T, HALF> {
+/// Most groups of a pass: one bit each says which of them are in use.
+const MOST_GROUPS: usize = 8;
+/// The same for clouds so large that every group counts: it takes 64 bytes a point.
+const MOST_GROUPS_OF_MANY: usize = 3;
+const MANY_POINTS: usize = 1 << 20;
+
+/// Groups of lanes that a pass over `points` points may have.
+pub(crate) fn most_groups(points: usize) -> usize {
+    if points < MANY_POINTS {
+        MOST_GROUPS
+    } else {
+        MOST_GROUPS_OF_MANY
+    }
+}
+
+impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
     /// Zeros at `points` points.
-    pub(crate) fn zero(points: usize) -> Self {
-        let half = || vec![Half([T::default(); HALF]); points];
-        Self([half(), half()])
+    pub(crate) fn zero(points: usize, groups: usize) -> Self {
+        Self(
+            (0..groups)
+                .map(|_| vec![Group([T::default(); WIDTH]); points])
+                .collect(),
+        )
     }
 
     /// The value of `lane` at point `i`.
     #[inline(always)]
     pub(crate) fn get(&self, i: usize, lane: usize) -> T {
-        self.0[lane / HALF][i].0[lane % HALF]
+        self.0[lane / WIDTH][i].0[lane % WIDTH]
     }
 
     /// The place of the value of `lane` at point `i`.
     #[inline(always)]
     pub(crate) fn get_mut(&mut self, i: usize, lane: usize) -> &mut T {
-        &mut self.0[lane / HALF][i].0[lane % HALF]
+        &mut self.0[lane / WIDTH][i].0[lane % WIDTH]
     }
 
-    /// Number of points.
-    pub(crate) fn len(&self) -> usize {
-        self.0[0].len()
+    /// Number of lanes.
+    pub(crate) fn lanes(&self) -> usize {
+        self.0.len() * WIDTH
     }
 }
 
@@ -50,13 +68,13 @@ pub(crate) enum Lane {
 
 /// The lanes of each pass over the graph.
 ///
-/// Labels without a seed need no lane. The first half of the first pass, which the background keeps busy
-/// everywhere, takes the labels with the most seeds; the others follow in the order of where they lie, so
-/// that the labels of a half are neighbours and the half is zero over most of the cloud.
+/// Labels without a seed need no lane. The first group, which the background keeps busy everywhere, takes the labels
+/// with the most seeds; the others follow in the order of where they lie, so that the labels of a group are neighbours
+/// and the group is zero over most of the cloud.
 pub(crate) fn plan<T: Real>(
     b: &PixelLabels<T>,
     labels: &[u32],
-    lanes: usize,
+    width: usize,
     probe: bool,
 ) -> Vec<Vec<Lane>> {
     let seeds = seeds_of(b, labels);
@@ -71,12 +89,15 @@ pub(crate) fn plan<T: Real>(
         .map(|_| Lane::Label(0));
     let mut order: Vec<Lane> = background.chain(probe.then_some(Lane::Probe)).collect();
     if !order.is_empty() {
-        let first = (lanes / 2 - order.len()).min(rest.len());
+        let first = (width - order.len()).min(rest.len());
         order.extend(rest.drain(..first).map(|seeds| Lane::Label(seeds.label)));
     }
     rest.sort_by_key(|seeds| (seeds.row_sum / seeds.count, seeds.label));
     order.extend(rest.iter().map(|seeds| Lane::Label(seeds.label)));
-    order.chunks(lanes).map(<[Lane]>::to_vec).collect()
+    order
+        .chunks(width * most_groups(b.rows()))
+        .map(<[Lane]>::to_vec)
+        .collect()
 }
 
 /// Seeds of one label.
@@ -113,6 +134,8 @@ pub(crate) struct LaneSeeds<T> {
     /// Seeds of the background, which nearly every row has; zeros where it is in another pass.
     pub(crate) background: Vec<T>,
     offsets: Vec<u32>,
+    /// Number of lanes.
+    pub(crate) lanes: usize,
     /// Row, lane and weight of each seed.
     entries: Vec<(u32, u32, T)>,
     /// Values up to this magnitude are too small to matter.
@@ -133,6 +156,7 @@ impl<T: Real> LaneSeeds<T> {
         let probe = pass.iter().position(|lane| *lane == Lane::Probe);
         let mut seeds = Self {
             background: vec![T::default(); b.rows()],
+            lanes: pass.len(),
             least: T::from_f64(T::NEGLIGIBLE * largest_weight(b)),
             offsets: Vec::with_capacity(b.rows() + 1),
             entries: Vec::new(),
@@ -152,20 +176,20 @@ impl<T: Real> LaneSeeds<T> {
         seeds
     }
 
-    /// For each block of `block` rows, bit 0 where the first half of its lanes has seeds, bit 1 for the second.
-    pub(crate) fn halves(&self, block: usize, half: usize) -> Vec<u8> {
+    /// For each block of `block` rows, bit g where lanes of group g have seeds.
+    pub(crate) fn groups(&self, block: usize, width: usize) -> Vec<u8> {
         let rows = self.offsets.len() - 1;
         let probed = self.probe.as_ref();
-        let probed = probed.map_or(0, |(lane, _)| 1 << (lane / half));
+        let probed = probed.map_or(0, |(lane, _)| 1 << (lane / width));
         let full = self.background.iter().any(|&weight| weight > T::default());
-        let everywhere = probed | u8::from(full) << (BACKGROUND_LANE / half);
+        let everywhere = probed | u8::from(full) << (BACKGROUND_LANE / width);
         let of_block = |first: usize| {
             let entries =
                 self.offsets[first] as usize..self.offsets[rows.min(first + block)] as usize;
             self.entries[entries]
                 .iter()
                 .fold(everywhere, |bits, (_, lane, _)| {
-                    bits | 1 << (*lane as usize / half)
+                    bits | 1 << (*lane as usize / width)
                 })
         };
         (0..rows).step_by(block).map(of_block).collect()

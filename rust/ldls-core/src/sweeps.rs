@@ -1,9 +1,9 @@
 //! Sweeps over the graph: the only place where time is spent in number crunching.
 //!
 //! A sweep works on blocks of consecutive rows. Values spread from the seeds by one edge a sweep, so at first
-//! most halves of most blocks are zero; those are left out, at no loss.
+//! most groups of lanes of most blocks are zero; those are left out, at no loss.
 
-use crate::lanes::{BACKGROUND_LANE, Half, LaneSeeds, Values};
+use crate::lanes::{BACKGROUND_LANE, Group, LaneSeeds, Values};
 use crate::{PointGraph, Real};
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -17,10 +17,10 @@ const BLOCKS_A_TASK: usize = 32;
 /// Edges of a point with the paper's parameters: 10 neighbours and itself.
 const PAPER_DEGREE: usize = 11;
 
-/// Number of floats that make half a cache line.
-pub(crate) const HALF_F32: usize = 8;
-/// The same of doubles.
-pub(crate) const HALF_F64: usize = 4;
+/// Lanes of a group in single precision.
+pub(crate) const WIDTH_F32: usize = 8;
+/// The same in double precision.
+pub(crate) const WIDTH_F64: usize = 4;
 
 /// One step next <- seeds * s + along * A z - stay * z - back * next.
 #[derive(Debug, Clone, Copy)]
@@ -32,28 +32,28 @@ pub(crate) struct Step<T> {
 }
 
 /// What the rows of a step are computed from.
-pub(crate) struct Inputs<'a, T, const HALF: usize> {
+pub(crate) struct Inputs<'a, T, const WIDTH: usize> {
     a: &'a PointGraph<T>,
     seeds: &'a LaneSeeds<T>,
     step: Step<T>,
-    z: &'a Values<T, HALF>,
+    z: &'a Values<T, WIDTH>,
     /// One where the background lies, zero elsewhere: its seeds are added to all lanes at once, since a single
     /// lane would have to wait for the row to reach memory.
-    background_lanes: [T; HALF],
+    background_lanes: [T; WIDTH],
 }
 
-impl<'a, T: Real, const HALF: usize> Inputs<'a, T, HALF> {
+impl<'a, T: Real, const WIDTH: usize> Inputs<'a, T, WIDTH> {
     fn new(
         a: &'a PointGraph<T>,
         seeds: &'a LaneSeeds<T>,
         step: Step<T>,
-        z: &'a Values<T, HALF>,
+        z: &'a Values<T, WIDTH>,
     ) -> Self {
         assert!(
-            z.0.iter().all(|half| half.len() == a.len()),
+            z.0.iter().all(|group| group.len() == a.len()),
             "values for each point"
         );
-        let mut background_lanes = [T::default(); HALF];
+        let mut background_lanes = [T::default(); WIDTH];
         background_lanes[BACKGROUND_LANE] = T::from_f64(1.0);
         Self {
             a,
@@ -66,88 +66,91 @@ impl<'a, T: Real, const HALF: usize> Inputs<'a, T, HALF> {
 }
 
 /// Consecutive blocks of rows that a step computes.
-pub(crate) struct Task<'a, T, const HALF: usize> {
+pub(crate) struct Task<'a, T, const WIDTH: usize> {
     /// Number of the first block.
     first: usize,
-    next: [&'a mut [Half<T, HALF>]; 2],
-    /// Halves of each block that may become anything but zeros.
+    /// Their rows, group by group.
+    next: Vec<&'a mut [Group<T, WIDTH>]>,
+    /// Groups of each block that may become anything but zeros: bit g for group g.
     active: &'a [u8],
-    /// Halves of each block that are.
+    /// Groups of each block that are.
     filled: &'a mut [u8],
 }
 
 /// A precision for which sweeps are compiled.
-pub(crate) trait Sweep<const HALF: usize>: Real {
-    /// Computes the active halves of the blocks of `task`.
-    fn step_blocks(inputs: &Inputs<Self, HALF>, task: Task<Self, HALF>);
+pub(crate) trait Sweep<const WIDTH: usize>: Real {
+    /// Computes the active groups of the blocks of `task`.
+    fn step_blocks(inputs: &Inputs<Self, WIDTH>, task: Task<Self, WIDTH>);
 }
 
-impl Sweep<HALF_F32> for f32 {
-    fn step_blocks(inputs: &Inputs<f32, HALF_F32>, task: Task<f32, HALF_F32>) {
+impl Sweep<WIDTH_F32> for f32 {
+    fn step_blocks(inputs: &Inputs<f32, WIDTH_F32>, task: Task<f32, WIDTH_F32>) {
         step_f32(inputs, task);
     }
 }
 
-impl Sweep<HALF_F64> for f64 {
-    fn step_blocks(inputs: &Inputs<f64, HALF_F64>, task: Task<f64, HALF_F64>) {
+impl Sweep<WIDTH_F64> for f64 {
+    fn step_blocks(inputs: &Inputs<f64, WIDTH_F64>, task: Task<f64, WIDTH_F64>) {
         step_f64(inputs, task);
     }
 }
 
 // without fused multiply-add, which is not faster here, results are the same bits on every processor
 #[multiversion(targets("x86_64+avx2"))]
-fn step_f32(inputs: &Inputs<f32, HALF_F32>, task: Task<f32, HALF_F32>) {
+fn step_f32(inputs: &Inputs<f32, WIDTH_F32>, task: Task<f32, WIDTH_F32>) {
     step_all(inputs, task);
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn step_f64(inputs: &Inputs<f64, HALF_F64>, task: Task<f64, HALF_F64>) {
+fn step_f64(inputs: &Inputs<f64, WIDTH_F64>, task: Task<f64, WIDTH_F64>) {
     step_all(inputs, task);
 }
 
 #[inline(always)]
-fn step_all<T: Real, const HALF: usize>(inputs: &Inputs<T, HALF>, task: Task<T, HALF>) {
-    let [first, second] = task.next;
-    let rows = first.chunks_mut(BLOCK).zip(second.chunks_mut(BLOCK));
-    let states = task.active.iter().zip(task.filled);
-    for (block, ((first, second), (&active, filled))) in rows.zip(states).enumerate() {
-        if active == 0 {
-            continue;
-        }
-        let start = (task.first + block) * BLOCK;
-        let range = start..start + first.len();
-        if active & 1 != 0 {
-            step_rows::<T, HALF, 0>(inputs, range.clone(), first);
-        }
-        if active & 2 != 0 {
-            step_rows::<T, HALF, 1>(inputs, range.clone(), second);
+fn step_all<T: Real, const WIDTH: usize>(inputs: &Inputs<T, WIDTH>, task: Task<T, WIDTH>) {
+    let Task {
+        first,
+        mut next,
+        active,
+        filled,
+    } = task;
+    for (block, (&active, filled)) in active.iter().zip(filled).enumerate() {
+        let start = (first + block) * BLOCK;
+        let rows = block * BLOCK..next[0].len().min((block + 1) * BLOCK);
+        let range = start..start + rows.len();
+        for group in (0..next.len()).filter(|group| active >> group & 1 == 1) {
+            let rows = &mut next[group][rows.clone()];
+            if group == BACKGROUND_LANE / WIDTH {
+                step_rows::<T, WIDTH, true>(inputs, group, range.clone(), rows);
+            } else {
+                step_rows::<T, WIDTH, false>(inputs, group, range.clone(), rows);
+            }
         }
         for &(i, lane, weight) in inputs.seeds.of_rows(range) {
-            let rows = if (lane as usize) < HALF {
-                &mut *first
-            } else {
-                &mut *second
-            };
-            rows[i as usize - start].0[lane as usize % HALF] += inputs.step.seeds * weight;
+            let (group, lane) = (lane as usize / WIDTH, lane as usize % WIDTH);
+            next[group][rows.start + i as usize - start].0[lane] += inputs.step.seeds * weight;
         }
         if active & !*filled != 0 {
-            *filled |= u8::from(in_use(first)) | u8::from(in_use(second)) << 1;
+            for (group, values) in next.iter().enumerate() {
+                *filled |= u8::from(in_use(&values[rows.clone()])) << group;
+            }
         }
     }
 }
 
-fn in_use<T: Real, const HALF: usize>(rows: &[Half<T, HALF>]) -> bool {
-    rows.iter().any(|row| row.0 != [T::default(); HALF])
+fn in_use<T: Real, const WIDTH: usize>(rows: &[Group<T, WIDTH>]) -> bool {
+    rows.iter().any(|row| row.0 != [T::default(); WIDTH])
 }
 
-/// Computes one half of the rows of `range`.
+/// Computes one group of the rows of `range`.
 #[inline(always)]
-fn step_rows<T: Real, const HALF: usize, const WHICH: usize>(
-    inputs: &Inputs<T, HALF>,
+fn step_rows<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
+    inputs: &Inputs<T, WIDTH>,
+    group: usize,
     range: Range<usize>,
-    rows: &mut [Half<T, HALF>],
+    rows: &mut [Group<T, WIDTH>],
 ) {
-    let z = &inputs.z.0[WHICH];
+    let z = &inputs.z.0[group];
     let background = &inputs.seeds.background[range.clone()];
     let points = rows.iter_mut().zip(&z[range.clone()]).zip(background);
     if inputs.a.degree() == Some(PAPER_DEGREE) {
@@ -157,13 +160,13 @@ fn step_rows<T: Real, const HALF: usize, const WHICH: usize>(
         let edges = columns.iter().zip(weights.as_chunks::<PAPER_DEGREE>().0);
         for (((row, own), &background), (columns, weights)) in points.zip(edges) {
             let sum = weighted_sum(z, columns, weights);
-            row.0 = finish::<T, HALF, WHICH>(inputs, &sum, &own.0, &row.0, background);
+            row.0 = finish::<T, WIDTH, BACKGROUND>(inputs, &sum, &own.0, &row.0, background);
         }
     } else {
         for (i, ((row, own), &background)) in range.zip(points) {
             let (columns, weights) = inputs.a.slices(i..i + 1);
             let sum = weighted_sum(z, columns, weights);
-            row.0 = finish::<T, HALF, WHICH>(inputs, &sum, &own.0, &row.0, background);
+            row.0 = finish::<T, WIDTH, BACKGROUND>(inputs, &sum, &own.0, &row.0, background);
         }
     }
 }
@@ -174,13 +177,13 @@ fn step_rows<T: Real, const HALF: usize, const WHICH: usize>(
     unsafe_code,
     reason = "the check of every column takes a sixth of the time of a sweep"
 )]
-fn weighted_sum<T: Real, const HALF: usize>(
-    z: &[Half<T, HALF>],
+fn weighted_sum<T: Real, const WIDTH: usize>(
+    z: &[Group<T, WIDTH>],
     columns: &[u32],
     weights: &[T],
-) -> [T; HALF] {
+) -> [T; WIDTH] {
     // one row, one thread: sums keep their order, so results do too
-    let mut sum = [T::default(); HALF];
+    let mut sum = [T::default(); WIDTH];
     for (&column, &weight) in columns.iter().zip(weights) {
         // SAFETY: a `PointGraph` has no column beyond its last row, and `Inputs::new` sees to as many in `z`
         let values = unsafe { z.get_unchecked(column as usize) };
@@ -191,15 +194,15 @@ fn weighted_sum<T: Real, const HALF: usize>(
     sum
 }
 
-/// The values of a half after the step; those too small to matter become zero.
+/// The values of a group after the step; those too small to matter become zero.
 #[inline(always)]
-fn finish<T: Real, const HALF: usize, const WHICH: usize>(
-    inputs: &Inputs<T, HALF>,
-    sum: &[T; HALF],
-    z: &[T; HALF],
-    before: &[T; HALF],
+fn finish<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
+    inputs: &Inputs<T, WIDTH>,
+    sum: &[T; WIDTH],
+    z: &[T; WIDTH],
+    before: &[T; WIDTH],
     background: T,
-) -> [T; HALF] {
+) -> [T; WIDTH] {
     let Step {
         seeds,
         along,
@@ -207,10 +210,10 @@ fn finish<T: Real, const HALF: usize, const WHICH: usize>(
         back,
     } = inputs.step;
     let (background, least) = (seeds * background, inputs.seeds.least);
-    let mut next = [T::default(); HALF];
-    for lane in 0..HALF {
+    let mut next = [T::default(); WIDTH];
+    for lane in 0..WIDTH {
         let mut value = along * sum[lane] - stay * z[lane] - back * before[lane];
-        if WHICH == BACKGROUND_LANE / HALF {
+        if BACKGROUND {
             value += background * inputs.background_lanes[lane];
         }
         let counts = value > least || value < T::default() - least;
@@ -279,23 +282,23 @@ fn sources_of<T: Real>(a: &PointGraph<T>, block: usize, met: &mut [u32]) -> Vec<
 }
 
 /// Values of the lanes of one pass at all points, and those of the step before.
-pub(crate) struct State<'a, T, const HALF: usize> {
+pub(crate) struct State<'a, T, const WIDTH: usize> {
     a: &'a PointGraph<T>,
     seeds: &'a LaneSeeds<T>,
     blocks: &'a Blocks,
     /// Values after the last step.
-    pub(crate) z: Values<T, HALF>,
+    pub(crate) z: Values<T, WIDTH>,
     /// Values before it, which the next step overwrites.
-    pub(crate) previous: Values<T, HALF>,
-    /// Halves of each block that may hold anything but zeros: bit 0 for the first, bit 1 for the second.
+    pub(crate) previous: Values<T, WIDTH>,
+    /// Groups of each block that may hold anything but zeros: bit g for group g.
     active: Vec<u8>,
-    /// Halves of each block that do.
+    /// Groups of each block that do.
     filled: Vec<u8>,
-    /// Halves of each block that do and have made active the blocks that they flow to.
+    /// Groups of each block that do and have made active the blocks that they flow to.
     passed_on: Vec<u8>,
 }
 
-impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
+impl<'a, T: Sweep<WIDTH>, const WIDTH: usize> State<'a, T, WIDTH> {
     /// z = `scale` * s, with the probe's seeds as they are.
     pub(crate) fn new(
         a: &'a PointGraph<T>,
@@ -303,7 +306,8 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
         blocks: &'a Blocks,
         scale: T,
     ) -> Self {
-        let (mut z, previous) = (Values::zero(a.len()), Values::zero(a.len()));
+        let groups = seeds.lanes.div_ceil(WIDTH).max(1);
+        let (mut z, previous) = (Values::zero(a.len(), groups), Values::zero(a.len(), groups));
         for &(i, lane, weight) in seeds.of_rows(0..a.len()) {
             *z.get_mut(i as usize, lane as usize) = scale * weight;
         }
@@ -316,7 +320,7 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
                 .enumerate()
                 .for_each(|(i, &seed)| *z.get_mut(i, *lane) = seed);
         }
-        let active = seeds.halves(BLOCK, HALF);
+        let active = seeds.groups(BLOCK, WIDTH);
         let (filled, passed_on) = (active.clone(), vec![0; blocks.len()]);
         let mut state = Self {
             a,
@@ -332,6 +336,11 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
         state
     }
 
+    /// Number of points.
+    pub(crate) fn points(&self) -> usize {
+        self.a.len()
+    }
+
     /// Lane of the probe, if there is one.
     pub(crate) fn probe(&self) -> Option<usize> {
         self.seeds.probe.as_ref().map(|(lane, _)| *lane)
@@ -340,27 +349,27 @@ impl<'a, T: Sweep<HALF>, const HALF: usize> State<'a, T, HALF> {
     /// Applies `step`; what was z becomes the previous values.
     pub(crate) fn step(&mut self, step: Step<T>) {
         let inputs = Inputs::new(self.a, self.seeds, step, &self.z);
-        let [first, second] = &mut self.previous.0;
-        let rows = BLOCK * BLOCKS_A_TASK;
-        let next = first.par_chunks_mut(rows).zip(second.par_chunks_mut(rows));
         let states = self
             .active
-            .par_chunks(BLOCKS_A_TASK)
-            .zip(self.filled.par_chunks_mut(BLOCKS_A_TASK));
-        next.zip(states)
-            .enumerate()
-            .for_each(|(task, ((first, second), (active, filled)))| {
-                let first_block = task * BLOCKS_A_TASK;
-                T::step_blocks(
-                    &inputs,
-                    Task {
-                        first: first_block,
-                        next: [first, second],
-                        active,
-                        filled,
-                    },
-                );
-            });
+            .chunks(BLOCKS_A_TASK)
+            .zip(self.filled.chunks_mut(BLOCKS_A_TASK));
+        let rows = BLOCK * BLOCKS_A_TASK;
+        let mut groups: Vec<_> = self
+            .previous
+            .0
+            .iter_mut()
+            .map(|group| group.chunks_mut(rows))
+            .collect();
+        let task = |(task, (active, filled))| Task {
+            first: task * BLOCKS_A_TASK,
+            next: groups.iter_mut().filter_map(Iterator::next).collect(),
+            active,
+            filled,
+        };
+        let tasks: Vec<Task<T, WIDTH>> = states.enumerate().map(task).collect();
+        tasks
+            .into_par_iter()
+            .for_each(|task| T::step_blocks(&inputs, task));
         std::mem::swap(&mut self.z, &mut self.previous);
         self.spread();
     }
