@@ -118,12 +118,24 @@ fn step_all<T: Real, const WIDTH: usize>(inputs: &Inputs<T, WIDTH>, task: Task<T
         let start = (first + block) * BLOCK;
         let rows = block * BLOCK..next[0].len().min((block + 1) * BLOCK);
         let range = start..start + rows.len();
-        for group in (0..next.len()).filter(|group| active >> group & 1 == 1) {
-            let rows = &mut next[group][rows.clone()];
-            if group == BACKGROUND_LANE / WIDTH {
-                step_rows::<T, WIDTH, true>(inputs, group, range.clone(), rows);
+        let mut groups = (0..next.len()).filter(|group| active >> group & 1 == 1);
+        while let Some(group) = groups.next() {
+            let background = group == BACKGROUND_LANE / WIDTH;
+            if let Some(other) = groups.next() {
+                let [one, two] = next.get_disjoint_mut([group, other]).expect("two groups");
+                let pair = [&mut one[rows.clone()], &mut two[rows.clone()]];
+                if background {
+                    step_pairs::<T, WIDTH, true>(inputs, [group, other], range.clone(), pair);
+                } else {
+                    step_pairs::<T, WIDTH, false>(inputs, [group, other], range.clone(), pair);
+                }
             } else {
-                step_rows::<T, WIDTH, false>(inputs, group, range.clone(), rows);
+                let rows = &mut next[group][rows.clone()];
+                if background {
+                    step_rows::<T, WIDTH, true>(inputs, group, range.clone(), rows);
+                } else {
+                    step_rows::<T, WIDTH, false>(inputs, group, range.clone(), rows);
+                }
             }
         }
         for &(i, lane, weight) in inputs.seeds.of_rows(range) {
@@ -169,6 +181,64 @@ fn step_rows<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
             row.0 = finish::<T, WIDTH, BACKGROUND>(inputs, &sum, &own.0, &row.0, background);
         }
     }
+}
+
+/// Computes two groups of the rows of `range`, which share what they read of the graph.
+#[inline(always)]
+fn step_pairs<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
+    inputs: &Inputs<T, WIDTH>,
+    [one, two]: [usize; 2],
+    range: Range<usize>,
+    [rows_one, rows_two]: [&mut [Group<T, WIDTH>]; 2],
+) {
+    let (z_one, z_two) = (inputs.z.0[one].as_slice(), inputs.z.0[two].as_slice());
+    if inputs.a.degree() != Some(PAPER_DEGREE) {
+        step_rows::<T, WIDTH, BACKGROUND>(inputs, one, range.clone(), rows_one);
+        step_rows::<T, WIDTH, false>(inputs, two, range, rows_two);
+        return;
+    }
+    let own = z_one[range.clone()].iter().zip(&z_two[range.clone()]);
+    let background = &inputs.seeds.background[range.clone()];
+    let (columns, weights) = inputs.a.slices(range);
+    let columns = columns.as_chunks::<PAPER_DEGREE>().0;
+    let edges = columns.iter().zip(weights.as_chunks::<PAPER_DEGREE>().0);
+    let points = rows_one.iter_mut().zip(rows_two).zip(own).zip(background);
+    for ((((one, two), (own_one, own_two)), &background), (columns, weights)) in points.zip(edges) {
+        let [sum_one, sum_two] = weighted_sums(z_one, z_two, columns, weights);
+        one.0 = finish::<T, WIDTH, BACKGROUND>(inputs, &sum_one, &own_one.0, &one.0, background);
+        two.0 = finish::<T, WIDTH, false>(inputs, &sum_two, &own_two.0, &two.0, background);
+    }
+}
+
+/// Weighted sums of the rows of two groups that `columns` name.
+#[inline(always)]
+#[expect(
+    unsafe_code,
+    reason = "the check of every column takes a sixth of the time of a sweep"
+)]
+fn weighted_sums<T: Real, const WIDTH: usize>(
+    one: &[Group<T, WIDTH>],
+    two: &[Group<T, WIDTH>],
+    columns: &[u32],
+    weights: &[T],
+) -> [[T; WIDTH]; 2] {
+    // one row, one thread: sums keep their order, so results do too
+    let mut sums = [[T::default(); WIDTH]; 2];
+    for (&column, &weight) in columns.iter().zip(weights) {
+        // SAFETY: a `PointGraph` has no column beyond its last row; `Inputs::new` sees to as many in each group
+        let values = unsafe {
+            [
+                &one.get_unchecked(column as usize).0,
+                &two.get_unchecked(column as usize).0,
+            ]
+        };
+        for group in 0..2 {
+            for lane in 0..WIDTH {
+                sums[group][lane] += weight * values[group][lane];
+            }
+        }
+    }
+    sums
 }
 
 /// Weighted sum of the rows of `z` that `columns` name.
