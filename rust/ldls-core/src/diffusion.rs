@@ -1,7 +1,7 @@
 //! Label diffusion z <- A z + b (method, steps 5 and 6).
 //!
 //! The products are not run one by one: their result is a polynomial of A times b, which a Chebyshev series
-//! reaches with a third of the sweeps, in single precision. Both leave an error, which is known; where two
+//! reaches with a third of the sweeps, in single precision. Both leave an error, which is estimated; where two
 //! labels are nearer to one another than that, they are diffused again in double precision. Where the graph
 //! is such that the series cannot be trusted, the products are run as they stand.
 
@@ -15,9 +15,9 @@ use rayon::prelude::*;
 const TOLERANCE_F32: Tolerance = Tolerance(1e-7);
 /// What a series in double precision may leave out.
 const TOLERANCE_F64: Tolerance = Tolerance(1e-13);
-/// Rounding of single precision, as a share of the largest likelihood of a point; 1e-5 on real frames.
+/// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
 const ROUNDING: f32 = 2.5e-5;
-/// By how much the terms that a series leaves out may exceed what the probe says of them.
+/// By how much the terms that a series leaves out are taken to exceed what the probe says of them.
 const CAUTION: f64 = 1.0;
 /// Error from which on a series is given up for plain products.
 const LARGEST_ERROR: f64 = 1e-3;
@@ -37,7 +37,7 @@ pub struct Convergence {
     pub sweeps: usize,
     /// Largest change of any likelihood that one more product would make, where that bounded the run.
     pub residual: Option<f64>,
-    /// Largest error of a likelihood from the terms that the series leaves out.
+    /// Estimate of the largest error of a likelihood from the terms that the series leaves out.
     pub error: f64,
     /// Points whose label was decided in double precision.
     pub refined: usize,
