@@ -25,7 +25,7 @@ from ldls.masks import InstanceMasks
 from ldls.objects import OrientedBox, SegmentedObject
 from ldls.params import Params
 from ldls.report import Report
-from ldls.segmentation import Segmentation, segment
+from ldls.segmentation import LabelDiffusion, Segmentation, segment
 
 __all__ = [
     "CalibrationError",
@@ -36,6 +36,7 @@ __all__ = [
     "InputError",
     "InstanceMasks",
     "InternalError",
+    "LabelDiffusion",
     "LdlsError",
     "LimitError",
     "MaskError",

@@ -10,6 +10,7 @@ _Csr: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32
 _Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 __all__ = [
+    "KeepMemory",
     "Masks",
     "Rle",
     "SegmentationArrays",
@@ -61,6 +62,10 @@ class Masks:
     def width(self) -> int: ...
     def __len__(self) -> int: ...
     def rle(self, index: int) -> Rle: ...
+
+@final
+class KeepMemory:
+    def __new__(cls) -> KeepMemory: ...
 
 @final
 class SegmentationArrays:

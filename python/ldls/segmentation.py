@@ -142,7 +142,62 @@ def segment(
         InputError: `points`, `masks` or `camera` cannot be used; see its subclasses.
         LimitError: The cloud has more points than the graph can index.
     """
-    params = params or Params()
+    return _segment(points, masks, camera, params or Params(), nonfinite, keep_origin)
+
+
+class LabelDiffusion:
+    """Segments the frames of a stream: what one camera and one lidar yield, frame after frame.
+
+    Does what `segment` does. While it lives, the memory that a frame needs is kept for the next one, so that after the
+    first frame of a size none is asked of the system; `segment` alone gives it back when it has not been called for
+    some seconds. Calls from several threads are allowed.
+
+    Attributes:
+        camera: The camera that takes the images.
+        params: Parameters of the method.
+
+    Example:
+        >>> diffusion = ldls.LabelDiffusion(camera)  # doctest: +SKIP
+        >>> for points, masks in stream:  # doctest: +SKIP
+        ...     labels = diffusion.segment(points, masks).labels
+    """
+
+    def __init__(self, camera: Camera, params: Params | None = None) -> None:
+        """Prepare for the images of `camera`; the parameters are the paper's by default.
+
+        Raises:
+            InputError: `camera` or `params` is of another type.
+        """
+        _check_camera(camera)
+        if params is not None and not isinstance(params, Params):
+            raise ParameterError(f"params: expected Params, got {type(params).__name__}")
+        self.camera = camera
+        self.params = params or Params()
+        self._memory = _ldls.KeepMemory()
+
+    def segment(
+        self,
+        points: ArrayLike,
+        masks: InstanceMasks,
+        *,
+        nonfinite: Literal["drop", "raise"] = "drop",
+        keep_origin: bool = False,
+    ) -> Segmentation:
+        """Segment the next frame; arguments, result and errors are those of `ldls.segment`."""
+        return _segment(points, masks, self.camera, self.params, nonfinite, keep_origin)
+
+    def __repr__(self) -> str:
+        return f"LabelDiffusion({self.camera!r}, {self.params!r})"
+
+
+def _segment(
+    points: ArrayLike,
+    masks: InstanceMasks,
+    camera: Camera,
+    params: Params,
+    nonfinite: str,
+    keep_origin: bool,
+) -> Segmentation:
     cloud = as_points(points)
     _check_masks(masks, camera)
     _check_nonfinite(cloud, nonfinite)
@@ -177,15 +232,19 @@ def _check_masks(masks: InstanceMasks, camera: Camera) -> None:
             f"masks: expected InstanceMasks, got {type(masks).__name__}; "
             "make them with InstanceMasks.from_array, from_coco or from_npz"
         )
+    _check_camera(camera)
+    expected = camera.image_size
+    if expected is not None and masks.image_size != tuple(expected):
+        hint = "; swapped?" if masks.image_size == tuple(expected)[::-1] else ""
+        raise MaskError(f"masks: {masks.image_size}, the camera's image is {expected}{hint}")
+
+
+def _check_camera(camera: Camera) -> None:
     if not isinstance(camera, Camera):
         raise InputError(
             f"camera: expected Camera, got {type(camera).__name__}; "
             "make one with Camera(projection=..., T_camera_lidar=...) or Camera.from_kitti"
         )
-    expected = camera.image_size
-    if expected is not None and masks.image_size != tuple(expected):
-        hint = "; swapped?" if masks.image_size == tuple(expected)[::-1] else ""
-        raise MaskError(f"masks: {masks.image_size}, the camera's image is {expected}{hint}")
 
 
 def _check_nonfinite(cloud: Points, nonfinite: str) -> None:
@@ -220,8 +279,8 @@ def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
 
 
 def _warning(message: str, category: type[Warning]) -> None:
-    # the caller of segment, three calls up, is the one to be told
-    warnings.warn(message, category, stacklevel=4)
+    # the caller of segment, four calls up, is the one to be told
+    warnings.warn(message, category, stacklevel=5)
 
 
 def _report(arrays: _ldls.SegmentationArrays, masks: InstanceMasks) -> Report:

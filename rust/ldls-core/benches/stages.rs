@@ -10,7 +10,7 @@ use std::hint::black_box;
 const HEIGHT: usize = 375;
 const WIDTH: usize = 1242;
 const INSTANCES: usize = 20;
-const SIZES: [usize; 3] = [10_000, 100_000, 1_000_000];
+const SIZES: [usize; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
 
 /// `n` points in view, scan line by scan line: ground below, a wall ahead, and a pillar for each instance.
 fn street(n: usize) -> Vec<f32> {

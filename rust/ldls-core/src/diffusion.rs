@@ -6,8 +6,10 @@
 //! is such that the series cannot be trusted, the products are run as they stand.
 
 use crate::chebyshev::{Interval, Series, Tolerance};
-use crate::lanes::{Lane, LaneSeeds, Values, plan};
-use crate::sweeps::{Blocks, State, Step, Sweep, WIDTH_F32, WIDTH_F64};
+use crate::lanes::{Lane, LaneSeeds, plan};
+use crate::state::{Rows, State};
+use crate::sweeps::{Step, Sweep, WIDTH_F32, WIDTH_F64};
+use crate::values::Values;
 use crate::{Error, PixelLabels, PointGraph, Real, Result};
 use rayon::prelude::*;
 
@@ -176,15 +178,15 @@ fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
         TOLERANCE_F32
     };
     let mut scheme = Scheme::choose(a, iterations, tolerance);
-    let blocks = Blocks::new(a);
+    let rows = Rows::new(a);
     let mut convergence = Convergence::default();
     let probe = WIDTH == WIDTH_F32;
     for lanes in plan(b, labels, WIDTH, probe) {
         let seeds = LaneSeeds::new(b, &lanes);
-        let mut pass = scheme.run(a, &seeds, &blocks);
+        let mut pass = scheme.run(&rows, &seeds);
         if !matches!(scheme, Scheme::Products(_)) && !pass.is_sound(&lanes, largest_overlap(b)) {
             scheme = iterations.map_or(Scheme::UntilConverged, Scheme::Products);
-            pass = scheme.run(a, &seeds, &blocks);
+            pass = scheme.run(&rows, &seeds);
         }
         done(&lanes, &pass.z);
         convergence.merge(pass.convergence());
@@ -224,15 +226,14 @@ impl Scheme {
 
     fn run<T: Sweep<WIDTH>, const WIDTH: usize>(
         &self,
-        a: &PointGraph<T>,
+        rows: &Rows<T>,
         seeds: &LaneSeeds<T>,
-        blocks: &Blocks,
     ) -> Pass<T, WIDTH> {
         match self {
-            Self::Products(products) => run_products(a, seeds, blocks, *products),
-            Self::UntilConverged => run_until_converged(a, seeds, blocks),
-            Self::Series(series) => run_series(a, seeds, blocks, series, false),
-            Self::ConvergedSeries(series) => run_series(a, seeds, blocks, series, true),
+            Self::Products(products) => run_products(rows, seeds, *products),
+            Self::UntilConverged => run_until_converged(rows, seeds),
+            Self::Series(series) => run_series(rows, seeds, series, false),
+            Self::ConvergedSeries(series) => run_series(rows, seeds, series, true),
         }
     }
 }
@@ -251,16 +252,13 @@ fn step<T: Real>((seeds, along, stay, back): (f64, f64, f64, f64)) -> Step<T> {
 }
 
 fn run_products<T: Sweep<WIDTH>, const WIDTH: usize>(
-    a: &PointGraph<T>,
+    rows: &Rows<T>,
     seeds: &LaneSeeds<T>,
-    blocks: &Blocks,
     products: usize,
 ) -> Pass<T, WIDTH> {
     // from z = 0 the first product yields b
-    let mut state = State::new(a, seeds, blocks, T::from_f64(1.0));
-    for _ in 1..products {
-        state.step(step(PRODUCT));
-    }
+    let mut state = State::new(rows, seeds, T::from_f64(1.0));
+    state.run(&vec![step(PRODUCT); products.saturating_sub(1)]);
     Pass {
         z: state.z,
         sweeps: products,
@@ -270,14 +268,13 @@ fn run_products<T: Sweep<WIDTH>, const WIDTH: usize>(
 }
 
 fn run_until_converged<T: Sweep<WIDTH>, const WIDTH: usize>(
-    a: &PointGraph<T>,
+    rows: &Rows<T>,
     seeds: &LaneSeeds<T>,
-    blocks: &Blocks,
 ) -> Pass<T, WIDTH> {
-    let mut state = State::new(a, seeds, blocks, T::from_f64(1.0));
+    let mut state = State::new(rows, seeds, T::from_f64(1.0));
     let mut sweeps = 1;
     while largest_change(&state) > CONVERGED && sweeps < MOST_SWEEPS {
-        state.step(step(PRODUCT));
+        state.run(&[step(PRODUCT)]);
         sweeps += 1;
     }
     last_product(state, sweeps, 0.0)
@@ -285,21 +282,22 @@ fn run_until_converged<T: Sweep<WIDTH>, const WIDTH: usize>(
 
 /// Clenshaw's recurrence: `y_k = c_k b + 2 X y_(k+1) - y_(k+2)`, `X = (A - middle) / half width`.
 fn run_series<T: Sweep<WIDTH>, const WIDTH: usize>(
-    a: &PointGraph<T>,
+    rows: &Rows<T>,
     seeds: &LaneSeeds<T>,
-    blocks: &Blocks,
     series: &Series,
     until_converged: bool,
 ) -> Pass<T, WIDTH> {
     let (middle, half_width) = (series.interval.middle(), series.interval.half_width());
     let degree = series.degree();
-    let mut state = State::new(a, seeds, blocks, T::from_f64(series.coefficients[degree]));
-    for k in (0..degree).rev() {
+    let mut state = State::new(rows, seeds, T::from_f64(series.coefficients[degree]));
+    let step_of = |k: usize| {
         // the last step takes X once, all others twice
         let times = if k == 0 { 1.0 } else { 2.0 };
         let (along, stay) = (times / half_width, times * middle / half_width);
-        state.step(step((series.coefficients[k], along, stay, 1.0)));
-    }
+        step((series.coefficients[k], along, stay, 1.0))
+    };
+    let steps: Vec<Step<T>> = (0..degree).rev().map(step_of).collect();
+    state.run(&steps);
     let error = CAUTION * series.tail * largest_probe(&state);
     if until_converged {
         return last_product(state, degree, error);
@@ -318,7 +316,7 @@ fn last_product<T: Sweep<WIDTH>, const WIDTH: usize>(
     sweeps: usize,
     error: f64,
 ) -> Pass<T, WIDTH> {
-    state.step(step(PRODUCT));
+    state.run(&[step(PRODUCT)]);
     let residual = largest_change(&state);
     Pass {
         z: state.previous,
@@ -420,16 +418,17 @@ impl<T: Real, const WIDTH: usize> Pass<T, WIDTH> {
     /// Whether little is left out, and no likelihood is negative or too large.
     fn is_sound(&self, lanes: &[Lane], overlap: f64) -> bool {
         let slack = f64::from(SLACK);
+        let lanes = label_values(lanes, &self.z);
         let row_is_sound = |i: usize| {
             let mut sum = 0.0;
-            labels_of(lanes).all(|(_, lane)| {
-                let value = self.z.get(i, lane).to_f64();
+            lanes.iter().all(|(_, values)| {
+                let value = values.at(i).to_f64();
                 sum += value;
                 value >= -slack
             }) && sum <= overlap + slack
         };
         self.error <= LARGEST_ERROR
-            && (0..self.z.0[0].len())
+            && (0..self.z.points())
                 .into_par_iter()
                 .with_min_len(BLOCK)
                 .all(row_is_sound)
@@ -447,14 +446,40 @@ fn labels_of(lanes: &[Lane]) -> impl Iterator<Item = (u32, usize)> {
         })
 }
 
+/// The values of one lane.
+struct LaneValues<'a, T, const WIDTH: usize> {
+    group: &'a [[T; WIDTH]],
+    lane: usize,
+}
+
+impl<T: Real, const WIDTH: usize> LaneValues<'_, T, WIDTH> {
+    /// The value at point `i`.
+    #[inline(always)]
+    fn at(&self, i: usize) -> T {
+        self.group[i][self.lane]
+    }
+}
+
+/// Labels of the lanes that carry one, and their values.
+fn label_values<'a, T: Real, const WIDTH: usize>(
+    lanes: &[Lane],
+    z: &'a Values<T, WIDTH>,
+) -> Vec<(u32, LaneValues<'a, T, WIDTH>)> {
+    let values = |(label, lane): (u32, usize)| {
+        let (group, lane) = (z.group(lane / WIDTH), lane % WIDTH);
+        (label, LaneValues { group, lane })
+    };
+    labels_of(lanes).map(values).collect()
+}
+
 fn update<const WIDTH: usize>(best: &mut [Best], lanes: &[Lane], z: &Values<f32, WIDTH>) {
-    let lanes: Vec<(u32, usize)> = labels_of(lanes).collect();
+    let lanes = label_values(lanes, z);
     best.par_iter_mut()
         .enumerate()
         .with_min_len(BLOCK)
         .for_each(|(i, best)| {
-            for &(label, lane) in &lanes {
-                best.offer(label, z.get(i, lane));
+            for (label, values) in &lanes {
+                best.offer(*label, values.at(i));
             }
         });
 }
@@ -687,6 +712,27 @@ mod tests {
         }
         a.normalize_rows(&mut b).unwrap();
         (a, b)
+    }
+
+    #[test]
+    fn a_cloud_too_large_for_the_cache_gets_the_likelihoods_of_plain_products() {
+        // a strip, and far points that are joined to both of its ends
+        let strip = (0..100_000).map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0]);
+        let far = (0..40).map(|i| [2500.0, 3000.0 + f64::from(i % 2), f64::from(i)]);
+        let points: Vec<[f64; 3]> = strip.chain(far).collect();
+        let seen: Vec<(u32, u32)> = (0..points.len() as u32)
+            .map(|i| (1 + i / 7000 % 2, i % 26))
+            .collect();
+        let (a, b) = system::<f32>(&points, &seen, 0.01);
+        let (found, _) = likelihoods(&a, &b, 3, Some(60)).unwrap();
+        let (a, b) = system::<f64>(&points, &seen, 0.01);
+        let expected = plain_products(&a, &b, 3, 60);
+        let largest = found
+            .iter()
+            .zip(&expected)
+            .map(|(found, expected)| (f64::from(*found) - expected).abs())
+            .fold(0.0, f64::max);
+        assert!(largest < 1e-5, "likelihoods differ by {largest}");
     }
 
     fn clouds() -> impl Strategy<Value = Vec<[f64; 3]>> {

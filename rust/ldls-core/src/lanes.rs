@@ -3,18 +3,8 @@
 use crate::{PixelLabels, Real};
 use std::ops::Range;
 
-/// Values of a group of lanes at one point: 32 bytes.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(32))]
-pub(crate) struct Group<T, const WIDTH: usize>(pub(crate) [T; WIDTH]);
-
-/// Values of all lanes at all points, group by group: where one holds nothing but zeros, a sweep leaves it out and
-/// does not touch its memory.
-#[derive(Debug, Clone)]
-pub(crate) struct Values<T, const WIDTH: usize>(pub(crate) Vec<Vec<Group<T, WIDTH>>>);
-
 /// Most groups of a pass: one bit each says which of them are in use.
-const MOST_GROUPS: usize = 8;
+pub(crate) const MOST_GROUPS: usize = 8;
 /// The same for clouds so large that every group counts: it takes 64 bytes a point.
 const MOST_GROUPS_OF_MANY: usize = 3;
 const MANY_POINTS: usize = 1 << 20;
@@ -25,34 +15,6 @@ pub(crate) fn most_groups(points: usize) -> usize {
         MOST_GROUPS
     } else {
         MOST_GROUPS_OF_MANY
-    }
-}
-
-impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
-    /// Zeros at `points` points.
-    pub(crate) fn zero(points: usize, groups: usize) -> Self {
-        Self(
-            (0..groups)
-                .map(|_| vec![Group([T::default(); WIDTH]); points])
-                .collect(),
-        )
-    }
-
-    /// The value of `lane` at point `i`.
-    #[inline(always)]
-    pub(crate) fn get(&self, i: usize, lane: usize) -> T {
-        self.0[lane / WIDTH][i].0[lane % WIDTH]
-    }
-
-    /// The place of the value of `lane` at point `i`.
-    #[inline(always)]
-    pub(crate) fn get_mut(&mut self, i: usize, lane: usize) -> &mut T {
-        &mut self.0[lane / WIDTH][i].0[lane % WIDTH]
-    }
-
-    /// Number of lanes.
-    pub(crate) fn lanes(&self) -> usize {
-        self.0.len() * WIDTH
     }
 }
 
@@ -130,6 +92,7 @@ fn seeds_of<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
 pub(crate) const BACKGROUND_LANE: usize = 0;
 
 /// The seeds of the labels of one pass by lane, row after row.
+#[derive(Debug)]
 pub(crate) struct LaneSeeds<T> {
     /// Seeds of the background, which nearly every row has; zeros where it is in another pass.
     pub(crate) background: Vec<T>,

@@ -7,6 +7,8 @@
 //! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is
 //! taken by one thread in one order.
 
+mod activity;
+mod blocks;
 mod camera;
 mod chebyshev;
 mod cloud;
@@ -23,7 +25,10 @@ mod polygon;
 mod real;
 mod rle;
 mod segment;
+mod state;
 mod sweeps;
+mod tiles;
+mod values;
 
 pub use camera::{Camera, View, ViewCounts};
 pub use cloud::Cloud;

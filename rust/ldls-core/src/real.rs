@@ -28,6 +28,9 @@ pub trait Real:
     fn from_f64(x: f64) -> Self;
     /// The same value in double precision.
     fn to_f64(self) -> f64;
+    /// Its magnitude.
+    #[must_use]
+    fn abs(self) -> Self;
     /// e to the power of this value.
     #[must_use]
     fn exp(self) -> Self;
@@ -42,6 +45,10 @@ impl Real for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
     fn exp(self) -> Self {
         self.exp()
     }
@@ -55,6 +62,10 @@ impl Real for f64 {
     }
     fn to_f64(self) -> f64 {
         self
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
     }
     fn exp(self) -> Self {
         self.exp()

@@ -6,10 +6,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::any::Any;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 /// Most threads of a pool.
 const MAX_THREADS: usize = 1024;
+
+/// Pools of one thread that nobody uses, each with the process that it is of.
+static SINGLE_THREADS: Mutex<Vec<(u32, ThreadPool)>> = Mutex::new(Vec::new());
 
 type Pools = HashMap<(u32, usize), Arc<ThreadPool>>;
 /// Pools by process and size: threads do not survive a fork, so a child makes its own. Pools are never dropped, which
@@ -19,18 +22,37 @@ static POOLS: LazyLock<Mutex<Pools>> = LazyLock::new(Mutex::default);
 static LAST_PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// Runs `work` on `threads` threads (`None`: as many as the process may use) with the GIL released.
+///
+/// Calls at the same time share the threads of a pool, so that frames from several Python threads do not take more than
+/// one frame would; those with `threads` 1 run beside one another, each on a thread of its own.
 pub fn run<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
     work: impl FnOnce() -> ldls_core::Result<T> + Send,
 ) -> PyResult<T> {
-    let pool = pool(py, threads)?;
-    let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(|| pool.install(work))));
+    let threads = checked_threads(py, threads)?;
+    let outcome = if threads == 1 {
+        let pool = idle_thread(py)?;
+        let outcome = on_pool(py, &pool, work);
+        lock(&SINGLE_THREADS).push((std::process::id(), pool));
+        outcome
+    } else {
+        let pool = shared_pool(py, threads)?;
+        on_pool(py, &pool, work)
+    };
     match outcome {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(error)) => Err(to_python(py, &error)),
         Err(payload) => Err(internal_error(py, payload.as_ref())),
     }
+}
+
+fn on_pool<T: Send>(
+    py: Python<'_>,
+    pool: &ThreadPool,
+    work: impl FnOnce() -> T + Send,
+) -> std::thread::Result<T> {
+    py.detach(|| catch_unwind(AssertUnwindSafe(|| pool.install(work))))
 }
 
 /// Number of threads where none is asked for: `LDLS_NUM_THREADS`, or the cores that the process may use by affinity
@@ -60,42 +82,56 @@ pub fn remember_panics() {
         let place = info
             .location()
             .map_or_else(|| "an unknown place".to_owned(), ToString::to_string);
-        *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some(place);
+        *lock(&LAST_PANIC) = Some(place);
     }));
 }
 
-fn pool(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
-    let threads = match threads {
-        Some(threads @ 1..=MAX_THREADS) => threads,
+fn checked_threads(py: Python<'_>, threads: Option<usize>) -> PyResult<usize> {
+    match threads {
+        Some(threads @ 1..=MAX_THREADS) => Ok(threads),
         Some(threads) => {
-            return Err(raise(
-                py,
-                "ParameterError",
-                &format!("threads: got {threads}, expected 1 to {MAX_THREADS}"),
-            ));
+            let message = format!("threads: got {threads}, expected 1 to {MAX_THREADS}");
+            Err(raise(py, "ParameterError", &message))
         }
-        None => default_threads(py)?,
-    };
-    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+        None => default_threads(py),
+    }
+}
+
+/// The pool of `threads` threads of this process.
+fn shared_pool(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
+    let mut pools = lock(&POOLS);
     let key = (std::process::id(), threads);
     if let Some(pool) = pools.get(&key) {
         return Ok(Arc::clone(pool));
     }
-    let pool = ThreadPoolBuilder::new()
+    let pool = Arc::new(new_pool(py, threads)?);
+    pools.insert(key, Arc::clone(&pool));
+    Ok(pool)
+}
+
+/// A pool of one thread of this process that nobody uses.
+fn idle_thread(py: Python<'_>) -> PyResult<ThreadPool> {
+    let mut idle = lock(&SINGLE_THREADS);
+    let own = idle
+        .iter()
+        .position(|(process, _)| *process == std::process::id());
+    own.map_or_else(|| new_pool(py, 1), |at| Ok(idle.swap_remove(at).1))
+}
+
+fn new_pool(py: Python<'_>, threads: usize) -> PyResult<ThreadPool> {
+    ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("ldls-{i}"))
         .start_handler(keep_to_own_core(threads))
         .build()
         .map_err(|error| {
-            raise(
-                py,
-                "LimitError",
-                &format!("threads: cannot start {threads}: {error}"),
-            )
-        })?;
-    Ok(Arc::clone(
-        pools.entry(key).or_insert_with(|| Arc::new(pool)),
-    ))
+            let message = format!("threads: cannot start {threads}: {error}");
+            raise(py, "LimitError", &message)
+        })
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Ties each thread of a pool to a core, if the pool has one for every core that the process may use.
@@ -117,10 +153,7 @@ fn internal_error(py: Python<'_>, payload: &(dyn Any + Send)) -> PyErr {
         .map(|text| (*text).to_owned())
         .or_else(|| payload.downcast_ref::<String>().cloned())
         .unwrap_or_else(|| "a panic without a message".to_owned());
-    let place = LAST_PANIC
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .take();
+    let place = lock(&LAST_PANIC).take();
     let place = place.unwrap_or_else(|| "an unknown place".to_owned());
     raise(
         py,

@@ -10,12 +10,9 @@ mod arrays;
 mod call;
 mod errors;
 mod masks;
+mod memory;
 mod segment;
 mod stages;
-
-/// Keeps the memory of a frame for the next one, where the system's allocator would give it back and fetch it anew.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 /// Core of `ldls`; private, use `ldls`.
 #[pyo3::pymodule]
@@ -24,6 +21,8 @@ mod _ldls {
     use crate::call::{default_threads, panic_in_worker};
     #[pymodule_export]
     use crate::masks::{Masks, Rle};
+    #[pymodule_export]
+    use crate::memory::KeepMemory;
     #[pymodule_export]
     use crate::segment::{SegmentationArrays, check_camera, check_params, segment};
     #[pymodule_export]
@@ -36,6 +35,7 @@ mod _ldls {
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyModuleMethods;
         crate::call::remember_panics();
+        crate::memory::keep_for_a_while();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

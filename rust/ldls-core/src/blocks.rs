@@ -1,0 +1,75 @@
+//! Blocks of consecutive rows of a graph, and from which other blocks values flow to each.
+
+use crate::{PointGraph, Real};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rows of a block.
+pub(crate) const BLOCK: usize = 16;
+/// The blocks of a graph: from which of them values flow to each.
+#[derive(Debug)]
+pub(crate) struct Blocks {
+    rows: usize,
+    offsets: Vec<u32>,
+    sources: Vec<u32>,
+}
+
+impl Blocks {
+    pub(crate) fn new<T: Real>(a: &PointGraph<T>) -> Self {
+        let count = a.len().div_ceil(BLOCK);
+        // few tasks: each marks the blocks that it has met in an array of its own
+        let size = count.div_ceil(4 * rayon::current_num_threads()).max(1);
+        let parts: Vec<(Vec<u32>, Vec<u32>)> = (0..count.div_ceil(size))
+            .into_par_iter()
+            .map(|task| sources(a, count, task * size..count.min((task + 1) * size)))
+            .collect();
+        let mut all = Vec::with_capacity(parts.iter().map(|(sources, _)| sources.len()).sum());
+        let mut offsets = Vec::with_capacity(count + 1);
+        offsets.push(0);
+        for (sources, ends) in &parts {
+            let start = all.len() as u32;
+            offsets.extend(ends.iter().map(|end| start + end));
+            all.extend_from_slice(sources);
+        }
+        Self {
+            rows: a.len(),
+            offsets,
+            sources: all,
+        }
+    }
+
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of blocks.
+    pub(crate) fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// The blocks other than `block` with a row that a row of `block` has an edge from.
+    #[inline(always)]
+    pub(crate) fn sources(&self, block: usize) -> &[u32] {
+        &self.sources[self.offsets[block] as usize..self.offsets[block + 1] as usize]
+    }
+}
+
+/// The sources of some consecutive ones of `count` blocks, block after block, and where those of each end.
+fn sources<T: Real>(a: &PointGraph<T>, count: usize, blocks: Range<usize>) -> (Vec<u32>, Vec<u32>) {
+    let mut all = Vec::with_capacity(16 * blocks.len());
+    let mut ends = Vec::with_capacity(blocks.len());
+    // at which block each was last met
+    let mut met = vec![u32::MAX; count];
+    for block in blocks {
+        met[block] = block as u32;
+        for &column in a.slices(block * BLOCK..a.len().min((block + 1) * BLOCK)).0 {
+            let source = column / BLOCK as u32;
+            if std::mem::replace(&mut met[source as usize], block as u32) != block as u32 {
+                all.push(source);
+            }
+        }
+        ends.push(all.len() as u32);
+    }
+    (all, ends)
+}

@@ -1,0 +1,211 @@
+//! In which order tiles of rows take their steps.
+//!
+//! A step of a row needs the step before it of the rows that it has edges from, and of no others. Where all values fit
+//! into the cache, all tiles take a step before any takes the next. A larger cloud would be fetched from memory for
+//! every step; it is divided into regions that fit, and each takes several steps at a time. Tiles at the border of a
+//! region that is still to come are left to that one, a ring of tiles more with every step ("sparse tiling": Strout
+//! et al., Int. J. High Performance Computing Applications 18(1), 2004). What is computed does not depend on it.
+
+use crate::blocks::{BLOCK, Blocks};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rows of a tile.
+const TILE: usize = 4 * BLOCK;
+/// Fewest tiles for a task of the thread pool.
+const TILES_A_TASK: usize = 4;
+/// Tiles of a region: some 16 MB of values and edges.
+const REGION: usize = 32768 / TILE;
+/// Steps that a region takes at a time.
+const ROUND: usize = 12;
+
+/// Tiles of consecutive rows, and when each takes which step.
+#[derive(Debug)]
+pub(crate) struct Tiles {
+    rows: usize,
+    /// Steps after which the order repeats itself.
+    round: usize,
+    /// Region after region and step after step of a round, the tiles that take it then.
+    order: Vec<u32>,
+    /// Where in `order` each step of each region begins.
+    offsets: Vec<usize>,
+}
+
+impl Tiles {
+    pub(crate) fn new(blocks: &Blocks) -> Self {
+        Self::in_regions(blocks, REGION)
+    }
+
+    /// Regions of `region` tiles each.
+    fn in_regions(blocks: &Blocks, region_tiles: usize) -> Self {
+        let tiles = blocks.rows().div_ceil(TILE);
+        if tiles <= region_tiles {
+            return Self {
+                rows: blocks.rows(),
+                round: 1,
+                order: (0..tiles as u32).collect(),
+                offsets: vec![0, tiles],
+            };
+        }
+        let adjacent = Adjacent::new(blocks, tiles);
+        let regions = tiles.div_ceil(region_tiles);
+        let mut region: Vec<u32> = (0..tiles)
+            .map(|tile| (tile / region_tiles) as u32)
+            .collect();
+        let mut places: Vec<Vec<u32>> = vec![Vec::new(); regions * ROUND];
+        for step in 0..ROUND {
+            for (tile, &region) in region.iter().enumerate() {
+                places[region as usize * ROUND + step].push(tile as u32);
+            }
+            // a tile needs this step of all tiles next to it before it takes the next one
+            let last = |tile: usize| {
+                let others = adjacent
+                    .of(tile)
+                    .iter()
+                    .map(|&other| region[other as usize]);
+                others.fold(region[tile], u32::max)
+            };
+            region = (0..tiles)
+                .into_par_iter()
+                .with_min_len(1024)
+                .map(last)
+                .collect();
+        }
+        let mut offsets = vec![0];
+        offsets.extend(places.iter().scan(0, |end, place| {
+            *end += place.len();
+            Some(*end)
+        }));
+        Self {
+            rows: blocks.rows(),
+            round: ROUND,
+            order: places.concat(),
+            offsets,
+        }
+    }
+
+    /// Calls `work(rows, step)` for steps 0 to `steps` - 1 of every tile of rows, on all threads of the pool.
+    ///
+    /// At that time every tile next to it has taken steps 0 to `step` - 1, none has begun with `step` + 1, and what
+    /// was written for those is visible.
+    pub(crate) fn run(&self, steps: usize, work: impl Fn(Range<usize>, usize) + Sync) {
+        for first in (0..steps).step_by(self.round) {
+            for (place, range) in self.offsets.windows(2).enumerate() {
+                let step = first + place % self.round;
+                if step < steps {
+                    let tiles = &self.order[range[0]..range[1]];
+                    tiles
+                        .par_iter()
+                        .with_min_len(TILES_A_TASK)
+                        .for_each(|&tile| {
+                            let start = tile as usize * TILE;
+                            work(start..self.rows.min(start + TILE), step);
+                        });
+                }
+            }
+        }
+    }
+}
+
+/// Which tiles have edges to or from one another.
+struct Adjacent {
+    offsets: Vec<usize>,
+    tiles: Vec<u32>,
+}
+
+impl Adjacent {
+    fn new(blocks: &Blocks, count: usize) -> Self {
+        let of_tile = |tile: usize| {
+            let range = tile * TILE / BLOCK..blocks.len().min((tile + 1) * TILE / BLOCK);
+            let mut others = Vec::new();
+            for &source in range.flat_map(|block| blocks.sources(block)) {
+                let other = source / (TILE / BLOCK) as u32;
+                if other != tile as u32 && !others.contains(&other) {
+                    others.push(other);
+                }
+            }
+            others
+        };
+        let sources: Vec<Vec<u32>> = (0..count)
+            .into_par_iter()
+            .with_min_len(256)
+            .map(of_tile)
+            .collect();
+        let mut all = sources.clone();
+        for (tile, sources) in sources.iter().enumerate() {
+            for &source in sources {
+                all[source as usize].push(tile as u32);
+            }
+        }
+        let mut offsets = vec![0];
+        offsets.extend(all.iter().scan(0, |end, tiles| {
+            *end += tiles.len();
+            Some(*end)
+        }));
+        Self {
+            offsets,
+            tiles: all.concat(),
+        }
+    }
+
+    /// The tiles next to `tile`, some of them twice.
+    fn of(&self, tile: usize) -> &[u32] {
+        &self.tiles[self.offsets[tile]..self.offsets[tile + 1]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PointGraph;
+    use proptest::prelude::*;
+    use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+
+    /// A graph in which each row has edges from itself and from the two rows `reaches` away from it.
+    fn graph(rows: usize, reaches: &[usize]) -> PointGraph {
+        let columns = (0..rows).flat_map(|i| {
+            let reach = reaches[i % reaches.len()];
+            [i, (i + reach) % rows, (i + rows - reach % rows) % rows].map(|j| j as u32)
+        });
+        let offsets = (0..=rows).map(|i| 3 * i).collect();
+        PointGraph::from_csr(offsets, columns.collect(), vec![0.25; 3 * rows]).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn every_tile_takes_every_step_once_all_next_to_it_are_ready(
+            rows in 1_usize..6000,
+            reaches in proptest::collection::vec(prop_oneof![0_usize..80, 0_usize..6000], 1..40),
+            region in 1_usize..20,
+            steps in 0_usize..30,
+        ) {
+            let blocks = Blocks::new(&graph(rows, &reaches));
+            let count = rows.div_ceil(TILE);
+            let adjacent = Adjacent::new(&blocks, count);
+            let taken: Vec<AtomicUsize> = (0..count).map(|_| AtomicUsize::new(0)).collect();
+            let violations = AtomicUsize::new(0);
+            Tiles::in_regions(&blocks, region).run(steps, |rows, step| {
+                let tile = rows.start / TILE;
+                let ready = adjacent.of(tile).iter().all(|&other| {
+                    // this step at most: it may be about to take it, or have taken it
+                    [step, step + 1].contains(&taken[other as usize].load(SeqCst))
+                });
+                if !ready || taken[tile].fetch_add(1, SeqCst) != step {
+                    violations.fetch_add(1, SeqCst);
+                }
+            });
+            prop_assert_eq!(violations.into_inner(), 0);
+            prop_assert!(taken.into_iter().all(|taken| taken.into_inner() == steps));
+        }
+    }
+
+    #[test]
+    fn a_large_cloud_is_divided_and_most_of_a_region_takes_all_steps_of_a_round_at_once() {
+        let rows = 4 * REGION * TILE;
+        let tiles = Tiles::new(&Blocks::new(&graph(rows, &[1])));
+        assert_eq!((tiles.round, tiles.offsets.len() - 1), (ROUND, 4 * ROUND));
+        let last = tiles.offsets.windows(2).nth(ROUND - 1).unwrap();
+        assert!(last[1] - last[0] > REGION / 2);
+    }
+}

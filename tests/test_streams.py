@@ -1,0 +1,113 @@
+"""Frames one after the other, and beside one another."""
+
+import os
+import subprocess
+import sys
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import ldls
+from ldls.errors import PrecisionWarning
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+def test_a_stream_yields_what_segment_yields(small_scene):
+    points, masks, camera = small_scene
+    params = ldls.Params(window=3, iterations=50)
+    stream = ldls.LabelDiffusion(camera, params)
+    for part in (points, points[::2], points[:0], points):
+        found, expected = stream.segment(part, masks), ldls.segment(part, masks, camera, params=params)
+        np.testing.assert_array_equal(found.labels, expected.labels)
+        np.testing.assert_array_equal(found.confidence, expected.confidence)
+        assert found.params == params
+    assert ldls.LabelDiffusion(camera).params == ldls.Params()
+    assert "LabelDiffusion(Camera" in repr(stream)
+
+
+def test_a_stream_takes_the_arguments_of_segment_and_refuses_the_same(small_scene):
+    points, masks, camera = small_scene
+    stream = ldls.LabelDiffusion(camera)
+    assert stream.segment(points * 0, masks, keep_origin=True).report.n_origin == 0
+    points[0, 0] = np.nan
+    with pytest.raises(ldls.NonFiniteError, match="row 0"):
+        stream.segment(points, masks, nonfinite="raise")
+    with pytest.raises(ldls.InputError, match="camera: expected Camera, got dict"):
+        ldls.LabelDiffusion({})
+    with pytest.raises(ldls.ParameterError, match="params: expected Params, got int"):
+        ldls.LabelDiffusion(camera, 3)
+
+
+def test_warnings_name_the_line_that_called(small_scene):
+    points, masks, camera = small_scene
+    far = (points + 1e6).astype(np.float32)
+    for call in (lambda: ldls.segment(far, masks, camera), lambda: ldls.LabelDiffusion(camera).segment(far, masks)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            call()
+        assert {warning.filename for warning in caught if warning.category is PrecisionWarning} == {__file__}
+
+
+def run(source, **variables):
+    environment = os.environ | variables
+    command = [sys.executable, "-c", source]
+    return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout.split()
+
+
+@linux
+def test_a_stream_asks_no_memory_of_the_system_for_later_frames():
+    first, warm, later = map(
+        int,
+        run(
+            """
+import resource, numpy as np, ldls
+from ldls.simulation import street_scene
+scene = street_scene()
+masks = ldls.InstanceMasks.from_array(scene.masks)
+stream = ldls.LabelDiffusion(ldls.Camera(projection=scene.projection, T_camera_lidar=scene.T_camera_lidar))
+points = np.tile(scene.points, (5, 1)) + np.arange(5).repeat(len(scene.points))[:, None].astype(np.float32) * 1e-3
+def pages(frames):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(frames):
+        stream.segment(points, masks)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+print(pages(1), pages(4), pages(20))
+"""
+        ),
+    )
+    assert later < 20 < first, f"new pages: {first} in the first frame, {warm} in 4, {later} in 20 after them"
+
+
+@linux
+def test_frames_of_a_batch_run_one_a_thread():
+    threads = run(
+        """
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+import ldls
+from ldls.simulation import street_scene
+scene = street_scene()
+masks = ldls.InstanceMasks.from_array(scene.masks)
+camera = ldls.Camera(projection=scene.projection, T_camera_lidar=scene.T_camera_lidar)
+stream = ldls.LabelDiffusion(camera, ldls.Params(threads=1))
+with ThreadPoolExecutor(3) as workers:
+    list(workers.map(lambda _: stream.segment(scene.points, masks), range(12)))
+print(*(task.joinpath("comm").read_text().strip() for task in Path("/proc/self/task").iterdir()))
+""",
+        LDLS_NUM_THREADS="1",
+    )
+    # one for each frame that runs at a time, and none more
+    assert 2 <= threads.count("ldls-0") <= 3
+    assert not any(name.startswith("ldls-") and name != "ldls-0" for name in threads)
+
+
+def test_frames_beside_one_another_yield_the_same(small_scene):
+    points, masks, camera = small_scene
+    stream = ldls.LabelDiffusion(camera, ldls.Params(threads=1))
+    expected = stream.segment(points, masks)
+    with ThreadPoolExecutor(4) as workers:
+        for found in workers.map(lambda _: stream.segment(points, masks), range(20)):
+            np.testing.assert_array_equal(found.labels, expected.labels)
