@@ -10,10 +10,10 @@ _Csr: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32
 _Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 __all__ = [
-    "KeepMemory",
     "Masks",
     "Rle",
     "SegmentationArrays",
+    "StreamMemory",
     "__version__",
     "check_camera",
     "check_params",
@@ -64,8 +64,8 @@ class Masks:
     def rle(self, index: int) -> Rle: ...
 
 @final
-class KeepMemory:
-    def __new__(cls) -> KeepMemory: ...
+class StreamMemory:
+    def __new__(cls) -> StreamMemory: ...
 
 @final
 class SegmentationArrays:
@@ -93,6 +93,7 @@ def segment(
     params: _Params,
     keep_origin: bool,
     threads: int | None,
+    memory: StreamMemory | None,
 ) -> SegmentationArrays: ...
 def check_params(params: _Params, threads: int | None) -> None: ...
 def check_camera(projection: NDArray[np.float64], t_camera_lidar: NDArray[np.float64], min_depth_m: float) -> None: ...

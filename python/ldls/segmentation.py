@@ -148,9 +148,8 @@ def segment(
 class LabelDiffusion:
     """Segments the frames of a stream: what one camera and one lidar yield, frame after frame.
 
-    Does what `segment` does. While it lives, the memory that a frame needs is kept for the next one, so that after the
-    first frame of a size none is asked of the system; `segment` alone gives it back when it has not been called for
-    some seconds. Calls from several threads are allowed.
+    Does what `segment` does, but keeps the memory that a frame needs for the next one: after the first frame of a size
+    only the result is allocated. Calls from several threads are allowed; each that runs at a time has memory of its own.
 
     Attributes:
         camera: The camera that takes the images.
@@ -173,7 +172,7 @@ class LabelDiffusion:
             raise ParameterError(f"params: expected Params, got {type(params).__name__}")
         self.camera = camera
         self.params = params or Params()
-        self._memory = _ldls.KeepMemory()
+        self._memory = _ldls.StreamMemory()
 
     def segment(
         self,
@@ -184,7 +183,7 @@ class LabelDiffusion:
         keep_origin: bool = False,
     ) -> Segmentation:
         """Segment the next frame; arguments, result and errors are those of `ldls.segment`."""
-        return _segment(points, masks, self.camera, self.params, nonfinite, keep_origin)
+        return _segment(points, masks, self.camera, self.params, nonfinite, keep_origin, self._memory)
 
     def __repr__(self) -> str:
         return f"LabelDiffusion({self.camera!r}, {self.params!r})"
@@ -197,6 +196,7 @@ def _segment(
     params: Params,
     nonfinite: str,
     keep_origin: bool,
+    memory: _ldls.StreamMemory | None = None,
 ) -> Segmentation:
     cloud = as_points(points)
     _check_masks(masks, camera)
@@ -210,6 +210,7 @@ def _segment(
         params.as_tuple(),
         keep_origin,
         params.threads,
+        memory,
     )
     _warn(cloud, arrays.report)
     return Segmentation(

@@ -1,6 +1,6 @@
 //! Points to pixels: a general pinhole camera and what it sees.
 
-use crate::{Cloud, Error, Result};
+use crate::{Cloud, Error, Memory, Result};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use rayon::prelude::*;
 
@@ -109,6 +109,7 @@ impl Camera {
         height: usize,
         width: usize,
         keep_origin: bool,
+        memory: &mut Memory,
     ) -> Result<View> {
         let n = cloud.len();
         if n > i32::MAX as usize {
@@ -119,32 +120,33 @@ impl Camera {
                 of: "points",
             });
         }
-        let blocks: Vec<Result<View>> = (0..n.div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|block| {
-                self.view_rows(
-                    cloud,
-                    block * BLOCK..n.min((block + 1) * BLOCK),
-                    height,
-                    width,
-                    keep_origin,
-                )
+        let count = n.div_ceil(BLOCK);
+        let mut blocks: Vec<View> = memory.as_left(count);
+        let rows = |block: usize| block * BLOCK..n.min((block + 1) * BLOCK);
+        let outcomes: Vec<Result<()>> = blocks[..count]
+            .par_iter_mut()
+            .enumerate()
+            .map(|(block, view)| {
+                self.view_rows(cloud, rows(block), [height, width], keep_origin, view)
             })
             .collect();
         // taken in order, so that the first bad row is the one reported
-        let blocks = blocks.into_iter().collect::<Result<Vec<_>>>()?;
-        Ok(concatenate(&blocks))
+        outcomes.into_iter().collect::<Result<()>>()?;
+        let view = concatenate(&blocks[..count], memory);
+        memory.keep_as_is(blocks);
+        Ok(view)
     }
 
+    /// Makes `view` that of some rows.
     fn view_rows(
         &self,
         cloud: Cloud,
         rows: std::ops::Range<usize>,
-        height: usize,
-        width: usize,
+        [height, width]: [usize; 2],
         keep_origin: bool,
-    ) -> Result<View> {
-        let mut view = View::default();
+        view: &mut View,
+    ) -> Result<()> {
+        view.clear();
         for row in rows {
             let xyz = cloud.xyz(row);
             if !xyz.iter().all(|c| c.is_finite()) {
@@ -174,7 +176,7 @@ impl Camera {
                 view.counts.outside += 1;
             }
         }
-        Ok(view)
+        Ok(())
     }
 
     /// u and v in pixels, and the depth in metres, of a point in the lidar frame.
@@ -194,6 +196,15 @@ pub(crate) fn nearest_pixel([u, v]: [f64; 2], height: usize, width: usize) -> Op
     // written so that NaN fails
     let inside = column >= 0.0 && column < width as f64 && row >= 0.0 && row < height as f64;
     inside.then_some([column as usize, row as usize])
+}
+
+impl View {
+    fn clear(&mut self) {
+        self.indices.clear();
+        self.points.clear();
+        self.uv.clear();
+        self.counts = ViewCounts::default();
+    }
 }
 
 impl ViewCounts {
@@ -216,11 +227,11 @@ impl ViewCounts {
     }
 }
 
-fn concatenate(blocks: &[View]) -> View {
+fn concatenate(blocks: &[View], memory: &mut Memory) -> View {
     let n = blocks.iter().map(|block| block.indices.len()).sum();
     let mut view = View {
         indices: Vec::with_capacity(n),
-        points: Vec::with_capacity(n),
+        points: memory.empty(n),
         uv: Vec::with_capacity(n),
         counts: ViewCounts::default(),
     };
@@ -307,6 +318,7 @@ mod tests {
                 80,
                 100,
                 false,
+                &mut Memory::of_one_frame(),
             )
             .unwrap()
     }
@@ -377,7 +389,9 @@ mod tests {
             values: &[0., 0., 1., 0., 1e30, 1.],
             columns: 3,
         };
-        let error = camera().view(cloud, 10, 10, false).unwrap_err();
+        let error = camera()
+            .view(cloud, 10, 10, false, &mut Memory::of_one_frame())
+            .unwrap_err();
         assert!(
             matches!(error, Error::CoordinateOutOfRange { row: 1, .. }),
             "{error}"

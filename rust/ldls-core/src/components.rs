@@ -1,6 +1,6 @@
 //! Outlier removal: an instance keeps its largest connected component (method, step 7).
 
-use crate::{Error, PointGraph, Result};
+use crate::{Error, Memory, PointGraph, Result};
 
 /// Turns every point that is not in the largest connected component of its label into background (0). Edges are
 /// taken as undirected; of components of one size, the one with the lowest point index is kept.
@@ -9,7 +9,7 @@ use crate::{Error, PointGraph, Result};
 /// [`Error::Mismatch`] where `labels` is of another length than the graph.
 pub fn keep_largest_components(graph: &PointGraph, labels: &[u32]) -> Result<Vec<u32>> {
     let indices: Vec<u32> = (0..labels.len() as u32).collect();
-    keep_largest_by_index(graph, labels, &indices)
+    keep_largest_by_index(graph, labels, &indices, &mut Memory::of_one_frame())
 }
 
 /// The same for points whose rows are not in the order of their `indices`.
@@ -17,6 +17,7 @@ pub(crate) fn keep_largest_by_index(
     graph: &PointGraph,
     labels: &[u32],
     indices: &[u32],
+    memory: &mut Memory,
 ) -> Result<Vec<u32>> {
     if labels.len() != graph.len() {
         let problem = format!(
@@ -29,14 +30,15 @@ pub(crate) fn keep_largest_by_index(
             problem,
         });
     }
-    let mut sets = DisjointSets::new(labels.len());
+    let mut sets = DisjointSets::new(labels.len(), memory);
     for (i, &label) in labels.iter().enumerate().filter(|(_, label)| **label > 0) {
         for (j, _) in graph.row(i).filter(|&(j, _)| labels[j] == label) {
             sets.join(i as u32, j as u32);
         }
     }
-    let components: Vec<u32> = (0..labels.len() as u32).map(|i| sets.root(i)).collect();
-    let largest = largest_of_each(labels, &components, indices);
+    let mut components = memory.empty(labels.len());
+    components.extend((0..labels.len() as u32).map(|i| sets.root(i)));
+    let largest = largest_of_each(labels, &components, indices, memory);
     let kept = |(&label, &component): (&u32, &u32)| {
         if largest[label as usize].root == component {
             label
@@ -44,7 +46,11 @@ pub(crate) fn keep_largest_by_index(
             0
         }
     };
-    Ok(labels.iter().zip(&components).map(kept).collect())
+    let mut all = memory.empty(labels.len());
+    all.extend(labels.iter().zip(&components).map(kept));
+    memory.keep(components);
+    memory.keep(sets.parents);
+    Ok(all)
 }
 
 /// One component: its root, its size, and the lowest index of a point in it.
@@ -63,8 +69,13 @@ impl Component {
     };
 }
 
-fn largest_of_each(labels: &[u32], components: &[u32], indices: &[u32]) -> Vec<Component> {
-    let mut found = vec![Component::NONE; labels.len()];
+fn largest_of_each(
+    labels: &[u32],
+    components: &[u32],
+    indices: &[u32],
+    memory: &mut Memory,
+) -> Vec<Component> {
+    let mut found = memory.filled(labels.len(), Component::NONE);
     for (&root, &index) in components.iter().zip(indices) {
         let component = &mut found[root as usize];
         let first = component.first.min(index);
@@ -76,13 +87,14 @@ fn largest_of_each(labels: &[u32], components: &[u32], indices: &[u32]) -> Vec<C
     }
     let n_labels = labels.iter().max().map_or(1, |&label| label as usize + 1);
     let mut largest = vec![Component::NONE; n_labels];
-    for component in found.into_iter().filter(|component| component.size > 0) {
+    for &component in found.iter().filter(|component| component.size > 0) {
         let best = &mut largest[labels[component.root as usize] as usize];
         let larger = component.size > best.size;
         if larger || (component.size == best.size && component.first < best.first) {
             *best = component;
         }
     }
+    memory.keep(found);
     largest
 }
 
@@ -92,10 +104,10 @@ struct DisjointSets {
 }
 
 impl DisjointSets {
-    fn new(n: usize) -> Self {
-        Self {
-            parents: (0..n as u32).collect(),
-        }
+    fn new(n: usize, memory: &mut Memory) -> Self {
+        let mut parents = memory.empty(n);
+        parents.extend(0..n as u32);
+        Self { parents }
     }
 
     fn root(&mut self, mut element: u32) -> u32 {
@@ -142,7 +154,13 @@ mod tests {
 
     #[test]
     fn rows_may_come_in_another_order_than_indices() {
-        let kept = keep_largest_by_index(&chain(5), &[3, 3, 0, 3, 3], &[4, 3, 2, 1, 0]).unwrap();
+        let kept = keep_largest_by_index(
+            &chain(5),
+            &[3, 3, 0, 3, 3],
+            &[4, 3, 2, 1, 0],
+            &mut Memory::of_one_frame(),
+        )
+        .unwrap();
         assert_eq!(kept, [0, 0, 0, 3, 3]);
     }
 

@@ -10,7 +10,7 @@ use crate::lanes::{Lane, LaneSeeds, plan};
 use crate::state::{Rows, State};
 use crate::sweeps::{Step, Sweep, WIDTH_F32, WIDTH_F64};
 use crate::values::Values;
-use crate::{Error, PixelLabels, PointGraph, Real, Result};
+use crate::{Error, Memory, PixelLabels, PointGraph, Real, Result};
 use rayon::prelude::*;
 
 /// What a series in single precision may leave out.
@@ -56,6 +56,14 @@ pub struct Diffused {
     pub convergence: Convergence,
 }
 
+impl Diffused {
+    /// Keeps the vectors, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.labels);
+        memory.keep(self.confidence);
+    }
+}
+
 /// How to come to z.
 #[derive(Debug, Clone, PartialEq)]
 enum Scheme {
@@ -88,7 +96,7 @@ impl Convergence {
 
 /// Diffuses labels 0 to `n_labels` - 1 from their seeds `b` over the graph `a` and picks the winner at every
 /// point. `iterations` is the number of products, `None` as many as it takes. `exact` yields `a` and `b` in
-/// double precision, for points at which single precision does not tell the winner.
+/// double precision, for points at which single precision does not tell the winner. Works in `memory`.
 ///
 /// # Errors
 /// [`Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and whatever `exact` returns.
@@ -97,30 +105,37 @@ pub fn diffuse(
     b: &PixelLabels,
     n_labels: usize,
     iterations: Option<usize>,
-    exact: impl FnOnce() -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    exact: impl FnOnce(&mut Memory) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    memory: &mut Memory,
 ) -> Result<Diffused> {
     check(a, b, n_labels)?;
-    let mut best = vec![Best::default(); a.len()];
+    let mut best = memory.filled(a.len(), Best::default());
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let mut convergence = for_each_pass::<f32, WIDTH_F32>(a, b, &labels, iterations, |lanes, z| {
-        update(&mut best, lanes, z);
-    });
+    let choose = |lanes: &[Lane], z: &Values<f32, WIDTH_F32>| update(&mut best, lanes, z);
+    let mut convergence = for_each_pass(a, b, &labels, iterations, choose, memory);
     let contested = Contested::among(&best, convergence.error);
     if !contested.points.is_empty() {
-        let (a, b) = exact()?;
+        let (a, b) = exact(memory)?;
         let labels = contested.labels(&best, n_labels);
         let mut refined = vec![(0, f64::NEG_INFINITY); contested.points.len()];
-        for_each_pass::<f64, WIDTH_F64>(&a, &b, &labels, iterations, |lanes, z| {
+        let choose = |lanes: &[Lane], z: &Values<f64, WIDTH_F64>| {
             contested.refine(&mut refined, lanes, z);
-        });
+        };
+        for_each_pass(&a, &b, &labels, iterations, choose, memory);
+        a.keep_in(memory);
+        b.keep_in(memory);
         for (&point, &(label, _)) in contested.points.iter().zip(&refined) {
             best[point as usize].labels[0] = label;
         }
         convergence.refined = contested.points.len();
     }
+    let best_of = best.par_iter().with_min_len(BLOCK);
+    let labels = memory.collect(best_of.clone().map(|best| best.labels[0]));
+    let confidence = memory.collect(best_of.map(Best::confidence));
+    memory.keep(best);
     Ok(Diffused {
-        labels: best.iter().map(|best| best.labels[0]).collect(),
-        confidence: best.iter().map(Best::confidence).collect(),
+        labels,
+        confidence,
         convergence,
     })
 }
@@ -138,13 +153,15 @@ pub fn likelihoods(
     check(a, b, n_labels)?;
     let mut all = vec![0.0; a.len() * n_labels];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let convergence = for_each_pass::<f32, WIDTH_F32>(a, b, &labels, iterations, |lanes, z| {
+    let write = |lanes: &[Lane], z: &Values<f32, WIDTH_F32>| {
         for (i, row) in all.chunks_mut(n_labels).enumerate() {
             for (label, lane) in labels_of(lanes) {
                 row[label as usize] = z.get(i, lane);
             }
         }
-    });
+    };
+    let memory = &mut Memory::of_one_frame();
+    let convergence = for_each_pass(a, b, &labels, iterations, write, memory);
     Ok((all, convergence))
 }
 
@@ -171,6 +188,7 @@ fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
     labels: &[u32],
     iterations: Option<usize>,
     mut done: impl FnMut(&[Lane], &Values<T, WIDTH>),
+    memory: &mut Memory,
 ) -> Convergence {
     let tolerance = if WIDTH == WIDTH_F64 {
         TOLERANCE_F64
@@ -178,25 +196,31 @@ fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
         TOLERANCE_F32
     };
     let mut scheme = Scheme::choose(a, iterations, tolerance);
-    let rows = Rows::new(a);
+    let rows = Rows::new(a, memory);
     let mut convergence = Convergence::default();
     let probe = WIDTH == WIDTH_F32;
     for lanes in plan(b, labels, WIDTH, probe) {
-        let seeds = LaneSeeds::new(b, &lanes);
-        let mut pass = scheme.run(&rows, &seeds);
+        let seeds = LaneSeeds::new(b, &lanes, memory);
+        let mut pass = scheme.run(&rows, &seeds, memory);
         if !matches!(scheme, Scheme::Products(_)) && !pass.is_sound(&lanes, largest_overlap(b)) {
             scheme = iterations.map_or(Scheme::UntilConverged, Scheme::Products);
-            pass = scheme.run(&rows, &seeds);
+            pass.keep_in(memory);
+            pass = scheme.run(&rows, &seeds, memory);
         }
         done(&lanes, &pass.z);
         convergence.merge(pass.convergence());
+        pass.keep_in(memory);
+        seeds.keep_in(memory);
     }
+    rows.keep_in(memory);
     convergence
 }
 
 /// What one pass came to.
 struct Pass<T, const WIDTH: usize> {
     z: Values<T, WIDTH>,
+    /// No longer needed.
+    other: Values<T, WIDTH>,
     sweeps: usize,
     residual: Option<f64>,
     /// What the terms left out may amount to.
@@ -228,12 +252,21 @@ impl Scheme {
         &self,
         rows: &Rows<T>,
         seeds: &LaneSeeds<T>,
+        memory: &mut Memory,
     ) -> Pass<T, WIDTH> {
+        // the first product yields the seeds, the first step of a series its last term
+        let first = match self {
+            Self::Products(_) | Self::UntilConverged => 1.0,
+            Self::Series(series) | Self::ConvergedSeries(series) => {
+                series.coefficients[series.degree()]
+            }
+        };
+        let state = State::new(rows, seeds, T::from_f64(first), memory);
         match self {
-            Self::Products(products) => run_products(rows, seeds, *products),
-            Self::UntilConverged => run_until_converged(rows, seeds),
-            Self::Series(series) => run_series(rows, seeds, series, false),
-            Self::ConvergedSeries(series) => run_series(rows, seeds, series, true),
+            Self::Products(products) => run_products(state, *products),
+            Self::UntilConverged => run_until_converged(state),
+            Self::Series(series) => run_series(state, series, false),
+            Self::ConvergedSeries(series) => run_series(state, series, true),
         }
     }
 }
@@ -252,15 +285,13 @@ fn step<T: Real>((seeds, along, stay, back): (f64, f64, f64, f64)) -> Step<T> {
 }
 
 fn run_products<T: Sweep<WIDTH>, const WIDTH: usize>(
-    rows: &Rows<T>,
-    seeds: &LaneSeeds<T>,
+    mut state: State<T, WIDTH>,
     products: usize,
 ) -> Pass<T, WIDTH> {
-    // from z = 0 the first product yields b
-    let mut state = State::new(rows, seeds, T::from_f64(1.0));
     state.run(&vec![step(PRODUCT); products.saturating_sub(1)]);
     Pass {
         z: state.z,
+        other: state.previous,
         sweeps: products,
         residual: None,
         error: 0.0,
@@ -268,10 +299,8 @@ fn run_products<T: Sweep<WIDTH>, const WIDTH: usize>(
 }
 
 fn run_until_converged<T: Sweep<WIDTH>, const WIDTH: usize>(
-    rows: &Rows<T>,
-    seeds: &LaneSeeds<T>,
+    mut state: State<T, WIDTH>,
 ) -> Pass<T, WIDTH> {
-    let mut state = State::new(rows, seeds, T::from_f64(1.0));
     let mut sweeps = 1;
     while largest_change(&state) > CONVERGED && sweeps < MOST_SWEEPS {
         state.run(&[step(PRODUCT)]);
@@ -282,14 +311,12 @@ fn run_until_converged<T: Sweep<WIDTH>, const WIDTH: usize>(
 
 /// Clenshaw's recurrence: `y_k = c_k b + 2 X y_(k+1) - y_(k+2)`, `X = (A - middle) / half width`.
 fn run_series<T: Sweep<WIDTH>, const WIDTH: usize>(
-    rows: &Rows<T>,
-    seeds: &LaneSeeds<T>,
+    mut state: State<T, WIDTH>,
     series: &Series,
     until_converged: bool,
 ) -> Pass<T, WIDTH> {
     let (middle, half_width) = (series.interval.middle(), series.interval.half_width());
     let degree = series.degree();
-    let mut state = State::new(rows, seeds, T::from_f64(series.coefficients[degree]));
     let step_of = |k: usize| {
         // the last step takes X once, all others twice
         let times = if k == 0 { 1.0 } else { 2.0 };
@@ -304,6 +331,7 @@ fn run_series<T: Sweep<WIDTH>, const WIDTH: usize>(
     }
     Pass {
         z: state.z,
+        other: state.previous,
         sweeps: degree,
         residual: None,
         error,
@@ -320,6 +348,7 @@ fn last_product<T: Sweep<WIDTH>, const WIDTH: usize>(
     let residual = largest_change(&state);
     Pass {
         z: state.previous,
+        other: state.z,
         sweeps: sweeps + 1,
         residual: Some(residual),
         error,
@@ -413,6 +442,11 @@ impl<T: Real, const WIDTH: usize> Pass<T, WIDTH> {
             error,
             refined: 0,
         }
+    }
+
+    fn keep_in(self, memory: &mut Memory) {
+        self.z.keep_in(memory);
+        self.other.keep_in(memory);
     }
 
     /// Whether little is left out, and no likelihood is negative or too large.
@@ -605,7 +639,7 @@ mod tests {
         (a, b)
     }
 
-    fn never() -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
+    fn never(_: &mut Memory) -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
         panic!("single precision tells the winner")
     }
 
@@ -641,7 +675,7 @@ mod tests {
             weights: vec![],
             mass: vec![0.0],
         };
-        let diffused = diffuse(&a, &b, 3, Some(5), never).unwrap();
+        let diffused = diffuse(&a, &b, 3, Some(5), never, &mut Memory::of_one_frame()).unwrap();
         assert_eq!((diffused.labels[0], diffused.confidence[0]), (0, 0.0));
     }
 
@@ -710,7 +744,8 @@ mod tests {
             b.offsets.push(b.labels.len());
             b.mass.push(T::from_f64(lambda * 25.0));
         }
-        a.normalize_rows(&mut b).unwrap();
+        a.normalize_rows(&mut b, &mut Memory::of_one_frame())
+            .unwrap();
         (a, b)
     }
 
@@ -779,9 +814,9 @@ mod tests {
         ) {
             let seen = &seen[..points.len()];
             let (a, b) = system::<f32>(&points, seen, lambda);
-            let double = || Ok(system::<f64>(&points, seen, lambda));
-            let found = diffuse(&a, &b, 30, Some(iterations), double).unwrap();
-            let (a, b) = double().unwrap();
+            let double = |_: &mut Memory| Ok(system::<f64>(&points, seen, lambda));
+            let found = diffuse(&a, &b, 30, Some(iterations), double, &mut Memory::of_one_frame()).unwrap();
+            let (a, b) = system::<f64>(&points, seen, lambda);
             let expected = plain_products(&a, &b, 30, iterations);
             for (i, (label, z)) in found.labels.iter().zip(expected.chunks(30)).enumerate() {
                 let best = z.iter().fold(0.0, |best: f64, &z| best.max(z));

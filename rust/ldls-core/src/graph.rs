@@ -1,7 +1,7 @@
 //! The point graph as a sparse matrix (method, steps 3 and 4).
 
 use crate::neighbors::Adjacency;
-use crate::{Error, Neighbors, PixelLabels, Real, Result};
+use crate::{Error, Memory, Neighbors, PixelLabels, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -71,13 +71,19 @@ impl<T: Real> PointGraph<T> {
                 columns: Arc::new(columns),
             },
             sigma,
+            &mut Memory::of_one_frame(),
         ))
     }
 
     /// The same from rows that begin with the point itself.
-    pub(crate) fn from_adjacency(points: &[[f64; 3]], adjacency: &Adjacency, sigma: f64) -> Self {
+    pub(crate) fn from_adjacency(
+        points: &[[f64; 3]],
+        adjacency: &Adjacency,
+        sigma: f64,
+        memory: &mut Memory,
+    ) -> Self {
         let (count, degree) = (points.len(), adjacency.degree);
-        let mut weights = vec![T::default(); count * degree];
+        let mut weights = memory.filled(count * degree, T::default());
         let rows = weights
             .par_chunks_mut(degree)
             .zip(adjacency.columns.par_chunks(degree))
@@ -145,7 +151,11 @@ impl<T: Real> PointGraph<T> {
     ///
     /// # Errors
     /// [`Error::Mismatch`] where `labels` is of another number of points.
-    pub fn normalize_rows(&mut self, labels: &mut PixelLabels<T>) -> Result<()> {
+    pub fn normalize_rows(
+        &mut self,
+        labels: &mut PixelLabels<T>,
+        memory: &mut Memory,
+    ) -> Result<()> {
         if labels.rows() != self.len() {
             let problem = format!("{} rows, the graph has {}", labels.rows(), self.len());
             return Err(Error::Mismatch {
@@ -159,13 +169,8 @@ impl<T: Real> PointGraph<T> {
             // a row without edges stays empty rather than become NaN
             if sum > 0.0 { 1.0 / sum } else { 0.0 }
         };
-        let scales: Vec<f64> = labels
-            .mass
-            .par_iter()
-            .enumerate()
-            .with_min_len(BLOCK)
-            .map(scale)
-            .collect();
+        let masses = labels.mass.par_iter().enumerate().with_min_len(BLOCK);
+        let scales = memory.collect(masses.map(scale));
         scale_rows(&mut self.weights, &scales, |rows| self.rows.range(rows));
         let range = |rows: Range<usize>| labels.offsets[rows.start]..labels.offsets[rows.end];
         scale_rows(&mut labels.weights, &scales, range);
@@ -174,7 +179,13 @@ impl<T: Real> PointGraph<T> {
             .iter_mut()
             .zip(&scales)
             .for_each(|(mass, scale)| rescale(mass, *scale));
+        memory.keep(scales);
         Ok(())
+    }
+
+    /// Keeps the weights, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.weights);
     }
 
     /// Number of points.
@@ -281,7 +292,9 @@ mod tests {
             mass: vec![0.5; 4],
         };
         let mut graph = chain();
-        graph.normalize_rows(&mut labels).unwrap();
+        graph
+            .normalize_rows(&mut labels, &mut Memory::of_one_frame())
+            .unwrap();
         for i in 0..4 {
             let sum: f32 = graph.row(i).map(|(_, weight)| weight).sum::<f32>() + labels.mass[i];
             assert!((sum - 1.0).abs() < 1e-6, "row {i} sums to {sum}");

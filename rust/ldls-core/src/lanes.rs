@@ -1,6 +1,7 @@
 //! Which labels share a sweep over the graph, and where in a row of values each of them lies.
 
-use crate::{PixelLabels, Real};
+use crate::{Memory, PixelLabels, Real};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Most groups of a pass: one bit each says which of them are in use.
@@ -8,6 +9,8 @@ pub(crate) const MOST_GROUPS: usize = 8;
 /// The same for clouds so large that every group counts: it takes 64 bytes a point.
 const MOST_GROUPS_OF_MANY: usize = 3;
 const MANY_POINTS: usize = 1 << 20;
+/// Rows that one task of the thread pool seeds.
+const ROWS_A_TASK: usize = 4096;
 
 /// Groups of lanes that a pass over `points` points may have.
 pub(crate) fn most_groups(points: usize) -> usize {
@@ -108,7 +111,7 @@ pub(crate) struct LaneSeeds<T> {
 }
 
 impl<T: Real> LaneSeeds<T> {
-    pub(crate) fn new(b: &PixelLabels<T>, pass: &[Lane]) -> Self {
+    pub(crate) fn new(b: &PixelLabels<T>, pass: &[Lane], memory: &mut Memory) -> Self {
         let lane_of = |label: usize| {
             pass.iter()
                 .position(|lane| *lane == Lane::Label(label as u32))
@@ -117,17 +120,23 @@ impl<T: Real> LaneSeeds<T> {
         let n_labels = b.labels.iter().max().map_or(0, |&label| label as usize + 1);
         let lanes: Vec<Option<u32>> = (0..n_labels).map(lane_of).collect();
         let probe = pass.iter().position(|lane| *lane == Lane::Probe);
+        let has_background = pass.get(BACKGROUND_LANE) == Some(&Lane::Label(0));
+        let background = |i: usize| {
+            if has_background {
+                background_of(b, i)
+            } else {
+                T::default()
+            }
+        };
+        let points = || (0..b.rows()).into_par_iter().with_min_len(ROWS_A_TASK);
         let mut seeds = Self {
-            background: vec![T::default(); b.rows()],
+            background: memory.collect(points().map(background)),
             lanes: pass.len(),
             least: T::from_f64(T::NEGLIGIBLE * largest_weight(b)),
-            offsets: Vec::with_capacity(b.rows() + 1),
-            entries: Vec::new(),
-            probe: probe.map(|lane| (lane, probe_seeds(b))),
+            offsets: memory.empty(b.rows() + 1),
+            entries: memory.empty(0),
+            probe: probe.map(|lane| (lane, memory.collect(points().map(|i| probe_seed(b, i))))),
         };
-        if pass.get(BACKGROUND_LANE) == Some(&Lane::Label(0)) {
-            seeds.background = (0..b.rows()).map(|i| background_of(b, i)).collect();
-        }
         seeds.offsets.push(0);
         for i in 0..b.rows() {
             let others = b.row(i).filter(|&(label, _)| label > 0);
@@ -137,6 +146,16 @@ impl<T: Real> LaneSeeds<T> {
             seeds.offsets.push(seeds.entries.len() as u32);
         }
         seeds
+    }
+
+    /// Keeps the vectors, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.background);
+        memory.keep(self.offsets);
+        memory.keep(self.entries);
+        if let Some((_, seeds)) = self.probe {
+            memory.keep(seeds);
+        }
     }
 
     /// For each block of `block` rows, bit g where lanes of group g have seeds.
@@ -178,9 +197,9 @@ fn background_of<T: Real>(b: &PixelLabels<T>, i: usize) -> T {
         .map_or(T::default(), |(_, weight)| weight)
 }
 
-fn probe_seeds<T: Real>(b: &PixelLabels<T>) -> Vec<T> {
+fn probe_seed<T: Real>(b: &PixelLabels<T>, i: usize) -> T {
     let signed = |(label, weight): (usize, T)| T::from_f64(random_sign(label)) * weight;
-    (0..b.rows()).map(|i| b.row(i).map(signed).sum()).collect()
+    b.row(i).map(signed).sum()
 }
 
 /// Plus or minus one, without a pattern.

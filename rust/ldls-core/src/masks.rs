@@ -2,7 +2,7 @@
 
 use crate::camera::nearest_pixel;
 use crate::rle::check_size;
-use crate::{Error, Real, Result, Rle};
+use crate::{Error, Memory, Real, Result, Rle};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -107,23 +107,30 @@ impl InstanceMasks {
         uv: &[[f64; 2]],
         window: usize,
         pixel_weight: f64,
+        memory: &mut Memory,
     ) -> Result<PixelLabels<T>> {
-        let pixels = self.nearest_pixels(uv)?;
-        let image = LabelImage::paint(self);
-        let n = pixels.len();
-        let blocks: Vec<PixelLabels<T>> = (0..n.div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|block| {
-                let mut labels = PixelLabels::default();
+        let image = LabelImage::paint(self, memory);
+        let count = uv.len().div_ceil(BLOCK);
+        let mut blocks: Vec<PixelLabels<T>> = memory.as_left(count);
+        let outcomes: Vec<Result<()>> = blocks
+            .par_iter_mut()
+            .zip(uv.par_chunks(BLOCK))
+            .enumerate()
+            .map(|(block, (labels, uv))| {
+                labels.clear();
                 let mut counts = WindowCounts::default();
-                for &pixel in &pixels[block * BLOCK..n.min((block + 1) * BLOCK)] {
-                    image.count(pixel, window / 2, &mut counts);
+                for (i, &uv) in (block * BLOCK..).zip(uv) {
+                    image.count(self.nearest_pixel(i, uv)?, window / 2, &mut counts);
                     labels.push(&counts, pixel_weight);
                 }
-                labels
+                Ok(())
             })
             .collect();
-        Ok(PixelLabels::concatenate(&blocks))
+        memory.keep(image.pixels);
+        outcomes.into_iter().collect::<Result<()>>()?;
+        let labels = PixelLabels::concatenate(&blocks[..count], memory);
+        memory.keep_as_is(blocks);
+        Ok(labels)
     }
 
     /// Direct projection: the label of the pixel nearest to each of `uv`; of several masks, the first.
@@ -131,25 +138,26 @@ impl InstanceMasks {
     /// # Errors
     /// As [`InstanceMasks::pixel_labels`].
     pub fn direct_labels(&self, uv: &[[f64; 2]]) -> Result<Vec<u32>> {
-        let image = LabelImage::paint(self);
-        let label = |pixel| image.labels_of(image.set_at(pixel)).last().unwrap_or(0);
-        Ok(self.nearest_pixels(uv)?.into_iter().map(label).collect())
+        let image = LabelImage::paint(self, &mut Memory::of_one_frame());
+        let label = |(i, &uv): (usize, &[f64; 2])| {
+            let set = image.set_at(self.nearest_pixel(i, uv)?);
+            Ok(image.labels_of(set).last().unwrap_or(0))
+        };
+        uv.iter().enumerate().map(label).collect()
     }
 
-    fn nearest_pixels(&self, uv: &[[f64; 2]]) -> Result<Vec<[usize; 2]>> {
-        let nearest = |(i, &uv): (usize, &[f64; 2])| {
-            nearest_pixel(uv, self.height, self.width).ok_or_else(|| {
-                let problem = format!(
-                    "row {i} is at ({}, {}), outside the image of {} x {}",
-                    uv[0], uv[1], self.height, self.width
-                );
-                Error::Mismatch {
-                    name: "pixels",
-                    problem,
-                }
-            })
-        };
-        uv.iter().enumerate().map(nearest).collect()
+    /// The pixel nearest to `uv`, that of point `i`.
+    fn nearest_pixel(&self, i: usize, uv: [f64; 2]) -> Result<[usize; 2]> {
+        nearest_pixel(uv, self.height, self.width).ok_or_else(|| {
+            let problem = format!(
+                "row {i} is at ({}, {}), outside the image of {} x {}",
+                uv[0], uv[1], self.height, self.width
+            );
+            Error::Mismatch {
+                name: "pixels",
+                problem,
+            }
+        })
     }
 }
 
@@ -188,6 +196,13 @@ impl<T: Real> PixelLabels<T> {
         })
     }
 
+    fn clear(&mut self) {
+        self.offsets.clear();
+        self.labels.clear();
+        self.weights.clear();
+        self.mass.clear();
+    }
+
     fn push(&mut self, counts: &WindowCounts, pixel_weight: f64) {
         for &(label, count) in &counts.labels {
             self.labels.push(label);
@@ -199,11 +214,16 @@ impl<T: Real> PixelLabels<T> {
         self.offsets.push(self.labels.len());
     }
 
-    fn concatenate(blocks: &[Self]) -> Self {
+    fn concatenate(blocks: &[Self], memory: &mut Memory) -> Self {
+        let points: usize = blocks.iter().map(Self::rows).sum();
+        let entries = blocks.iter().map(|block| block.labels.len()).sum();
         let mut all = Self {
-            offsets: vec![0],
-            ..Self::default()
+            offsets: memory.empty(points + 1),
+            labels: memory.empty(entries),
+            weights: memory.empty(entries),
+            mass: memory.empty(points),
         };
+        all.offsets.push(0);
         for block in blocks {
             let start = all.labels.len();
             all.offsets
@@ -213,6 +233,14 @@ impl<T: Real> PixelLabels<T> {
             all.mass.extend_from_slice(&block.mass);
         }
         all
+    }
+
+    /// Keeps the vectors, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.offsets);
+        memory.keep(self.labels);
+        memory.keep(self.weights);
+        memory.keep(self.mass);
     }
 
     /// Number of points.
@@ -260,11 +288,11 @@ struct LabelSet {
 }
 
 impl LabelImage {
-    fn paint(masks: &InstanceMasks) -> Self {
+    fn paint(masks: &InstanceMasks, memory: &mut Memory) -> Self {
         let mut image = Self {
             height: masks.height,
             width: masks.width,
-            pixels: vec![0; masks.height * masks.width],
+            pixels: memory.filled(masks.height * masks.width, 0),
             sets: vec![LabelSet { label: 0, rest: 0 }],
         };
         for (m, mask) in masks.masks.iter().enumerate() {
@@ -364,7 +392,7 @@ mod tests {
     #[test]
     fn a_window_at_the_corner_has_fewer_pixels() {
         let labels = masks(6, 6, &[vec![true; 36]])
-            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0)
+            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0, &mut Memory::of_one_frame())
             .unwrap();
         assert_eq!(
             (labels.mass[0], labels.row(0).collect::<Vec<_>>()),
@@ -378,7 +406,7 @@ mod tests {
             pixels in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 63), 0..4),
             u in -0.5..8.49_f64, v in -0.5..6.49_f64, reach in 0_usize..4,
         ) {
-            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0).unwrap();
+            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, &mut Memory::of_one_frame()).unwrap();
             let mut expected = vec![0.0_f32; pixels.len() + 1];
             let mut mass = 0.0;
             for row in 0..7_usize {

@@ -7,6 +7,7 @@
 //! differ by its rounding, so a search keeps a few points more than it needs, and double precision decides
 //! among them. Where that is not enough (lattices, many coincident points), the point searches alone.
 
+use crate::Memory;
 use crate::graph::squared_distance;
 use crate::kdtree::{Boxes, FAN, KdTree};
 use multiversion::multiversion;
@@ -33,8 +34,9 @@ impl Neighbors {
     /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; the point itself is none
     /// of them.
     pub fn search(points: &[[f64; 3]], k: usize) -> Self {
-        let tree = KdTree::new(points);
-        let found = Adjacency::search(&tree, &tree.arrange(points), k);
+        let memory = &mut Memory::of_one_frame();
+        let tree = KdTree::new(points, memory);
+        let found = Adjacency::search(&tree, &tree.arrange(points, memory), k, memory);
         let k = found.degree - 1;
         let mut indices = vec![0; points.len() * k];
         if k > 0 {
@@ -71,9 +73,14 @@ pub(crate) struct Adjacency {
 
 impl Adjacency {
     /// The `k` nearest neighbours of `points`, which are in the order of their `tree`.
-    pub(crate) fn search(tree: &KdTree, points: &[[f64; 3]], k: usize) -> Self {
+    pub(crate) fn search(
+        tree: &KdTree,
+        points: &[[f64; 3]],
+        k: usize,
+        memory: &mut Memory,
+    ) -> Self {
         let degree = k.min(points.len().saturating_sub(1)) + 1;
-        let mut columns = vec![0; points.len() * degree];
+        let mut columns = memory.filled(points.len() * degree, 0);
         let tasks = columns
             .par_chunks_mut(degree * FAN * LEAVES_A_TASK)
             .enumerate();
@@ -91,6 +98,13 @@ impl Adjacency {
         Self {
             degree,
             columns: Arc::new(columns),
+        }
+    }
+
+    /// Keeps the columns, if no graph has them any more.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        if let Ok(columns) = Arc::try_unwrap(self.columns) {
+            memory.keep(columns);
         }
     }
 
@@ -644,7 +658,9 @@ mod tests {
             neighbors.indices[119_999 * 10..],
             [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
         );
-        let adjacency = Adjacency::search(&KdTree::new(&points), &points, 10);
+        let memory = &mut Memory::of_one_frame();
+        let tree = KdTree::new(&points, memory);
+        let adjacency = Adjacency::search(&tree, &points, 10, memory);
         assert_eq!(adjacency.duplicates(&points), 120_000);
         assert!(adjacency.only_islands(&points));
     }

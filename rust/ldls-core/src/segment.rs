@@ -4,8 +4,8 @@ use crate::components::keep_largest_by_index;
 use crate::kdtree::{KdTree, arrange};
 use crate::neighbors::Adjacency;
 use crate::{
-    Camera, Cloud, Convergence, Error, InstanceMasks, Params, PixelLabels, PointGraph, Real,
-    Result, View, ViewCounts, diffuse,
+    Camera, Cloud, Convergence, Error, InstanceMasks, Memory, Params, PixelLabels, PointGraph,
+    Real, Result, View, ViewCounts, diffuse,
 };
 use std::time::{Duration, Instant};
 
@@ -65,7 +65,8 @@ pub struct Timings {
 
 /// Segments `cloud` by the instance masks of the image that `camera` took.
 ///
-/// Points at exactly (0, 0, 0) are taken for missing returns unless `keep_origin` is set.
+/// Points at exactly (0, 0, 0) are taken for missing returns unless `keep_origin` is set. A stream of frames hands on
+/// one `memory`; a single frame takes a new one.
 ///
 /// # Errors
 /// Whatever [`Params::check`] and [`Camera::view`] refuse, and [`Error::TooManyPoints`].
@@ -75,41 +76,43 @@ pub fn segment(
     camera: &Camera,
     params: &Params,
     keep_origin: bool,
+    memory: &mut Memory,
 ) -> Result<Segmentation> {
     params.check()?;
     check_edges(cloud.len(), params.neighbors)?;
     let mut clock = Stopwatch::start();
 
-    let mut view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
+    let mut view = camera.view(cloud, masks.height(), masks.width(), keep_origin, memory)?;
     let project = clock.lap();
     // from here on, rows are in the order of the tree: near points are near in memory
-    let tree = KdTree::new(&view.points);
-    let points = tree.arrange(&std::mem::take(&mut view.points));
-    let adjacency = Adjacency::search(&tree, &points, params.neighbors);
-    let order = tree.order;
+    let tree = KdTree::new(&view.points, memory);
+    let points = tree.arrange(&view.points, memory);
+    memory.keep(std::mem::take(&mut view.points));
+    let adjacency = Adjacency::search(&tree, &points, params.neighbors, memory);
+    let order = tree.into_order(memory);
     let neighbors = clock.lap();
-    let pixels = masks.pixel_labels(
-        &arrange(&order, &view.uv),
-        params.window,
-        params.pixel_weight,
-    )?;
+    let uv = arrange(&order, &view.uv, memory);
+    let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight, memory)?;
+    memory.keep(uv);
     let pixel_labels = clock.lap();
-    let (a, b) = normalized_graph::<f32>(&points, &adjacency, pixels, params)?;
+    let (a, b) = normalized_graph::<f32>(&points, &adjacency, pixels, params, memory)?;
     let graph = clock.lap();
-    let diffused = diffuse(&a, &b, masks.len() + 1, params.iterations, || {
-        let uv = arrange(&order, &view.uv);
-        let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight)?;
-        normalized_graph::<f64>(&points, &adjacency, pixels, params)
-    })?;
+    let exact = |memory: &mut Memory| {
+        let uv = arrange(&order, &view.uv, memory);
+        let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight, memory)?;
+        memory.keep(uv);
+        normalized_graph::<f64>(&points, &adjacency, pixels, params, memory)
+    };
+    let diffused = diffuse(&a, &b, masks.len() + 1, params.iterations, exact, memory)?;
     let diffusion = clock.lap();
     let kept = if params.remove_outliers {
-        Some(keep_largest_by_index(&a, &diffused.labels, &order)?)
+        Some(keep_largest_by_index(&a, &diffused.labels, &order, memory)?)
     } else {
         None
     };
     let components = clock.lap();
 
-    let rows = arrange(&order, &view.indices);
+    let rows = arrange(&order, &view.indices, memory);
     let whole_cloud = |labels: &[u32]| {
         scatter(
             cloud.len(),
@@ -118,7 +121,7 @@ pub fn segment(
             labels.iter().map(|&m| m as i32),
         )
     };
-    Ok(Segmentation {
+    let segmentation = Segmentation {
         labels: whole_cloud(kept.as_ref().unwrap_or(&diffused.labels)),
         diffused_labels: whole_cloud(&diffused.labels),
         confidence: scatter(cloud.len(), &rows, 0.0, diffused.confidence.iter().copied()),
@@ -138,7 +141,17 @@ pub fn segment(
             components,
         },
         view,
-    })
+    };
+    a.keep_in(memory);
+    b.keep_in(memory);
+    adjacency.keep_in(memory);
+    diffused.keep_in(memory);
+    memory.keep(points);
+    [order, rows]
+        .into_iter()
+        .chain(kept)
+        .for_each(|vector| memory.keep(vector));
+    Ok(segmentation)
 }
 
 /// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
@@ -147,9 +160,10 @@ fn normalized_graph<T: Real>(
     adjacency: &Adjacency,
     mut pixels: PixelLabels<T>,
     params: &Params,
+    memory: &mut Memory,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
-    let mut graph = PointGraph::from_adjacency(points, adjacency, params.sigma);
-    graph.normalize_rows(&mut pixels)?;
+    let mut graph = PointGraph::from_adjacency(points, adjacency, params.sigma, memory);
+    graph.normalize_rows(&mut pixels, memory)?;
     Ok((graph, pixels))
 }
 

@@ -6,6 +6,7 @@
 //! region that is still to come are left to that one, a ring of tiles more with every step ("sparse tiling": Strout
 //! et al., Int. J. High Performance Computing Applications 18(1), 2004). What is computed does not depend on it.
 
+use crate::Memory;
 use crate::blocks::{BLOCK, Blocks};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -32,56 +33,60 @@ pub(crate) struct Tiles {
 }
 
 impl Tiles {
-    pub(crate) fn new(blocks: &Blocks) -> Self {
-        Self::in_regions(blocks, REGION)
+    pub(crate) fn new(blocks: &Blocks, memory: &mut Memory) -> Self {
+        Self::in_regions(blocks, REGION, memory)
     }
 
-    /// Regions of `region` tiles each.
-    fn in_regions(blocks: &Blocks, region_tiles: usize) -> Self {
+    /// Regions of `size` tiles each.
+    fn in_regions(blocks: &Blocks, size: usize, memory: &mut Memory) -> Self {
         let tiles = blocks.rows().div_ceil(TILE);
-        if tiles <= region_tiles {
-            return Self {
-                rows: blocks.rows(),
-                round: 1,
-                order: (0..tiles as u32).collect(),
-                offsets: vec![0, tiles],
-            };
-        }
-        let adjacent = Adjacent::new(blocks, tiles);
-        let regions = tiles.div_ceil(region_tiles);
-        let mut region: Vec<u32> = (0..tiles)
-            .map(|tile| (tile / region_tiles) as u32)
-            .collect();
-        let mut places: Vec<Vec<u32>> = vec![Vec::new(); regions * ROUND];
-        for step in 0..ROUND {
-            for (tile, &region) in region.iter().enumerate() {
-                places[region as usize * ROUND + step].push(tile as u32);
+        let round = if tiles <= size { 1 } else { ROUND };
+        // the region of each tile in each step: what must wait for a later region is left to that one
+        let mut regions = memory.empty(tiles * round);
+        regions.extend((0..tiles).map(|tile| (tile / size) as u32));
+        if round > 1 {
+            let edges = edges(blocks, memory);
+            for step in 1..round {
+                regions.extend_from_within((step - 1) * tiles..);
+                let (before, after) = regions.split_at_mut(step * tiles);
+                let before = &before[(step - 1) * tiles..];
+                for &[a, b] in &edges {
+                    let [a, b] = [a as usize, b as usize];
+                    after[a] = after[a].max(before[b]);
+                    after[b] = after[b].max(before[a]);
+                }
             }
-            // a tile needs this step of all tiles next to it before it takes the next one
-            let last = |tile: usize| {
-                let others = adjacent
-                    .of(tile)
-                    .iter()
-                    .map(|&other| region[other as usize]);
-                others.fold(region[tile], u32::max)
-            };
-            region = (0..tiles)
-                .into_par_iter()
-                .with_min_len(1024)
-                .map(last)
-                .collect();
+            memory.keep(edges);
         }
-        let mut offsets = vec![0];
-        offsets.extend(places.iter().scan(0, |end, place| {
-            *end += place.len();
-            Some(*end)
-        }));
+        // sorted by region and step
+        let place = |at: usize| regions[at] as usize * round + at / tiles;
+        let mut offsets = memory.filled(tiles.div_ceil(size) * round + 1, 0);
+        (0..regions.len()).for_each(|at| offsets[place(at) + 1] += 1);
+        for at in 1..offsets.len() {
+            offsets[at] += offsets[at - 1];
+        }
+        let mut order = memory.filled(regions.len(), 0);
+        for at in 0..regions.len() {
+            let next = &mut offsets[place(at)];
+            order[*next] = (at % tiles) as u32;
+            *next += 1;
+        }
+        // each place now begins where it ended
+        offsets.rotate_right(1);
+        offsets[0] = 0;
+        memory.keep(regions);
         Self {
             rows: blocks.rows(),
-            round: ROUND,
-            order: places.concat(),
+            round,
+            order,
             offsets,
         }
+    }
+
+    /// Keeps the vectors, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.order);
+        memory.keep(self.offsets);
     }
 
     /// Calls `work(rows, step)` for steps 0 to `steps` - 1 of every tile of rows, on all threads of the pool.
@@ -107,51 +112,23 @@ impl Tiles {
     }
 }
 
-/// Which tiles have edges to or from one another.
-struct Adjacent {
-    offsets: Vec<usize>,
-    tiles: Vec<u32>,
-}
-
-impl Adjacent {
-    fn new(blocks: &Blocks, count: usize) -> Self {
-        let of_tile = |tile: usize| {
-            let range = tile * TILE / BLOCK..blocks.len().min((tile + 1) * TILE / BLOCK);
-            let mut others = Vec::new();
-            for &source in range.flat_map(|block| blocks.sources(block)) {
-                let other = source / (TILE / BLOCK) as u32;
-                if other != tile as u32 && !others.contains(&other) {
-                    others.push(other);
-                }
-            }
-            others
-        };
-        let sources: Vec<Vec<u32>> = (0..count)
-            .into_par_iter()
-            .with_min_len(256)
-            .map(of_tile)
-            .collect();
-        let mut all = sources.clone();
-        for (tile, sources) in sources.iter().enumerate() {
-            for &source in sources {
-                all[source as usize].push(tile as u32);
+/// The pairs of different tiles with edges from one to the other, some of them twice.
+fn edges(blocks: &Blocks, memory: &mut Memory) -> Vec<[u32; 2]> {
+    let mut edges = memory.empty(0);
+    // at which tile each was last met
+    let mut met = memory.filled(blocks.rows().div_ceil(TILE), u32::MAX);
+    for block in 0..blocks.len() {
+        let tile = (block * BLOCK / TILE) as u32;
+        met[tile as usize] = tile;
+        for &source in blocks.sources(block) {
+            let other = source / (TILE / BLOCK) as u32;
+            if std::mem::replace(&mut met[other as usize], tile) != tile {
+                edges.push([tile, other]);
             }
         }
-        let mut offsets = vec![0];
-        offsets.extend(all.iter().scan(0, |end, tiles| {
-            *end += tiles.len();
-            Some(*end)
-        }));
-        Self {
-            offsets,
-            tiles: all.concat(),
-        }
     }
-
-    /// The tiles next to `tile`, some of them twice.
-    fn of(&self, tile: usize) -> &[u32] {
-        &self.tiles[self.offsets[tile]..self.offsets[tile + 1]]
-    }
+    memory.keep(met);
+    edges
 }
 
 #[cfg(test)]
@@ -180,14 +157,16 @@ mod tests {
             region in 1_usize..20,
             steps in 0_usize..30,
         ) {
-            let blocks = Blocks::new(&graph(rows, &reaches));
+            let memory = &mut Memory::of_one_frame();
+            let blocks = Blocks::new(&graph(rows, &reaches), memory);
             let count = rows.div_ceil(TILE);
-            let adjacent = Adjacent::new(&blocks, count);
+            let edges = edges(&blocks, memory);
             let taken: Vec<AtomicUsize> = (0..count).map(|_| AtomicUsize::new(0)).collect();
             let violations = AtomicUsize::new(0);
-            Tiles::in_regions(&blocks, region).run(steps, |rows, step| {
+            Tiles::in_regions(&blocks, region, memory).run(steps, |rows, step| {
                 let tile = rows.start / TILE;
-                let ready = adjacent.of(tile).iter().all(|&other| {
+                let of_tile = edges.iter().filter(|edge| edge.contains(&(tile as u32)));
+                let ready = of_tile.flatten().all(|&other| {
                     // this step at most: it may be about to take it, or have taken it
                     [step, step + 1].contains(&taken[other as usize].load(SeqCst))
                 });
@@ -203,7 +182,9 @@ mod tests {
     #[test]
     fn a_large_cloud_is_divided_and_most_of_a_region_takes_all_steps_of_a_round_at_once() {
         let rows = 4 * REGION * TILE;
-        let tiles = Tiles::new(&Blocks::new(&graph(rows, &[1])));
+        let memory = &mut Memory::of_one_frame();
+        let blocks = Blocks::new(&graph(rows, &[1]), memory);
+        let tiles = Tiles::new(&blocks, memory);
         assert_eq!((tiles.round, tiles.offsets.len() - 1), (ROUND, 4 * ROUND));
         let last = tiles.offsets.windows(2).nth(ROUND - 1).unwrap();
         assert!(last[1] - last[0] > REGION / 2);

@@ -2,9 +2,8 @@
 //!
 //! Which thread may touch which rows when is the business of [`crate::tiles`], which orders the steps of tiles of rows.
 
-use crate::Real;
 use crate::lanes::MOST_GROUPS;
-use rayon::prelude::*;
+use crate::{Memory, Real};
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -27,15 +26,21 @@ struct GroupValues<T, const WIDTH: usize> {
 }
 
 impl<T: Real, const WIDTH: usize> GroupValues<T, WIDTH> {
-    fn zero(points: usize) -> Self {
-        let spare = ALIGNMENT / size_of::<T>();
-        let buffer = vec![T::default(); points * WIDTH + spare];
-        let start = buffer.as_ptr().align_offset(ALIGNMENT).min(spare);
+    /// From zeros in `buffer`, of which there are as many as `length_for` says.
+    fn new(buffer: Vec<T>, points: usize) -> Self {
+        let start = buffer.as_ptr().align_offset(ALIGNMENT).min(Self::SPARE);
         Self {
             buffer,
             start,
             points,
         }
+    }
+
+    /// Values beyond those of the rows, so that rows can begin where memory is aligned.
+    const SPARE: usize = ALIGNMENT / size_of::<T>();
+
+    fn length_for(points: usize) -> usize {
+        points * WIDTH + Self::SPARE
     }
 
     #[inline(always)]
@@ -51,13 +56,18 @@ impl<T: Real, const WIDTH: usize> GroupValues<T, WIDTH> {
 
 impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
     /// Zeros at `points` points.
-    pub(crate) fn zero(points: usize, groups: usize) -> Self {
-        Self(
-            (0..groups)
-                .into_par_iter()
-                .map(|_| GroupValues::zero(points))
-                .collect(),
-        )
+    pub(crate) fn zero(points: usize, groups: usize, memory: &mut Memory) -> Self {
+        let length = GroupValues::<T, WIDTH>::length_for(points);
+        let buffers = memory.filled_together(groups, length, &T::default());
+        let group = |buffer| GroupValues::new(buffer, points);
+        Self(buffers.into_iter().map(group).collect())
+    }
+
+    /// Keeps the vectors, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        self.0
+            .into_iter()
+            .for_each(|group| memory.keep(group.buffer));
     }
 
     /// The values of `group` at all points.

@@ -47,12 +47,25 @@ pub fn run<T: Send>(
     }
 }
 
+/// Runs `work` on the first thread of `pool`: always the same one, so that what a frame took from the allocator's store
+/// of that thread lies there for the next frame. The other threads share in what it divides.
 fn on_pool<T: Send>(
     py: Python<'_>,
     pool: &ThreadPool,
     work: impl FnOnce() -> T + Send,
 ) -> std::thread::Result<T> {
-    py.detach(|| catch_unwind(AssertUnwindSafe(|| pool.install(work))))
+    let work = Mutex::new(Some(work));
+    py.detach(|| {
+        let outcomes = pool.broadcast(|thread| {
+            let work = (thread.index() == 0).then(|| lock(&work).take())??;
+            Some(catch_unwind(AssertUnwindSafe(work)))
+        });
+        outcomes
+            .into_iter()
+            .flatten()
+            .next()
+            .expect("a pool has a first thread")
+    })
 }
 
 /// Number of threads where none is asked for: `LDLS_NUM_THREADS`, or the cores that the process may use by affinity

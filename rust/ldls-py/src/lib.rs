@@ -22,7 +22,7 @@ mod _ldls {
     #[pymodule_export]
     use crate::masks::{Masks, Rle};
     #[pymodule_export]
-    use crate::memory::KeepMemory;
+    use crate::memory::StreamMemory;
     #[pymodule_export]
     use crate::segment::{SegmentationArrays, check_camera, check_params, segment};
     #[pymodule_export]

@@ -1,62 +1,47 @@
 //! The memory that one frame leaves for the next.
-//!
-//! A frame takes some hundred bytes a point and gives them back at its end. If they went back to the system, the next
-//! frame would fetch them page by page, and the kernel would clear each: a third of the time of a large cloud. So the
-//! allocator keeps them for a while, and for as long as a stream of frames lives.
 
-use libmimalloc_sys::{mi_collect, mi_option_set, mi_option_t};
+use ldls_core::Memory;
+use libmimalloc_sys::{mi_option_set, mi_option_t};
 use pyo3::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
 
-/// Keeps what a frame leaves.
+/// Without it, what a frame gives back would go to the system, and the next would fetch it page by page, each of them
+/// cleared by the kernel: a third of the time of a large cloud.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// `mi_option_purge_delay`: milliseconds for which free memory is kept, -1 for ever.
+/// `mi_option_purge_delay`: milliseconds for which the allocator keeps free memory.
 const PURGE_DELAY: mi_option_t = 15;
-/// The frames of a sensor come more often.
+/// Longer than a frame of ten million points takes.
 const A_WHILE: i64 = 10_000;
-const FOR_EVER: i64 = -1;
 
-/// Streams that live.
-static STREAMS: AtomicUsize = AtomicUsize::new(0);
+/// To be called once, when the module is loaded: lets the allocator keep free memory for a while.
+#[expect(unsafe_code, reason = "the allocator is a C library")]
+pub fn keep_for_a_while() {
+    // SAFETY: sets a number that the allocator reads when it frees memory; any thread may at any time
+    unsafe { mi_option_set(PURGE_DELAY, A_WHILE as _) };
+}
 
-/// While one of these lives, memory that a frame leaves is kept.
+/// The memory of a stream: one set of vectors for each frame that runs at a time.
 #[pyclass(frozen, module = "ldls._ldls")]
-pub struct KeepMemory(());
+#[derive(Default)]
+pub struct StreamMemory(Mutex<Vec<Memory>>);
 
 #[pymethods]
-impl KeepMemory {
+impl StreamMemory {
     #[new]
     fn new() -> Self {
-        STREAMS.fetch_add(1, Relaxed);
-        set_purge_delay(FOR_EVER);
-        Self(())
+        Self::default()
     }
 }
 
-impl Drop for KeepMemory {
-    fn drop(&mut self) {
-        if STREAMS.fetch_sub(1, Relaxed) == 1 {
-            set_purge_delay(A_WHILE);
-            give_back();
-        }
+impl StreamMemory {
+    /// Calls `work` with memory that no other frame has meanwhile. What a frame that panics had is lost to the next.
+    pub fn lend<T>(&self, work: impl FnOnce(&mut Memory) -> T) -> T {
+        let spare = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut memory = spare().pop().unwrap_or_else(Memory::of_stream);
+        let outcome = work(&mut memory);
+        spare().push(memory);
+        outcome
     }
-}
-
-/// To be called once, when the module is loaded.
-pub fn keep_for_a_while() {
-    set_purge_delay(A_WHILE);
-}
-
-#[expect(unsafe_code, reason = "the allocator is a C library")]
-fn set_purge_delay(milliseconds: i64) {
-    // SAFETY: sets a number that the allocator reads when it frees memory; any thread may at any time
-    unsafe { mi_option_set(PURGE_DELAY, milliseconds as _) };
-}
-
-#[expect(unsafe_code, reason = "the allocator is a C library")]
-fn give_back() {
-    // SAFETY: returns memory that nobody uses; any thread may at any time
-    unsafe { mi_collect(true) };
 }

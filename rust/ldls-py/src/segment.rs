@@ -3,7 +3,8 @@
 use crate::arrays::{Points, matrix, slice};
 use crate::call::run;
 use crate::masks::Masks;
-use ldls_core::{Params, Timings};
+use crate::memory::StreamMemory;
+use ldls_core::{Memory, Params, Timings};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -39,7 +40,7 @@ pub struct SegmentationArrays {
 
 /// Segments points by the masks of the image that the camera took.
 #[pyfunction]
-#[pyo3(signature = (points, masks, projection, t_camera_lidar, min_depth_m, params, keep_origin, threads))]
+#[pyo3(signature = (points, masks, projection, t_camera_lidar, min_depth_m, params, keep_origin, threads, memory))]
 #[expect(
     clippy::too_many_arguments,
     reason = "the face in Python has few; here each is one extraction"
@@ -54,12 +55,19 @@ pub fn segment(
     params: ParamsTuple,
     keep_origin: bool,
     threads: Option<usize>,
+    memory: Option<&StreamMemory>,
 ) -> PyResult<SegmentationArrays> {
     let camera = camera(py, &projection, &t_camera_lidar, min_depth_m)?;
     let cloud = points.cloud(py)?;
     let params = params.params();
     let found = run(py, threads, || {
-        ldls_core::segment(cloud, &masks.0, &camera, &params, keep_origin)
+        let segment = |memory: &mut Memory| {
+            ldls_core::segment(cloud, &masks.0, &camera, &params, keep_origin, memory)
+        };
+        match memory {
+            Some(stream) => stream.lend(segment),
+            None => segment(&mut Memory::of_one_frame()),
+        }
     })?;
     let report = report(py, &found.report)?;
     let in_view: Vec<i64> = found

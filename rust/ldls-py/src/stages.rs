@@ -7,7 +7,7 @@ use crate::arrays::{
 use crate::call::run;
 use crate::masks::Masks;
 use crate::segment::camera;
-use ldls_core::PointGraph;
+use ldls_core::{Memory, PointGraph};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
@@ -40,7 +40,13 @@ pub fn project(
     let camera = camera(py, &projection, &t_camera_lidar, min_depth_m)?;
     let cloud = points.cloud(py)?;
     let view = run(py, threads, || {
-        camera.view(cloud, height, width, keep_origin)
+        camera.view(
+            cloud,
+            height,
+            width,
+            keep_origin,
+            &mut Memory::of_one_frame(),
+        )
     })?;
     let indices: Vec<i64> = view.indices.iter().map(|&index| i64::from(index)).collect();
     Ok((
@@ -107,7 +113,9 @@ pub fn pixel_labels(
 ) -> PyResult<PixelLabelArrays> {
     let pixels = rows::<2>(py, "pixels", &pixels)?;
     let labels = run(py, threads, || {
-        masks.0.pixel_labels(&pixels, window, pixel_weight)
+        masks
+            .0
+            .pixel_labels(&pixels, window, pixel_weight, &mut Memory::of_one_frame())
     })?;
     Ok(label_arrays(py, labels))
 }
@@ -134,7 +142,9 @@ pub fn normalize_rows(
 ) -> PyResult<(CsrArrays, PixelLabelArrays)> {
     let mut graph = graph(py, &point_graph)?;
     let mut labels = labels_of(py, &labels, slice(py, "mass", &mass)?.to_vec())?;
-    run(py, None, || graph.normalize_rows(&mut labels))?;
+    run(py, None, || {
+        graph.normalize_rows(&mut labels, &mut Memory::of_one_frame())
+    })?;
     let (offsets, columns, weights) = graph.into_csr();
     Ok((
         csr_arrays(py, &offsets, &columns, weights),
