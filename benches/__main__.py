@@ -6,6 +6,7 @@ import argparse
 import os
 import statistics
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
@@ -170,6 +171,27 @@ def thread_scaling(measured: Frame, threads: int, runs: int, _most: int) -> Tabl
     return table
 
 
+def batch(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+    """Frames of a batch one after the other on all threads, against one a thread."""
+    frames = 8 * threads
+    table = _table(f"{frames} frames, {measured.name}", ["frames", "ms a frame", "ratio"], f"{threads} threads")
+
+    def one_after_the_other() -> None:
+        stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=threads))
+        for _ in range(frames):
+            stream.segment(measured.points, measured.masks)
+
+    def one_a_thread() -> None:
+        stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=1))
+        with ThreadPoolExecutor(threads) as workers:
+            list(workers.map(lambda _: stream.segment(measured.points, measured.masks), range(frames)))
+
+    found = medians({"one after the other": one_after_the_other, "one a thread": one_a_thread}, runs=min(runs, 7))
+    for name, seconds in found.items():
+        table.add_row(name, f"{seconds / frames * 1e3:.2f}", f"{found['one after the other'] / seconds:.2f} x")
+    return table
+
+
 SECTIONS = {
     "scipy": against_scipy,
     "learners": against_learners,
@@ -177,6 +199,7 @@ SECTIONS = {
     "growth": growth,
     "instances": instances,
     "threads": thread_scaling,
+    "batch": batch,
 }
 
 

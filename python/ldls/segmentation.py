@@ -149,7 +149,7 @@ class LabelDiffusion:
     """Segments the frames of a stream: what one camera and one lidar yield, frame after frame.
 
     Does what `segment` does, but keeps the memory that a frame needs for the next one: after the first frame of a size
-    only the result is allocated. Calls from several threads are allowed; each that runs at a time has memory of its own.
+    only the result is allocated. Several threads may call at a time; each then has memory of its own.
 
     Attributes:
         camera: The camera that takes the images.
