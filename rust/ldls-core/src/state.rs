@@ -3,7 +3,6 @@
 use crate::activity::Activity;
 use crate::blocks::{BLOCK, Blocks};
 use crate::lanes::{BACKGROUND_LANE, LaneSeeds};
-
 use crate::sweeps::{Inputs, Step, Sweep};
 use crate::tiles::Tiles;
 use crate::values::{SharedValues, Values, Window};
@@ -90,8 +89,8 @@ impl<'a, T: Sweep<WIDTH>, const WIDTH: usize> State<'a, T, WIDTH> {
         self.seeds.probe.as_ref().map(|(lane, _)| *lane)
     }
 
-    #[expect(unsafe_code, reason = "threads share values by rows")]
     /// Applies `steps` one after the other; what was z before the last becomes the previous values.
+    #[expect(unsafe_code, reason = "threads share values by rows")]
     pub(crate) fn run(&mut self, steps: &[Step<T>]) {
         let (mut z, mut previous) = (
             std::mem::take(&mut self.z),
