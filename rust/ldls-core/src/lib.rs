@@ -22,6 +22,7 @@ mod masks;
 mod memory;
 mod neighbors;
 mod params;
+mod pass;
 mod polygon;
 mod real;
 mod rle;
@@ -30,6 +31,7 @@ mod state;
 mod sweeps;
 mod tiles;
 mod values;
+mod winners;
 
 pub use camera::{Camera, View, ViewCounts};
 pub use cloud::Cloud;
