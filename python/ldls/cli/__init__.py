@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ldls.cli import demo, segment
+from ldls.cli import demo, evaluate, segment
 
 app = typer.Typer(
     name="ldls",
@@ -16,6 +16,7 @@ app = typer.Typer(
 )
 app.command(name="segment")(segment.segment)
 app.command(name="demo")(demo.demo)
+app.command(name="evaluate")(evaluate.evaluate)
 
 
 @app.callback(invoke_without_command=True)

@@ -1,0 +1,107 @@
+"""`ldls evaluate`: predictions against truth, from files."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.progress import progress
+
+if TYPE_CHECKING:
+    from ldls.evaluation import Evaluation
+
+EXISTING = {"exists": True, "readable": True}
+FOLDER = {"exists": True, "file_okay": False, "readable": True}
+FORMAT_NAMES = "annotations, kitti-boxes, ldls, semantic-kitti, squeezeseg, nuscenes-lidarseg, nuscenes-panoptic"
+
+
+class Missing(StrEnum):
+    """What becomes of a frame without its pair."""
+
+    ERROR = "error"
+    SKIP = "skip"
+
+
+@speaks_plainly
+def evaluate(
+    predictions: Annotated[Path, typer.Argument(help="Labels of a method: a file or a folder.", **EXISTING)],
+    truth: Annotated[Path, typer.Argument(help="True labels: a file or a folder.", **EXISTING)],
+    classes: Annotated[str, typer.Option(help="Classes to score, separated by commas.")] = "Car,Pedestrian",
+    prediction_format: Annotated[
+        str | None, typer.Option(help=f"One of {FORMAT_NAMES}. [default: by the files' ending]")
+    ] = None,
+    truth_format: Annotated[str | None, typer.Option(help="The same for the truth.")] = None,
+    missing: Annotated[Missing, typer.Option(help="What becomes of a frame without its pair.")] = Missing.ERROR,
+    merge_sitting: Annotated[
+        bool, typer.Option("--merge-sitting/--keep-sitting", help="Is Person_sitting a Pedestrian, or left out?")
+    ] = True,
+    leave_out: Annotated[
+        str | None,
+        typer.Option(help='True classes that do not count; "" for none. [default: Van,Cyclist,Misc,DontCare]'),
+    ] = None,
+    max_range: Annotated[float | None, typer.Option(help="Only points this near count, in metres.")] = None,
+    min_points: Annotated[int, typer.Option(min=0, help="True instances of fewer points do not count.")] = 0,
+    points: Annotated[
+        Path | None, typer.Option(help="Folder of the sweeps, for --max-range and kitti-boxes.", **FOLDER)
+    ] = None,
+    calib: Annotated[Path | None, typer.Option(help="Folder of the calibration, for kitti-boxes.", **FOLDER)] = None,
+    images: Annotated[
+        Path | None, typer.Option(help="Folder of the images, for their size, for kitti-boxes.", **FOLDER)
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the method. [default: that of PREDICTIONS]")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the tables as Markdown, CSV and JSON.", file_okay=False)
+    ] = None,
+) -> None:
+    """Score the labels of a method against true labels.
+
+    Prints precision, recall and IoU over points, instances found at IoU 0.50 and 0.70, and panoptic quality. Files
+    belong together by name: 000123.npz and 000123.txt.
+
+    Example: ldls evaluate results label_2 --truth-format kitti-boxes --points velodyne --calib calib --out tables
+    """
+    from ldls.evaluation import ClassSet
+    from ldls.evaluation import evaluate as score
+    from ldls.evaluation.frame_inputs import FrameInputs
+    from ldls.evaluation.frames import read_pairs
+    from ldls.evaluation.pairing import pair_files
+
+    scored = ClassSet.kitti(
+        _words(classes), merge_sitting=merge_sitting, leave_out=None if leave_out is None else _words(leave_out)
+    )
+    formats = {"prediction_format": prediction_format, "truth_format": truth_format}
+    files, lacking = pair_files(predictions, truth, missing=missing.value, **formats)
+    inputs = FrameInputs(points=points, calib=calib, images=images)
+    pairs = progress(read_pairs(files, inputs=inputs, **formats), len(files), "scoring")
+    found = score(pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
+    _show(name or predictions.stem, found, out)
+    if lacking:
+        typer.echo(f"{len(lacking)} frames without their pair were left out")
+
+
+def _show(method: str, found: Evaluation, out: Path | None) -> None:
+    from ldls.evaluation import instance_table, panoptic_table, semantic_table
+
+    by_method = {method: found}
+    tables = {
+        "semantic": semantic_table(by_method),
+        "instances": instance_table(by_method),
+        "panoptic": panoptic_table(by_method),
+    }
+    for stem, table in tables.items() if out else ():
+        table.write(out, stem)
+    screen = console()
+    for table in tables.values():
+        screen.print(table.rich())
+    counted, all_points = (sum(getattr(f, field) for f in found.frames) for field in ("n_counted", "n_points"))
+    screen.print(f"{len(found.frames)} frames, {counted:,} of {all_points:,} points counted", highlight=False)
+    if out:
+        screen.print(f"wrote {', '.join(tables)} as .md, .csv and .json to {out}", highlight=False, soft_wrap=True)
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in text.split(",") if word.strip())

@@ -1,0 +1,119 @@
+"""Which classes are scored, and what becomes of all others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Self
+
+from ldls.categories import COCO_NAMES
+from ldls.errors import ParameterError
+from ldls.evaluation.vocabularies import (
+    BACKGROUND,
+    KITTI,
+    NUSCENES,
+    SEMANTIC_KITTI,
+    SQUEEZESEG,
+    VOID,
+    synonyms,
+)
+
+SITTING = "Person_sitting"
+LEFT_OUT: tuple[str, ...] = ("Van", "Cyclist", "Misc", "DontCare")
+"""KITTI's classes that look so much like a scored one that neither finding nor missing them is an error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClassSet:
+    """The scored classes and how names of other vocabularies map onto them.
+
+    Attributes:
+        names: The scored classes, in the order of the tables.
+        aliases: Scored class of other names: {"car": "Car", "person": "Pedestrian"}.
+        left_out: Names whose points, in truth, no score counts. In predictions they are background.
+        background: Other names that truth may hold; their points are background. A name that truth holds and that
+            stands nowhere here is an error, one that predictions hold is background.
+
+    Raises:
+        ParameterError: There is no class, one stands there twice, or the attributes contradict one another.
+    """
+
+    names: tuple[str, ...]
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+    background: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = tuple(self.names)
+        object.__setattr__(self, "names", names)
+        if not names or len(set(names)) != len(names) or BACKGROUND in names or "" in names:
+            raise ParameterError(f"names: got {names}, expected one or more different classes without background")
+        for alias, name in self.aliases.items():
+            if name not in names:
+                raise ParameterError(f"aliases: {alias!r} stands for {name!r}, which is none of {names}")
+        both = set(self.left_out) & {*names, *self.aliases}
+        if both:
+            raise ParameterError(f"left_out: {sorted(both)} are scored too; score a class or leave it out")
+
+    @classmethod
+    def kitti(
+        cls,
+        names: Sequence[str] = ("Car", "Pedestrian"),
+        *,
+        merge_sitting: bool = True,
+        leave_out: Sequence[str] | None = None,
+    ) -> Self:
+        """Classes by name, with the synonyms of KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes.
+
+        Args:
+            names: The scored classes; any name of those vocabularies, or one of your own.
+            merge_sitting: Whether Person_sitting counts as Pedestrian; left out otherwise, unless it is scored.
+            leave_out: Classes whose points in truth do not count; `LEFT_OUT`, less those scored, by default. Points
+                that a data set calls unlabeled are left out whatever this says.
+
+        Raises:
+            ParameterError: A name is scored and left out, or `leave_out` holds a name of no vocabulary.
+        """
+        known = _known_names()
+        unknown = [name for name in leave_out or () if name not in known]
+        if unknown:
+            raise ParameterError(f"leave_out: no data set has {unknown}; expected names such as {', '.join(KITTI)}")
+        clash = sorted({*names} & {*(leave_out or ())})
+        if clash:
+            raise ParameterError(f"leave_out: {clash} are scored too; score a class or leave it out")
+        aliases = {alias: name for name in names for alias in _merged(name, merge_sitting) if alias not in names}
+        wanted = LEFT_OUT if leave_out is None else leave_out
+        left_out = {alias for name in wanted for alias in synonyms(name)}
+        left_out |= {*VOID} | (set() if merge_sitting else {SITTING})
+        left_out -= {*names, *aliases}
+        background = known - left_out - {*names, *aliases}
+        return cls(
+            names=tuple(names),
+            aliases=aliases,
+            left_out=tuple(sorted(left_out)),
+            background=tuple(sorted(background)),
+        )
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Names of a mapped labeling: background, then the scored classes."""
+        return (BACKGROUND, *self.names)
+
+    def index(self, name: str) -> int:
+        """Number of the class of `name` in `vocabulary`; 0 for whatever is not scored."""
+        scored = self.aliases.get(name, name)
+        return self.names.index(scored) + 1 if scored in self.names else 0
+
+    def knows(self, name: str) -> bool:
+        """Whether truth may hold `name`."""
+        return name == BACKGROUND or self.index(name) > 0 or name in self.left_out or name in self.background
+
+
+def _merged(name: str, merge_sitting: bool) -> tuple[str, ...]:
+    group = synonyms(name)
+    return (*group, SITTING) if merge_sitting and "Pedestrian" in group else group
+
+
+def _known_names() -> set[str]:
+    tables = (COCO_NAMES, SQUEEZESEG, SEMANTIC_KITTI, NUSCENES)
+    return {*KITTI, *(name for table in tables for name in table.values())}

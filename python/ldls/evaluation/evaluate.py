@@ -1,0 +1,95 @@
+"""All scores of predictions against truth, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ldls.errors import ParameterError
+from ldls.evaluation.classes import ClassSet
+from ldls.evaluation.counts import Counts
+from ldls.evaluation.instance import PAPER_THRESHOLDS, InstanceScores
+from ldls.evaluation.labeling import Labeling
+from ldls.evaluation.pair import Pair
+from ldls.evaluation.panoptic import PanopticScores
+from ldls.evaluation.semantic import SemanticScores
+
+
+@dataclass(frozen=True)
+class FrameCounts:
+    """What one frame brought.
+
+    Attributes:
+        name: Name of the frame.
+        n_points: Its points.
+        n_counted: Those that count.
+        classes: Points found, invented and missed of each class.
+    """
+
+    name: str
+    n_points: int
+    n_counted: int
+    classes: Mapping[str, Counts]
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Scores of predictions against truth.
+
+    Attributes:
+        names: The scored classes.
+        semantic: Points by class.
+        instance: Instances at each threshold.
+        panoptic: Panoptic quality.
+        frames: One record a frame.
+    """
+
+    names: tuple[str, ...]
+    semantic: SemanticScores
+    instance: InstanceScores
+    panoptic: PanopticScores
+    frames: tuple[FrameCounts, ...]
+
+
+def evaluate(
+    pairs: Iterable[Pair | tuple[str, Labeling, Labeling]],
+    *,
+    classes: ClassSet,
+    thresholds: Sequence[float] = PAPER_THRESHOLDS,
+    max_range_m: float | None = None,
+    minimum_points: int = 0,
+) -> Evaluation:
+    """Semantic, instance and panoptic scores over all frames, which are taken one at a time.
+
+    Args:
+        pairs: Prediction and truth of each frame, as `Pair` or (name, prediction, truth).
+        classes: What is scored, and what becomes of other classes.
+        thresholds: IoU from which on a matched instance is found.
+        max_range_m: Points farther from the lidar than this do not count; needs `Pair.ranges_m`.
+        minimum_points: Smaller true instances, and smaller unmatched segments in panoptic quality, do not count.
+
+    Raises:
+        ShapeError: Prediction and truth of a frame differ in length.
+        InputError: Truth holds an unknown class, or ranges are missing; the message names the frame.
+        ParameterError: A parameter is out of range.
+    """
+    if max_range_m is not None and not max_range_m > 0:
+        raise ParameterError(f"max_range_m: got {max_range_m}, expected more than 0")
+    semantic = SemanticScores(classes.names)
+    instance = InstanceScores(classes.names, thresholds=thresholds, minimum_points=minimum_points)
+    panoptic = PanopticScores(classes.names, minimum_points=minimum_points)
+    frames = []
+    for item in pairs:
+        pair = (item if isinstance(item, Pair) else Pair(*item)).mapped(classes, max_range_m=max_range_m)
+        of_frame = SemanticScores(classes.names)
+        of_frame.add(pair.prediction, pair.truth)
+        semantic.merge(of_frame)
+        instance.add(pair.prediction, pair.truth)
+        panoptic.add(pair.prediction, pair.truth)
+        frames.append(_frame_counts(pair, of_frame))
+    return Evaluation(classes.names, semantic, instance, panoptic, tuple(frames))
+
+
+def _frame_counts(pair: Pair, scores: SemanticScores) -> FrameCounts:
+    counts = {name: scores[name] for name in scores.names}
+    return FrameCounts(pair.name, len(pair.truth), int(scores.confusion.sum()), counts)

@@ -1,0 +1,117 @@
+"""Precision and recall of instances, matched within their class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls._optional import require
+from ldls.errors import ParameterError
+from ldls.evaluation.counts import Counts
+from ldls.evaluation.labeling import Labeling
+from ldls.evaluation.overlaps import Overlaps, overlaps
+from ldls.evaluation.semantic import check_vocabulary
+
+PAPER_THRESHOLDS = (0.5, 0.7)
+
+
+class InstanceScores:
+    """Instances found, invented and missed, added up frame by frame.
+
+    In each frame and class, true and predicted instances are matched one to one such that the sum of IoUs is largest;
+    a match is true from a threshold of IoU on.
+
+    Points that either labeling ignores are dropped before, and so are points of a scored class whose truth names no
+    instance: they tell nothing of instances. True instances of fewer than `minimum_points` points are left out, and a
+    prediction that matches one is neither right nor wrong.
+
+    Attributes:
+        names: The scored classes.
+        thresholds: IoU from which on a match is true.
+        minimum_points: Points from which on a true instance counts.
+    """
+
+    def __init__(
+        self, names: Sequence[str], *, thresholds: Sequence[float] = PAPER_THRESHOLDS, minimum_points: int = 0
+    ) -> None:
+        """Start without an instance.
+
+        Raises:
+            ParameterError: A threshold is not in (0, 1], or `minimum_points` is negative.
+        """
+        for threshold in thresholds:
+            if not 0 < threshold <= 1:
+                raise ParameterError(f"thresholds: got {threshold}, expected more than 0 and at most 1")
+        self.names = tuple(names)
+        self.thresholds = tuple(thresholds)
+        self.minimum_points = check_minimum(minimum_points)
+        self._counts = {(name, threshold): Counts() for name in self.names for threshold in self.thresholds}
+
+    def add(self, prediction: Labeling, truth: Labeling) -> None:
+        """Count the instances of a frame; both labelings mapped to these classes."""
+        check_vocabulary(self.names, prediction, truth)
+        for name in self.names:
+            found = instance_overlaps(prediction, truth, name)
+            matched = best_matches(found)
+            for threshold in self.thresholds:
+                self._counts[name, threshold] += _count(found, matched, threshold, self.minimum_points)
+
+    def merge(self, other: InstanceScores) -> None:
+        """Add the instances that `other` counted."""
+        if self._counts.keys() != other._counts.keys() or self.minimum_points != other.minimum_points:
+            raise ParameterError("other: has other classes, thresholds or minimum points")
+        for key, counts in other._counts.items():
+            self._counts[key] += counts
+
+    def __getitem__(self, key: tuple[str, float]) -> Counts:
+        """Instances of (class name, threshold) found, invented and missed."""
+        return self._counts[key]
+
+
+def instance_overlaps(prediction: Labeling, truth: Labeling, name: str) -> Overlaps:
+    """Overlaps of the instances of the class `name`, by the points that count for instances."""
+    k = truth.names.index(name)
+    theirs, ours = truth.classes == k, prediction.classes == k
+    unknown = (truth.classes > 0) & (truth.instances == 0)
+    rows = np.flatnonzero((theirs | ours) & ~(truth.ignored | prediction.ignored | unknown))
+    return overlaps(_segments(prediction, k, rows), _segments(truth, k, rows))
+
+
+def best_matches(found: Overlaps) -> NDArray[np.int64]:
+    """(T,) index of the predicted instance matched to each true one, -1 for none; the sum of IoUs is largest."""
+    matched = np.full(len(found.truth_ids), -1, np.int64)
+    if found.iou.any():
+        rows, columns = require("scipy.optimize", "eval").linear_sum_assignment(found.iou, maximize=True)
+        touching = found.iou[rows, columns] > 0
+        matched[rows[touching]] = columns[touching]
+    return matched
+
+
+def matched_iou(found: Overlaps, matched: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(T,) IoU of each true instance with its match; 0 for none."""
+    iou = np.zeros(len(matched))
+    rows = np.flatnonzero(matched >= 0)
+    iou[rows] = found.iou[rows, matched[rows]]
+    return iou
+
+
+def check_minimum(minimum_points: int) -> int:
+    """`minimum_points` if it is a number of points."""
+    if minimum_points < 0:
+        raise ParameterError(f"minimum_points: got {minimum_points}, expected 0 or more")
+    return minimum_points
+
+
+def _segments(labeling: Labeling, k: int, rows: NDArray[np.intp]) -> NDArray[np.int32]:
+    instances = labeling.instances[rows]
+    return np.where((labeling.classes[rows] == k) & (instances > 0), instances, -1).astype(np.int32)
+
+
+def _count(found: Overlaps, matched: NDArray[np.int64], threshold: float, minimum_points: int) -> Counts:
+    true = matched_iou(found, matched) >= threshold
+    counts = found.truth_points >= minimum_points
+    tp = int((true & counts).sum())
+    # a true match with an instance too small to count takes its prediction out of the false positives
+    return Counts(tp, len(found.prediction_ids) - int(true.sum()), int(counts.sum()) - tp)

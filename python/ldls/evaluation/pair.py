@@ -1,0 +1,60 @@
+"""Prediction and truth of one frame, side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import InputError, ShapeError
+from ldls.evaluation.classes import ClassSet
+from ldls.evaluation.labeling import Labeling
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Prediction and truth of one frame.
+
+    Attributes:
+        name: Name of the frame.
+        prediction: Labels of the N points by a method.
+        truth: Their true labels.
+        ranges_m: (N,) distance of each point from the lidar in metres, where it is known. Points whose distance is not
+            finite then do not count.
+
+    Raises:
+        ShapeError: The lengths differ.
+    """
+
+    name: str
+    prediction: Labeling
+    truth: Labeling
+    ranges_m: NDArray[np.floating] | None = None
+
+    def __post_init__(self) -> None:
+        n_predicted, n_true = len(self.prediction), len(self.truth)
+        if n_predicted != n_true:
+            raise ShapeError(
+                f"frame {self.name}: prediction has {n_predicted:,} points, truth {n_true:,}; "
+                "both must label the whole cloud in its order"
+            )
+        if self.ranges_m is not None and np.shape(self.ranges_m) != (n_true,):
+            raise ShapeError(f"frame {self.name}: ranges_m has shape {np.shape(self.ranges_m)}, expected ({n_true},)")
+
+    def mapped(self, classes: ClassSet, *, max_range_m: float | None = None) -> Pair:
+        """This pair in the vocabulary of `classes`; points farther than `max_range_m` are ignored.
+
+        Raises:
+            InputError: Truth holds an unknown class, or a range is asked for and none is known.
+        """
+        try:
+            truth = self.truth.mapped(classes, truth=True)
+        except InputError as error:
+            raise InputError(f"frame {self.name}: {error}") from None
+        if self.ranges_m is not None:
+            farthest = np.finfo(np.float64).max if max_range_m is None else max_range_m
+            truth = truth.restricted(np.asarray(self.ranges_m) <= farthest)
+        elif max_range_m is not None:
+            raise InputError(f"frame {self.name}: max_range_m needs the points' ranges_m, got none")
+        return Pair(self.name, self.prediction.mapped(classes), truth, self.ranges_m)

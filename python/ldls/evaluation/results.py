@@ -1,0 +1,79 @@
+"""Labels in `.npz` files: what `Segmentation.save` writes, and plain arrays of anyone's own."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import CorruptFileError, InputError, UnsupportedFormatError
+from ldls.evaluation.labeling import Labeling
+from ldls.evaluation.vocabularies import BACKGROUND
+from ldls.io.npz import read_npz, write_npz
+
+if TYPE_CHECKING:
+    from ldls.segmentation import Segmentation
+
+
+def read_results(path: str | PathLike[str]) -> Labeling:
+    """Labels of an `.npz` file with a segmentation's arrays, or with `classes`, `names` and, if any, `instances` and
+    `ignored`.
+
+    Raises:
+        UnsupportedFormatError: The arrays are of neither kind.
+        CorruptFileError: It is not a whole `.npz` file, or its arrays do not fit one another.
+        FileNotFoundError: There is no such file.
+    """  # noqa: D205
+    arrays = read_npz(path)
+    try:
+        if {"labels", "object_name"} <= arrays.keys():
+            return _by_object(arrays["labels"], arrays["object_name"])
+        if {"classes", "names"} <= arrays.keys():
+            return _by_array(arrays)
+    except (InputError, IndexError) as error:
+        raise CorruptFileError(f"{path}: {error}") from None
+    raise UnsupportedFormatError(
+        f"{path}: found arrays {sorted(arrays)}, expected labels and object_name (ldls), or classes and names"
+    )
+
+
+def write_labeling(path: str | PathLike[str], labeling: Labeling) -> None:
+    """Write the arrays of `labeling` to an `.npz` file under their names."""
+    arrays = {"classes": labeling.classes, "instances": labeling.instances, "ignored": labeling.ignored}
+    write_npz(path, arrays | {"names": np.array(labeling.names, np.str_)})
+
+
+def from_segmentation(result: Segmentation) -> Labeling:
+    """Labels of a segmentation, its instances by their masks; points out of view are ignored."""
+    return _by_object(result.labels, np.array([mask.name for mask in result.masks], np.str_))
+
+
+def from_instance_labels(labels: NDArray[Any], class_names: NDArray[np.str_]) -> Labeling:
+    """Labels of points by instance: -1 ignored, 0 background, m of class `class_names[m - 1]`.
+
+    Raises:
+        InputError: A label has no name.
+    """
+    return _by_object(labels, class_names)
+
+
+def _by_object(labels: NDArray[Any], class_names: NDArray[np.str_]) -> Labeling:
+    objects = [str(name) for name in class_names]
+    if labels.size and not (labels.min() >= -1 and labels.max() <= len(objects)):
+        raise InputError(f"labels: got {labels.min()} to {labels.max()}, expected -1 to {len(objects)}")
+    names = tuple(dict.fromkeys([BACKGROUND, *objects]))
+    # label -1, out of view, picks the last entry
+    by_label = np.array([0, *(names.index(name) for name in objects), 0], np.int32)
+    return Labeling(by_label[labels], np.maximum(labels, 0), labels < 0, names)
+
+
+def _by_array(arrays: dict[str, NDArray[Any]]) -> Labeling:
+    none = np.zeros(arrays["classes"].shape, np.int32)
+    return Labeling(
+        arrays["classes"],
+        arrays.get("instances", none),
+        arrays.get("ignored", none.astype(bool)),
+        tuple(arrays["names"].tolist()),
+    )

@@ -1,0 +1,66 @@
+"""SqueezeSeg's range images: `.npy`, 64 x 512 x 6 of x y z intensity range label."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import CorruptFileError, InputError, UnsafeFileError
+from ldls.evaluation.labeling import Labeling
+from ldls.evaluation.vocabularies import SQUEEZESEG
+
+IMAGE = (64, 512)
+N_CHANNELS = 6
+RANGE, LABEL = 4, 5
+
+
+def read_squeezeseg(path: str | PathLike[str]) -> Labeling:
+    """Labels of the 32,768 pixels, row by row; those without a range are ignored, and there are no instances.
+
+    The file is a range image, or the (64, 512) labels alone, as a network predicts them.
+
+    Raises:
+        CorruptFileError: It is not a whole file of such an array, or a label is none of 0 to 3.
+        UnsafeFileError: It holds Python objects.
+        FileNotFoundError: There is no such file.
+    """
+    path = Path(path)
+    image = _load(path)
+    labels = image.reshape(-1) if image.ndim == 2 else image[:, :, LABEL].reshape(-1)
+    counts = np.ones(labels.shape, bool) if image.ndim == 2 else image[:, :, RANGE].reshape(-1) > 0
+    # what a pixel without a return holds means nothing
+    codes = np.where(counts, labels, 0)
+    if not (codes == np.floor(codes)).all():
+        raise CorruptFileError(f"{path}: labels are not whole numbers; expected 0 to 3 in channel 5")
+    try:
+        return Labeling.from_codes(codes, SQUEEZESEG).restricted(counts)
+    except InputError as error:
+        raise CorruptFileError(f"{path}: {error}") from None
+
+
+def read_squeezeseg_ranges(path: str | PathLike[str]) -> NDArray[np.float64] | None:
+    """(32768,) distances of the pixels from the lidar in metres; None where the file holds labels alone.
+
+    Raises:
+        CorruptFileError: It is not a whole file of such an array.
+    """
+    image = _load(Path(path))
+    return None if image.ndim == 2 else image[:, :, RANGE].reshape(-1).astype(np.float64)
+
+
+def _load(path: Path) -> NDArray[Any]:
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        if "allow_pickle" in str(error):
+            raise UnsafeFileError(f"{path}: object arrays are not loaded") from None
+        raise CorruptFileError(f"{path}: not a whole .npy file ({error})") from None
+    if not isinstance(array, np.ndarray) or array.shape not in ((*IMAGE, N_CHANNELS), IMAGE):
+        raise CorruptFileError(f"{path}: expected 64 x 512 x 6, or 64 x 512 labels, got {np.shape(array)}")
+    if array.dtype.kind not in "fiu":
+        raise CorruptFileError(f"{path}: expected numbers, got {array.dtype}")
+    return array

@@ -1,0 +1,165 @@
+"""Tables of scores, for the screen and for files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ldls.errors import ParameterError
+from ldls.evaluation.evaluate import Evaluation
+from ldls.io.whole_file import whole_file
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+Cell = str | int | float | None
+UNDEFINED = "-"
+PERCENT = "Scores in percent; '-': neither truth nor prediction has the class."
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of scores.
+
+    Attributes:
+        title: What it shows.
+        columns: Heads of the columns.
+        rows: Cells: text, whole numbers, numbers shown with one decimal, or None where there is nothing to score.
+        note: What the reader must know.
+
+    Raises:
+        ParameterError: A row has not a cell for each column, or a number is not finite.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ParameterError(f"rows: expected {len(self.columns)} cells, got {row}")
+            if any(isinstance(cell, float) and not math.isfinite(cell) for cell in row):
+                raise ParameterError(f"rows: expected finite numbers, got {row}; None means not defined")
+
+    def markdown(self) -> str:
+        """The table in Markdown, title above and note below."""
+        align = ["---:" if self._is_number(c) else ":---" for c in range(len(self.columns))]
+        lines = [self.columns, align, *(tuple(map(_shown, row)) for row in self.rows)]
+        grid = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
+        return "\n\n".join(part for part in (f"**{self.title}**", grid, self.note) if part) + "\n"
+
+    def csv(self) -> str:
+        """The heads and rows as comma-separated values, numbers in full and empty where not defined."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerows([self.columns, *self.rows])
+        return text.getvalue()
+
+    def json(self) -> str:
+        """Title, note and one object a row, numbers in full and null where not defined."""
+        rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+        content = {"title": self.title, "note": self.note, "rows": rows}
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def rich(self) -> RichTable:
+        """The table for a terminal."""
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        grid = RichTable(title=self.title, caption=self.note or None)
+        for c, column in enumerate(self.columns):
+            grid.add_column(Text(column), justify="right" if self._is_number(c) else "left")
+        for row in self.rows:
+            grid.add_row(*(Text(_shown(cell)) for cell in row))
+        return grid
+
+    def write(self, folder: str | PathLike[str], stem: str) -> list[Path]:
+        """Write `stem` .md, .csv and .json to `folder`, made if need be; the files written."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        contents = {".md": self.markdown(), ".csv": self.csv(), ".json": self.json()}
+        paths = [folder / f"{stem}{suffix}" for suffix in contents]
+        for path, content in zip(paths, contents.values(), strict=True):
+            with whole_file(path) as file:
+                file.write(content.encode())
+        return paths
+
+    def _is_number(self, column: int) -> bool:
+        return bool(self.rows) and not any(isinstance(row[column], str) for row in self.rows)
+
+
+def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
+    """Precision, recall and IoU of each class by method, over all points (Table I of the paper)."""
+    names = _classes(evaluations)
+    columns = [f"{name} {score}" for name in names for score in ("precision", "recall", "IoU")]
+    rows = []
+    for method, found in evaluations.items():
+        counts = [found.semantic[name] for name in names]
+        scores = [score for c in counts for score in (c.precision, c.recall, c.iou)]
+        rows.append((method, *map(_percent, scores), _percent(found.semantic.mean_iou)))
+    return Table("Points by class", ("method", *columns, "mean IoU"), tuple(rows), PERCENT)
+
+
+def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
+    """Instances found, invented and missed at each threshold of IoU, by method and class (Table II)."""
+    rows: list[tuple[Cell, ...]] = []
+    for method, found in evaluations.items():
+        for name in found.names:
+            for threshold in found.instance.thresholds:
+                c = found.instance[name, threshold]
+                scores = _percent(c.precision), _percent(c.recall)
+                rows.append((method, name, f"{threshold:.2f}", c.tp, c.fp, c.fn, *scores))
+    columns = ("method", "class", "from IoU", "TP", "FP", "FN", "precision", "recall")
+    return Table("Instances", columns, tuple(rows), PERCENT)
+
+
+def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
+    """Panoptic, segmentation and recognition quality by method and class."""
+    rows: list[tuple[Cell, ...]] = []
+    for method, found in evaluations.items():
+        for name in found.names:
+            q = found.panoptic[name]
+            scores = _percent(q.pq), _percent(q.sq), _percent(q.rq)
+            rows.append((method, name, *scores, q.counts.tp, q.counts.fp, q.counts.fn))
+    columns = ("method", "class", "PQ", "SQ", "RQ", "TP", "FP", "FN")
+    return Table("Panoptic quality", columns, tuple(rows), PERCENT)
+
+
+def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
+    """IoU of each class by variant of the method, and the gain in mean IoU over the first (Table III)."""
+    names = _classes(evaluations)
+    rows: list[tuple[Cell, ...]] = []
+    first: float | None = None
+    for variant, found in evaluations.items():
+        mean = _percent(found.semantic.mean_iou)
+        first = mean if not rows else first
+        gain = None if mean is None or first is None else mean - first
+        rows.append((variant, *(_percent(found.semantic[name].iou) for name in names), mean, gain))
+    columns = ("variant", *(f"{name} IoU" for name in names), "mean IoU", "gain")
+    return Table("Ablation", columns, tuple(rows), f"{PERCENT} Gain: points of mean IoU over the first row.")
+
+
+def _classes(evaluations: Mapping[str, Evaluation]) -> tuple[str, ...]:
+    sets = {found.names for found in evaluations.values()}
+    if len(sets) != 1:
+        raise ParameterError(f"evaluations: expected one or more of the same classes, got {sorted(sets)}")
+    return sets.pop()
+
+
+def _percent(score: float | None) -> float | None:
+    return None if score is None else 100 * score
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None:
+        return UNDEFINED
+    return f"{cell:.1f}" if isinstance(cell, float) else str(cell)
