@@ -50,8 +50,8 @@ def test_segment_on_the_files_of_the_demo_gives_the_same(demo, tmp_path):
     assert outcome.exit_code == 0, outcome.output
     assert "objects found" in outcome.output
     assert "diffusion" in outcome.output
-    expected = np.load(folder / "demo.npz")["labels"]
-    np.testing.assert_array_equal(np.load(tmp_path / "points.npz")["labels"], expected)
+    with np.load(folder / "demo.npz") as expected, np.load(tmp_path / "points.npz") as stored:
+        np.testing.assert_array_equal(stored["labels"], expected["labels"])
     with Image.open(tmp_path / "points.png") as picture, Image.open(folder / "demo.png") as first:
         assert picture.tobytes() == first.tobytes()
 
@@ -74,9 +74,9 @@ def test_real_frame(frame_571, tmp_path):
     )  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
     assert "17 of 19 objects found" in outcome.output
-    stored = np.load(tmp_path / "new/folder/000571.npz")
     in_view = frame_571.expected["in_view"]
-    np.testing.assert_array_equal(stored["labels"][in_view], frame_571.expected["labels"])
+    with np.load(tmp_path / "new/folder/000571.npz") as stored:
+        np.testing.assert_array_equal(stored["labels"][in_view], frame_571.expected["labels"])
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,138 @@
+import json
+import shutil
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from ldls.cli import app
+from ldls.evaluation import Labeling, write_annotations, write_labeling
+
+run = CliRunner().invoke
+NAMES = ("background", "Car", "Pedestrian", "Van")
+
+
+def write_frame(folder, name, truth, prediction):
+    for side, classes, write, ending in (
+        ("truth", truth, write_annotations, ".txt"),
+        ("mine", prediction, write_labeling, ".npz"),
+    ):
+        (folder / side).mkdir(exist_ok=True)
+        array = np.array(classes)
+        write(folder / side / f"{name}{ending}", Labeling(array, (array > 0).astype(int), array < 0, NAMES))
+
+
+@pytest.fixture
+def frames(tmp_path):
+    write_frame(tmp_path, "1", [1, 1, 0, 2], [1, 1, 0, 0])
+    write_frame(tmp_path, "2", [1, 1, 3, 0], [1, 0, 1, 0])
+    return tmp_path
+
+
+def evaluate(folder, *options):
+    words = [str(folder / "mine"), str(folder / "truth"), "--truth-format", "annotations", *map(str, options)]
+    return run(app, ["evaluate", *words])
+
+
+def scores(folder):
+    return json.loads((folder / "semantic.json").read_text())["rows"][0]
+
+
+def test_tables_are_printed_and_written(frames):
+    outcome = evaluate(frames, "--out", frames / "new/tables", "--name", "my method")
+    assert outcome.exit_code == 0, outcome.output
+    for text in ("my method", "Points by class", "Instances", "Panoptic quality", "2 frames, 7 of 8 points counted"):
+        assert text in outcome.output
+    written = {path.name for path in (frames / "new/tables").iterdir()}
+    assert written == {
+        f"{stem}.{ending}" for stem in ("semantic", "instances", "panoptic") for ending in ("md", "csv", "json")
+    }
+    row = scores(frames / "new/tables")
+    assert (row["Car precision"], row["Car recall"], row["Pedestrian recall"]) == (100.0, 75.0, 0.0)
+
+
+def test_options_reach_the_scores(frames):
+    assert evaluate(frames, "--out", frames / "t", "--leave-out", "").exit_code == 0
+    assert scores(frames / "t")["Car precision"] == 75.0
+    assert evaluate(frames, "--out", frames / "t", "--classes", "Van,Car").exit_code == 0
+    assert scores(frames / "t")["Van recall"] == 0.0
+    assert evaluate(frames, "--out", frames / "t", "--min-points", "2").exit_code == 0
+    rows = json.loads((frames / "t/instances.json").read_text())["rows"]
+    assert [row["FN"] for row in rows if row["class"] == "Pedestrian"] == [0, 0]
+
+
+def test_range_comes_of_the_points(frames):
+    for name in "12":
+        np.save(frames / f"{name}.npy", np.array([[1, 0, 0], [30, 0, 0], [1, 1, 0], [2, 0, 0]], np.float32))
+    outcome = evaluate(frames, "--max-range", "20")
+    assert outcome.exit_code == 1
+    assert "needs the points' ranges_m" in outcome.stderr
+    outcome = evaluate(frames, "--max-range", "20", "--points", frames, "--out", frames / "t")
+    assert outcome.exit_code == 0, outcome.output
+    assert scores(frames / "t")["Car recall"] == 100.0
+    assert "5 of 8 points counted" in outcome.output
+
+
+def test_a_frame_without_its_pair(frames):
+    (frames / "mine/2.npz").unlink()
+    outcome = evaluate(frames, "--out", frames / "t")
+    assert outcome.exit_code == 1
+    assert outcome.stderr.startswith("error: frames without their pair: 2 of ")
+    assert not (frames / "t").exists()
+    outcome = evaluate(frames, "--missing", "skip")
+    assert outcome.exit_code == 0, outcome.output
+    assert "1 frames, 4 of 4" in outcome.output
+    assert "1 frames without their pair were left out" in outcome.output
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        pytest.param(
+            lambda f: write_frame(f, "1", [1, 1], [1, 1, 1]), "frame 1: prediction has 3 points, truth 2", id="length"
+        ),
+        pytest.param(lambda f: (f / "truth/1.txt").write_text("1 gnome\n" * 4), "['gnome']", id="unknown class"),
+        pytest.param(lambda f: (f / "truth/1.txt").write_text("Car\n" * 4), "line 1: expected 'instance", id="broken"),
+        pytest.param(lambda f: (f / "mine/1.npz").write_bytes(b"PK"), "not a whole .npz", id="cut prediction"),
+    ],
+)
+def test_bad_files_are_one_line_and_nothing_is_written(frames, change, message):
+    change(frames)
+    outcome = evaluate(frames, "--out", frames / "t")
+    assert outcome.exit_code == 1
+    assert message in outcome.stderr
+    assert not (frames / "t").exists()
+
+
+def test_formats_are_asked_for_where_no_ending_tells(frames):
+    outcome = run(app, ["evaluate", str(frames / "mine"), str(frames / "truth")])
+    assert outcome.exit_code == 1
+    assert "may be annotations or kitti-boxes" in outcome.stderr
+    outcome = run(app, ["evaluate", str(frames / "mine"), str(frames / "truth"), "--truth-format", "kitti-boxes"])
+    assert outcome.exit_code == 1
+    assert "frame 1: needs its points" in outcome.stderr
+
+
+def test_real_frames_against_their_boxes(data_folder, tmp_path):
+    training = data_folder / "kitti/training"
+    out = tmp_path / "results"
+    labels = tmp_path / "label_2"
+    labels.mkdir()
+    for name in ("000000", "000003"):
+        shutil.copy(training / f"label_2/{name}.txt", labels)
+        outcome = run(
+            app,
+            ["segment", "--points", str(training / f"velodyne/{name}.bin"),
+             "--calib", str(training / f"calib/{name}.txt"), "--masks", str(training / f"masks/{name}.json"),
+             "--out", str(out), "--format", "npz"],
+        )  # fmt: skip
+        assert outcome.exit_code == 0, outcome.output
+    outcome = run(
+        app,
+        ["evaluate", str(out), str(labels), "--truth-format", "kitti-boxes", "--points", str(training / "velodyne"),
+         "--calib", str(training / "calib"), "--images", str(training / "image_2"), "--out", str(tmp_path / "t")],
+    )  # fmt: skip
+    assert outcome.exit_code == 0, outcome.output
+    row = scores(tmp_path / "t")
+    assert row["Car IoU"] > 60
+    assert row["Pedestrian IoU"] > 60

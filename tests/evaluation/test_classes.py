@@ -1,0 +1,67 @@
+import pytest
+
+from ldls.errors import ParameterError
+from ldls.evaluation import ClassSet
+
+
+@pytest.mark.parametrize(
+    ("name", "index"),
+    [
+        pytest.param("Car", 1, id="KITTI car"),
+        pytest.param("car", 1, id="COCO and SemanticKITTI car"),
+        pytest.param("moving-car", 1, id="moving car"),
+        pytest.param("vehicle.car", 1, id="nuScenes car"),
+        pytest.param("person", 2, id="COCO person"),
+        pytest.param("pedestrian", 2, id="SqueezeSeg pedestrian"),
+        pytest.param("human.pedestrian.wheelchair", 2, id="nuScenes pedestrian"),
+        pytest.param("Person_sitting", 2, id="sitting"),
+        pytest.param("truck", 0, id="another class"),
+        pytest.param("Van", 0, id="left out"),
+        pytest.param("gnome", 0, id="unknown"),
+    ],
+)
+def test_names_of_all_vocabularies_find_their_class(name, index):
+    assert ClassSet.kitti().index(name) == index
+
+
+def test_who_sits_can_stand_apart():
+    apart = ClassSet.kitti(merge_sitting=False)
+    assert apart.index("Person_sitting") == 0
+    assert "Person_sitting" in apart.left_out
+    scored = ClassSet.kitti(("Person_sitting", "Pedestrian"), merge_sitting=False)
+    assert scored.index("Person_sitting") == 1
+    assert scored.left_out.count("Person_sitting") == 0
+
+
+def test_what_is_left_out_is_an_option_and_scored_classes_are_not_left_out():
+    assert {"Van", "Cyclist", "bicyclist", "DontCare", "unlabeled"} <= {*ClassSet.kitti().left_out}
+    kept = ClassSet.kitti(leave_out=())
+    assert "Van" in kept.background
+    assert "unlabeled" in kept.left_out
+    scored = ClassSet.kitti(("Car", "Cyclist"))
+    assert scored.index("cyclist") == 2
+    assert "Cyclist" not in scored.left_out
+    assert "traffic light" in scored.background
+
+
+def test_own_classes_take_part():
+    found = ClassSet.kitti(("gnome", "bicycle"))
+    assert found.index("gnome") == 1
+    assert found.index("vehicle.bicycle") == 2
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        pytest.param(lambda: ClassSet(names=()), "expected one or more", id="none"),
+        pytest.param(lambda: ClassSet(names=("Car", "Car")), "different classes", id="twice"),
+        pytest.param(lambda: ClassSet(names=("background",)), "without background", id="background"),
+        pytest.param(lambda: ClassSet(names=("Car",), aliases={"a": "Bus"}), "'a' stands for 'Bus'", id="alias"),
+        pytest.param(lambda: ClassSet(names=("Car",), left_out=("Car",)), "scored too", id="scored and left out"),
+        pytest.param(lambda: ClassSet.kitti(leave_out=("Car",)), "scored too", id="leave out what is scored"),
+        pytest.param(lambda: ClassSet.kitti(leave_out=("Vann",)), "no data set has \\['Vann'\\]", id="typing error"),
+    ],
+)
+def test_contradictions_are_refused(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()

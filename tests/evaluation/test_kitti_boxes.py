@@ -1,0 +1,119 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ldls
+from ldls.errors import CorruptFileError, TruncatedFileError
+from ldls.evaluation import KittiObject, label_by_boxes, points_in_box, read_kitti_boxes, read_kitti_objects
+
+ROW = "Car 0.25 1 -1.57 599.41 156.40 629.75 189.25 1.5 1.6 4.0 1.0 1.5 20.0 -1.56"
+BOX = KittiObject(
+    type="Car", truncated=0, occluded=0, alpha=0, bbox=(0, 0, 1, 1),
+    dimensions=(1.5, 1.6, 4.0), location=(1.0, 1.5, 20.0), rotation_y=0.0,
+)  # fmt: skip
+# lidar axes as the camera's: x right, y down, z forward
+CAMERA = ldls.Camera(projection=[[100.0, 0, 50], [0, 100, 40], [0, 0, 1]], image_size=(80, 100))
+
+
+def test_objects_have_all_fields(tmp_path):
+    (tmp_path / "a.txt").write_text(
+        f"{ROW}\n{ROW} 0.9\n\nDontCare -1 -1 -10 1 2 3 4 -1 -1 -1 -1000 -1000 -1000 -10\r\n"
+    )
+    car, scored, region = read_kitti_objects(tmp_path / "a.txt")
+    assert car == KittiObject(
+        type="Car", truncated=0.25, occluded=1, alpha=-1.57, bbox=(599.41, 156.40, 629.75, 189.25),
+        dimensions=(1.5, 1.6, 4.0), location=(1.0, 1.5, 20.0), rotation_y=-1.56,
+    )  # fmt: skip
+    assert scored == replace(car, score=0.9)
+    assert (region.is_region, car.is_region) == (True, False)
+    (tmp_path / "b.txt").write_text("")
+    assert read_kitti_objects(tmp_path / "b.txt") == ()
+
+
+@pytest.mark.parametrize(
+    ("row", "error", "message"),
+    [
+        pytest.param(ROW.rsplit(" ", 1)[0], TruncatedFileError, "line 2: expected 15 fields.*got 14", id="14 fields"),
+        pytest.param(f"{ROW} 1 2", CorruptFileError, "line 2: expected 15 fields.*got 17", id="17 fields"),
+        pytest.param(ROW.replace("Car", "Auto"), CorruptFileError, "unknown class 'Auto', expected one", id="class"),
+        pytest.param(ROW.replace("20.0", "nan"), CorruptFileError, "a finite number, got 'nan'", id="nan"),
+        pytest.param(ROW.replace("20.0", "20,0"), CorruptFileError, "got '20,0'", id="decimal comma"),
+        pytest.param(ROW.replace("1.6 4.0", "0 4.0"), CorruptFileError, "above 0, got", id="flat box"),
+    ],
+)
+def test_broken_rows_are_named(tmp_path, row, error, message):
+    (tmp_path / "a.txt").write_text(f"{ROW}\n{row}\n")
+    with pytest.raises(error, match=message):
+        read_kitti_objects(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize(
+    ("point", "turn", "inside"),
+    [
+        pytest.param((1.0, 1.5, 20.0), 0.0, True, id="middle of the bottom"),
+        pytest.param((1.0, 0.0, 20.0), 0.0, True, id="middle of the roof"),
+        pytest.param((1.0, -0.01, 20.0), 0.0, False, id="above"),
+        pytest.param((1.0, 1.51, 20.0), 0.0, False, id="below"),
+        pytest.param((2.9, 1.0, 20.0), 0.0, True, id="length lies along x"),
+        pytest.param((1.0, 1.0, 21.9), 0.0, False, id="width lies along z"),
+        pytest.param((2.9, 1.0, 20.0), np.pi / 2, False, id="turned: width along x"),
+        pytest.param((1.0, 1.0, 21.9), np.pi / 2, True, id="turned: length along z"),
+        # rotation_y turns x towards -z: the nose of a box turned by 45 degrees points right and back
+        pytest.param((2.3, 1.0, 18.7), np.pi / 4, True, id="45 degrees, along the nose"),
+        pytest.param((2.3, 1.0, 21.3), np.pi / 4, False, id="45 degrees, across the nose"),
+        pytest.param((np.nan, 1.0, 20.0), 0.0, False, id="nan"),
+    ],
+)
+def test_points_in_a_box(point, turn, inside):
+    assert points_in_box(np.array([point]), replace(BOX, rotation_y=turn)).tolist() == [inside]
+
+
+def test_boxes_regions_and_view_label_points():
+    person = replace(BOX, type="Pedestrian", dimensions=(1.5, 0.5, 0.5), location=(0.0, 1.5, 20.0))
+    region = replace(BOX, type="DontCare", bbox=(0, 0, 20, 79), dimensions=(-1, -1, -1), location=(-1000,) * 3)
+    points = np.array([
+        [1.5, 1.0, 20.0],  # in the car
+        [0.0, 1.0, 20.0],  # in the person's box and the car's
+        [-8.0, 0.0, 20.0],  # pixel u = 10: in the region
+        [5.0, 0.0, 20.0],  # nowhere
+        [1.0, 1.0, -20.0],  # behind
+        [30.0, 0.0, 20.0],  # beside the image
+        [np.nan, 0.0, 1.0],
+    ])  # fmt: skip
+    found = label_by_boxes([person, region, BOX], points, CAMERA)
+    assert [found.names[c] for c in found.classes] == ["Car", "Pedestrian", "DontCare"] + ["background"] * 4
+    assert found.instances.tolist() == [3, 1, 0, 0, 0, 0, 0]
+    assert found.ignored.tolist() == [False] * 4 + [True] * 3
+    # the order of the rows does not choose between boxes
+    assert label_by_boxes([BOX, region, person], points, CAMERA).classes.tolist() == found.classes.tolist()
+
+
+def test_an_object_in_a_region_keeps_its_points():
+    region = replace(BOX, type="DontCare", bbox=(0, 0, 99, 79))
+    found = label_by_boxes([BOX, region], np.array([[1.5, 1.0, 20.0]]), CAMERA)
+    assert found.names[found.classes[0]] == "Car"
+
+
+def test_no_objects_are_all_background():
+    found = label_by_boxes([], np.array([[0.0, 0, 10]]), CAMERA)
+    assert (found.classes.tolist(), found.ignored.tolist()) == ([0], [False])
+
+
+@pytest.mark.parametrize(
+    ("name", "classes"),
+    [
+        pytest.param("000000", {"Pedestrian"}, id="a pedestrian"),
+        pytest.param("000001", {"Truck", "Car", "Cyclist"}, id="far away"),
+        pytest.param("000002", {"Misc", "Car"}, id="misc"),
+        pytest.param("000003", {"Car", "DontCare"}, id="a car and regions"),
+    ],
+)
+def test_real_boxes_hold_points(data_folder, name, classes):
+    training = data_folder / "kitti/training"
+    points = ldls.read_points(training / f"velodyne/{name}.bin")
+    camera = ldls.Camera.from_kitti(training / f"calib/{name}.txt")
+    found = read_kitti_boxes(training / f"label_2/{name}.txt", points=points, camera=camera)
+    counts = {name for name, count in found.counts().items() if count} - {"background"}
+    assert counts == classes
+    assert 15_000 < (~found.ignored).sum() < 25_000

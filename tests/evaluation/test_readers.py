@@ -1,0 +1,227 @@
+import numpy as np
+import pytest
+
+import ldls
+from evaluation.samples import labeling
+from ldls.errors import (
+    CorruptFileError,
+    InputError,
+    ParameterError,
+    TruncatedFileError,
+    UnsafeFileError,
+    UnsupportedFormatError,
+)
+from ldls.evaluation import (
+    from_instance_labels,
+    from_segmentation,
+    read_labeling,
+    read_lidarseg,
+    read_panoptic,
+    read_results,
+    read_semantic_kitti,
+    read_squeezeseg,
+    read_squeezeseg_ranges,
+    write_labeling,
+)
+from ldls.evaluation.formats import FORMATS, guess_format
+
+
+def class_names(found):
+    return [found.names[c] for c in found.classes]
+
+
+def range_image():
+    image = np.zeros((64, 512, 6))
+    image[0, :5, 4] = [10, 20, 0, 30, 40]
+    image[0, :5, 5] = [1, 2, 1, 3, 0]
+    return image
+
+
+def test_squeezeseg_counts_pixels_with_a_range(tmp_path):
+    np.save(tmp_path / "a.npy", range_image())
+    found = read_squeezeseg(tmp_path / "a.npy")
+    assert len(found) == 64 * 512
+    assert class_names(found)[:5] == ["car", "pedestrian", "background", "cyclist", "background"]
+    assert found.ignored[:5].tolist() == [False, False, True, False, False]
+    assert found.ignored.sum() == 64 * 512 - 4
+    assert read_squeezeseg_ranges(tmp_path / "a.npy")[:4].tolist() == [10, 20, 0, 30]
+
+
+def test_squeezeseg_predictions_are_labels_alone(tmp_path):
+    labels = np.zeros((64, 512), np.uint8)
+    labels[1, 0] = 3
+    np.save(tmp_path / "a.npy", labels)
+    found = read_squeezeseg(tmp_path / "a.npy")
+    assert class_names(found)[512] == "cyclist"
+    assert not found.ignored.any()
+    assert read_squeezeseg_ranges(tmp_path / "a.npy") is None
+
+
+def changed(value):
+    image = range_image()
+    image[0, 1, 5] = value
+    return image
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        pytest.param(np.zeros((64, 512, 5)), "expected 64 x 512 x 6.*got \\(64, 512, 5\\)", id="five channels"),
+        pytest.param(np.zeros((512, 64, 6)), "got \\(512, 64, 6\\)", id="turned"),
+        pytest.param(changed(4), "point 1 has class 4.0, expected one of 0, 1, 2, 3", id="unknown label"),
+        pytest.param(changed(1.5), "labels are not whole numbers", id="fraction"),
+        pytest.param(changed(np.nan), "labels are not whole numbers", id="nan"),
+        pytest.param(np.full((64, 512), "x"), "expected numbers", id="text"),
+        pytest.param(None, "not a whole .npy file", id="cut"),
+    ],
+)
+def test_squeezeseg_faults(tmp_path, content, message):
+    np.save(tmp_path / "a.npy", range_image() if content is None else content)
+    if content is None:
+        (tmp_path / "a.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:1000])
+    with pytest.raises(CorruptFileError, match=message):
+        read_squeezeseg(tmp_path / "a.npy")
+
+
+def test_squeezeseg_runs_no_code(tmp_path):
+    np.save(tmp_path / "a.npy", np.array([{}], object), allow_pickle=True)
+    with pytest.raises(UnsafeFileError, match="object arrays"):
+        read_squeezeseg(tmp_path / "a.npy")
+    (tmp_path / "b.npy").write_bytes(b"")
+    with pytest.raises(CorruptFileError, match="not a whole .npy"):
+        read_squeezeseg(tmp_path / "b.npy")
+
+
+def test_semantic_kitti_splits_its_halves(tmp_path):
+    np.array([10 | 7 << 16, 0, 252 | 65535 << 16, 30, 99], "<u4").tofile(tmp_path / "a.label")
+    found = read_semantic_kitti(tmp_path / "a.label")
+    assert class_names(found) == ["car", "unlabeled", "moving-car", "person", "other-object"]
+    assert found.instances.tolist() == [7, 0, 65535, 0, 0]
+
+
+def test_semantic_kitti_faults(tmp_path):
+    (tmp_path / "a.label").write_bytes(b"1234567")
+    with pytest.raises(TruncatedFileError, match="7 bytes is not a multiple of 4"):
+        read_semantic_kitti(tmp_path / "a.label")
+    np.array([10, 12], "<u4").tofile(tmp_path / "a.label")
+    with pytest.raises(CorruptFileError, match="a.label: point 1 has class 12"):
+        read_semantic_kitti(tmp_path / "a.label")
+
+
+def test_the_writer_and_the_reader_of_label_files_agree(small_scene, tmp_path):
+    result = ldls.segment(*small_scene)
+    result.save(tmp_path / "a.label")
+    found = read_semantic_kitti(tmp_path / "a.label")
+    np.testing.assert_array_equal(found.instances, np.maximum(result.labels, 0))
+    expected = {0: "unlabeled", 1: "person", 3: "car"}
+    assert class_names(found) == [expected[c] for c in result.categories.tolist()]
+
+
+def test_nuscenes(tmp_path):
+    np.array([17, 2, 0, 24], np.uint8).tofile(tmp_path / "a_lidarseg.bin")
+    found = read_lidarseg(tmp_path / "a_lidarseg.bin")
+    expected = ["vehicle.car", "human.pedestrian.adult", "noise", "flat.driveable_surface"]
+    assert class_names(found) == expected
+    np.savez(tmp_path / "a_panoptic.npz", data=np.array([17001, 2999, 0, 24000], np.uint16))
+    found = read_panoptic(tmp_path / "a_panoptic.npz")
+    assert class_names(found) == expected
+    assert found.instances.tolist() == [1, 999, 0, 0]
+
+
+def test_nuscenes_faults(tmp_path):
+    np.array([17, 32], np.uint8).tofile(tmp_path / "a_lidarseg.bin")
+    with pytest.raises(CorruptFileError, match="point 1 has class 32"):
+        read_lidarseg(tmp_path / "a_lidarseg.bin")
+    np.savez(tmp_path / "a_panoptic.npz", data=np.array([32001], np.uint16))
+    with pytest.raises(CorruptFileError, match="point 0 has class 32"):
+        read_panoptic(tmp_path / "a_panoptic.npz")
+    np.savez(tmp_path / "a_panoptic.npz", labels=np.array([1001], np.uint16))
+    with pytest.raises(CorruptFileError, match="found arrays \\['labels'\\], expected 'data'"):
+        read_panoptic(tmp_path / "a_panoptic.npz")
+    (tmp_path / "a_panoptic.npz").write_bytes(b"PK")
+    with pytest.raises(CorruptFileError, match="not a whole .npz"):
+        read_panoptic(tmp_path / "a_panoptic.npz")
+
+
+def test_segmentations_are_read_as_they_were_written(small_scene, tmp_path):
+    points, masks, camera = small_scene
+    result = ldls.segment(np.vstack([points, [[0, 0, -5]]]).astype(np.float32), masks, camera)
+    result.save(tmp_path / "a.npz")
+    found = read_results(tmp_path / "a.npz")
+    expected = {0: "background", 1: "person", 3: "car"}
+    assert class_names(found) == [expected[c] for c in result.categories.tolist()]
+    np.testing.assert_array_equal(found.instances, np.maximum(result.labels, 0))
+    np.testing.assert_array_equal(found.ignored, result.labels < 0)
+    assert found.ignored[-1]
+    direct = from_segmentation(result)
+    for name in ("classes", "instances", "ignored"):
+        np.testing.assert_array_equal(getattr(direct, name), getattr(found, name))
+
+
+def test_two_masks_of_a_class_are_two_instances():
+    found = from_instance_labels(np.array([-1, 0, 1, 2, 3]), np.array(["car", "person", "car"]))
+    assert class_names(found) == ["background", "background", "car", "person", "car"]
+    assert found.instances.tolist() == [0, 0, 1, 2, 3]
+    with pytest.raises(InputError, match="labels: got 4 to 4, expected -1 to 3"):
+        from_instance_labels(np.array([4]), np.array(["car", "person", "car"]))
+
+
+def test_arrays_make_the_round_trip(tmp_path):
+    source = labeling([0, 1, 2], [0, 4, 1], ignored=[0])
+    write_labeling(tmp_path / "a.npz", source)
+    found = read_results(tmp_path / "a.npz")
+    assert found.names == source.names
+    for name in ("classes", "instances", "ignored"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(source, name))
+    np.savez(tmp_path / "b.npz", classes=[0, 1], names=["background", "gnome"])
+    assert class_names(read_results(tmp_path / "b.npz")) == ["background", "gnome"]
+
+
+@pytest.mark.parametrize(
+    ("arrays", "error", "message"),
+    [
+        pytest.param({"x": [1]}, UnsupportedFormatError, "found arrays \\['x'\\]", id="neither kind"),
+        pytest.param({"labels": [2], "object_name": ["car"]}, CorruptFileError, "expected -1 to 1", id="no object"),
+        pytest.param({"labels": [0.5], "object_name": ["car"]}, CorruptFileError, "a.npz", id="float labels"),
+        pytest.param({"classes": [2], "names": ["background"]}, CorruptFileError, "expected 0 to 0", id="class"),
+        pytest.param({"classes": [0], "names": ["Car"]}, CorruptFileError, "'background' first", id="names"),
+    ],
+)
+def test_arrays_that_do_not_fit(tmp_path, arrays, error, message):
+    np.savez(tmp_path / "a.npz", **arrays)
+    with pytest.raises(error, match=message):
+        read_results(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize(
+    ("name", "format"),
+    [
+        pytest.param("a_lidarseg.bin", "nuscenes-lidarseg", id="lidarseg"),
+        pytest.param("a_panoptic.npz", "nuscenes-panoptic", id="panoptic"),
+        pytest.param("a.npz", "ldls", id="npz"),
+        pytest.param("a.label", "semantic-kitti", id="label"),
+        pytest.param("a.npy", "squeezeseg", id="npy"),
+    ],
+)
+def test_endings_tell_formats(name, format):
+    assert guess_format(name) == format
+
+
+def test_what_no_ending_tells_is_asked_for(tmp_path):
+    with pytest.raises(UnsupportedFormatError, match="may be annotations or kitti-boxes; say which"):
+        read_labeling("a.txt")
+    with pytest.raises(UnsupportedFormatError, match="no format of labels has this name; expected nuscenes-lidarseg"):
+        read_labeling("a.bin")
+    with pytest.raises(ParameterError, match="format: got 'kitti', expected one of nuscenes-lidarseg"):
+        read_labeling("a.txt", format="kitti")
+    with pytest.raises(InputError, match="points: a.txt holds boxes"):
+        read_labeling("a.txt", format="kitti-boxes")
+    (tmp_path / "a.txt").write_text("1 Car\n")
+    assert class_names(read_labeling(tmp_path / "a.txt", format="annotations")) == ["Car"]
+
+
+@pytest.mark.parametrize("format", list(FORMATS))
+def test_a_missing_file_stays_one(format, tmp_path, small_scene):
+    points, _, camera = small_scene
+    with pytest.raises(FileNotFoundError):
+        read_labeling(tmp_path / "none", format=format, points=points, camera=camera)

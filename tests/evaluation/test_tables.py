@@ -1,0 +1,106 @@
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from evaluation.samples import disturbed, labeling, random_labeling
+from ldls.errors import ParameterError
+from ldls.evaluation import (
+    ClassSet,
+    Pair,
+    Table,
+    ablation_table,
+    evaluate,
+    instance_table,
+    panoptic_table,
+    semantic_table,
+)
+
+TABLES = [semantic_table, instance_table, panoptic_table, ablation_table]
+SMALL = Table("Cars | more", ("method", "IoU", "n"), (("a|b", 61.25, 3), ("c", None, 0)), "a note")
+
+
+def evaluation(prediction, truth, names=("Car", "Pedestrian")):
+    return evaluate([("a", prediction, truth)], classes=ClassSet(names=names))
+
+
+@pytest.fixture
+def methods():
+    truth = labeling([1, 1, 0, 0], [1, 1, 0, 0])
+    good, poor = labeling([1, 1, 0, 0], [1, 1, 0, 0]), labeling([1, 0, 0, 0], [1, 0, 0, 0])
+    return {"direct projection": evaluation(poor, truth), "full method": evaluation(good, truth)}
+
+
+def test_markdown():
+    assert SMALL.markdown() == (
+        "**Cars | more**\n\n| method | IoU | n |\n| :--- | ---: | ---: |\n| a/b | 61.2 | 3 |\n| c | - | 0 |\n\na note\n"
+    )
+
+
+def test_csv_and_json_keep_numbers_whole():
+    assert list(csv.reader(io.StringIO(SMALL.csv()))) == [["method", "IoU", "n"], ["a|b", "61.25", "3"], ["c", "", "0"]]
+    content = json.loads(SMALL.json())
+    assert content["rows"][1] == {"method": "c", "IoU": None, "n": 0}
+    assert (content["title"], content["note"]) == ("Cars | more", "a note")
+
+
+def test_files_are_written_under_one_stem(tmp_path):
+    paths = SMALL.write(tmp_path / "new/folder", "scores")
+    assert [path.name for path in paths] == ["scores.md", "scores.csv", "scores.json"]
+    assert [path.read_text() for path in paths] == [SMALL.markdown(), SMALL.csv(), SMALL.json()]
+
+
+def test_a_table_holds_no_nan_and_no_gap():
+    for wrong in (float("nan"), float("inf"), np.float64("nan")):
+        with pytest.raises(ParameterError, match="expected finite numbers"):
+            Table("t", ("a",), ((wrong,),))
+    with pytest.raises(ParameterError, match="expected 2 cells"):
+        Table("t", ("a", "b"), ((1,),))
+
+
+def test_methods_stand_side_by_side(methods):
+    table = semantic_table(methods)
+    assert table.columns[1:4] == ("Car precision", "Car recall", "Car IoU")
+    assert table.rows == (
+        ("direct projection", 100.0, 50.0, 50.0, None, None, None, 50.0),
+        ("full method", 100.0, 100.0, 100.0, None, None, None, 100.0),
+    )
+
+
+def test_instances_have_a_row_a_class_and_threshold(methods):
+    rows = instance_table(methods).rows
+    assert rows[0] == ("direct projection", "Car", "0.50", 1, 0, 0, 100.0, 100.0)
+    assert rows[1] == ("direct projection", "Car", "0.70", 0, 1, 1, 0.0, 0.0)
+    assert rows[2] == ("direct projection", "Pedestrian", "0.50", 0, 0, 0, None, None)
+    assert len(rows) == 8
+
+
+def test_panoptic_quality_has_its_parts(methods):
+    assert panoptic_table(methods).rows[2] == ("full method", "Car", 100.0, 100.0, 100.0, 1, 0, 0)
+
+
+def test_ablation_tells_the_gain(methods):
+    table = ablation_table(methods)
+    assert table.columns == ("variant", "Car IoU", "Pedestrian IoU", "mean IoU", "gain")
+    assert [row[-1] for row in table.rows] == [0.0, 50.0]
+
+
+@pytest.mark.parametrize("make", [semantic_table, ablation_table])
+def test_methods_must_be_scored_on_the_same_classes(make, methods):
+    bus = labeling([1], names=("background", "Bus"))
+    with pytest.raises(ParameterError, match="of the same classes"):
+        make(methods | {"other": evaluation(bus, bus, ("Bus",))})
+
+
+@pytest.mark.parametrize("make", TABLES)
+def test_no_cell_is_ever_nan(make):
+    generator = np.random.default_rng(6)
+    for _ in range(50):
+        truth = random_labeling(generator, int(generator.integers(0, 12)))
+        pair = Pair("a", disturbed(generator, truth, generator.random()), truth)
+        table = make({"m": evaluate([pair], classes=ClassSet(names=("class 1", "class 2", "class 3")))})
+        for text in (table.markdown(), table.csv(), table.json()):
+            assert "nan" not in text.lower()
+        assert all(0 <= cell <= 100 for row in table.rows for cell in row if isinstance(cell, float))
