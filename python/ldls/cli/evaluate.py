@@ -92,8 +92,9 @@ def _show(method: str, found: Evaluation, out: Path | None) -> None:
         "instances": instance_table(by_method),
         "panoptic": panoptic_table(by_method),
     }
-    for stem, table in tables.items() if out else ():
-        table.write(out, stem)
+    if out:
+        for stem, table in tables.items():
+            table.write(out, stem)
     screen = console()
     for table in tables.values():
         screen.print(table.rich())

@@ -7,6 +7,7 @@
 Needs the extra `eval`.
 """
 
+from ldls.evaluation.annotate import Annotation, annotate
 from ldls.evaluation.annotations import read_annotations, write_annotations
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
@@ -28,6 +29,7 @@ from ldls.evaluation.tables import Table, ablation_table, instance_table, panopt
 
 __all__ = [
     "FORMATS",
+    "Annotation",
     "ClassSet",
     "Counts",
     "Evaluation",
@@ -43,6 +45,7 @@ __all__ = [
     "SemanticScores",
     "Table",
     "ablation_table",
+    "annotate",
     "evaluate",
     "from_instance_labels",
     "from_segmentation",

@@ -1,0 +1,86 @@
+"""`ldls annotate`: point annotations of KITTI frames, started from their boxes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.progress import progress
+from ldls.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+@speaks_plainly
+def annotate(
+    training: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder of KITTI object data: label_2, velodyne, calib and, for their size, image_2.",
+            exists=True,
+            file_okay=False,
+        ),
+    ],
+    out: Annotated[Path, typer.Argument(help="Folder for the annotations; made if need be.", file_okay=False)],
+    clean: Annotated[bool, typer.Option("--clean/--no-clean", help="Does the ground under an object leave it?")] = True,
+) -> None:
+    """Start point annotations from KITTI's 3D boxes.
+
+    Writes a text file a frame, with a line `instance class` for each point of the sweep: the class of the box that
+    holds the point, DontCare for points of DontCare regions and points out of view, or background.
+
+    Example: ldls annotate kitti/training annotations
+    """
+    from ldls.evaluation import read_kitti_objects, write_annotations
+    from ldls.evaluation.annotate import annotate as annotate_cloud
+    from ldls.evaluation.frame_inputs import FrameInputs
+
+    labels = label_paths(training)
+    inputs = FrameInputs(points=training / "velodyne", calib=training / "calib", images=training / "image_2")
+    out.mkdir(parents=True, exist_ok=True)
+    n_objects: Counter[str] = Counter()
+    n_points: Counter[str] = Counter()
+    n_ground = 0
+    for path in progress(labels, len(labels), "annotating"):
+        points, camera = inputs.read_points(path.stem), inputs.read_camera(path.stem)
+        made = annotate_cloud(read_kitti_objects(path), points, camera, clean=clean)
+        write_annotations(out / path.name, made.labeling)
+        n_objects.update(made.objects())
+        n_points.update(made.labeling.counts())
+        n_ground += made.n_ground
+    screen = console()
+    screen.print(summary(n_objects, n_points))
+    if clean:
+        screen.print(f"{n_ground:,} points of ground under objects left them", highlight=False)
+    screen.print(f"wrote {len(labels)} files to {out}", highlight=False, soft_wrap=True)
+
+
+def label_paths(training: Path) -> list[Path]:
+    """The label_2 files of a KITTI folder, in the order of their frames.
+
+    Raises:
+        InputError: It has none.
+    """
+    paths = sorted((training / "label_2").glob("*.txt"))
+    if not paths:
+        raise InputError(f"{training}: has no label_2/*.txt; expected a folder such as kitti/training")
+    return paths
+
+
+def summary(n_objects: Counter[str], n_points: Counter[str]) -> Table:
+    """Objects with points, and their points, of each class that was found."""
+    from rich.table import Table
+
+    table = Table(title="annotated")
+    table.add_column("class")
+    table.add_column("objects", justify="right")
+    table.add_column("points", justify="right")
+    for name, count in n_points.items():
+        if count:
+            table.add_row(name, f"{n_objects[name]:,}" if n_objects[name] else "-", f"{count:,}")
+    return table
