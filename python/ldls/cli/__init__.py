@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ldls.cli import annotate, demo, evaluate, segment
+from ldls.cli import annotate, demo, evaluate, reproduce, segment
 
 app = typer.Typer(
     name="ldls",
@@ -17,6 +17,7 @@ app = typer.Typer(
 app.command(name="segment")(segment.segment)
 app.command(name="demo")(demo.demo)
 app.command(name="evaluate")(evaluate.evaluate)
+app.command(name="reproduce")(reproduce.reproduce)
 app.command(name="annotate")(annotate.annotate)
 
 

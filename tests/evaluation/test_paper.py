@@ -1,0 +1,131 @@
+"""The paper's experiments, on frames of a folder in KITTI's layout."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import ldls
+from ldls.cli import app
+from ldls.evaluation import ClassSet, paper
+from ldls.evaluation.annotations import write_annotations
+from ldls.evaluation.kitti_frames import KittiFrames
+from ldls.evaluation.labeling import Labeling
+from ldls.evaluation.methods import CLUSTERING, DIFFUSION, DIRECT_PROJECTION, FULL
+
+pytest.importorskip("sklearn")
+
+CALIBRATION = """P0: {0}
+P1: {0}
+P2: {0}
+P3: {0}
+R0_rect: 1 0 0 0 1 0 0 0 1
+Tr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0
+Tr_imu_to_velo: 1 0 0 0 0 1 0 0 0 0 1 0
+""".format("100 0 40 0 0 100 30 0 0 0 1 0")
+
+
+@pytest.fixture
+def folder(tmp_path, small_scene):
+    """Two frames of the small scene, whose truth are the two boxes of points before the wall."""
+    points, masks, _ = small_scene
+    for part in ("velodyne", "calib", "masks", "annotations"):
+        (tmp_path / part).mkdir()
+    for name in ("000000", "000007"):
+        np.hstack([points, np.ones((len(points), 1), np.float32)]).tofile(tmp_path / f"velodyne/{name}.bin")
+        (tmp_path / f"calib/{name}.txt").write_text(CALIBRATION)
+        write_masks(tmp_path / f"masks/{name}.json", masks)
+        write_annotations(tmp_path / f"annotations/{name}.txt", truth_of(points))
+    return tmp_path
+
+
+def write_masks(path, masks):
+    results = [
+        {
+            "image_id": 0,
+            "category_id": mask.category,
+            "score": mask.score,
+            "segmentation": {"size": list(masks.image_size), "counts": runs_of(mask.to_array())},
+        }
+        for mask in masks
+    ]
+    path.write_text(json.dumps(results))
+
+
+def runs_of(pixels):
+    flat = np.concatenate([[0], pixels.ravel(order="F").astype(int), [1 - pixels[-1, -1]]])
+    changes = np.flatnonzero(np.diff(flat[:-1]))
+    return np.diff(np.concatenate([[0], changes, [pixels.size]])).tolist()
+
+
+def truth_of(points):
+    near = points[:, 2] < 12
+    instances = np.where(near, np.where(points[:, 0] < 0, 1, 2), 0).astype(np.int32)
+    names = ("background", "Pedestrian", "Car")
+    return Labeling(instances, instances, np.zeros(len(points), bool), names)
+
+
+def test_a_folder_yields_its_whole_frames(folder, small_scene):
+    points, masks, _ = small_scene
+    (folder / "velodyne/000009.bin").write_bytes(b"")
+    frames = KittiFrames(folder)
+    assert (len(frames), frames.names) == (2, ["000000", "000007"])
+    frame = frames[1]
+    np.testing.assert_array_equal(frame.points[:, :3], points)
+    np.testing.assert_array_equal(frame.masks.to_array(), masks.to_array())
+    assert frame.truth.counts() == {"background": 260, "Pedestrian": 120, "Car": 120}
+
+
+def test_a_folder_without_a_part_is_refused(folder):
+    with pytest.raises(ldls.InputError, match="no folder label_2"):
+        KittiFrames(folder, boxes=True)
+    shutil.rmtree(folder / "masks")
+    with pytest.raises(ldls.InputError, match="no folder masks, expected velodyne, calib, masks, annotations"):
+        KittiFrames(folder)
+    (folder / "masks").mkdir()
+    with pytest.raises(ldls.InputError, match="no frame has a file in each"):
+        KittiFrames(folder)
+
+
+def test_scores_are_those_of_the_labels(folder):
+    frames = KittiFrames(folder)
+    labelled = list(paper.label(frames, iterations=(1, 200)))
+    found = paper.score(labelled, classes=ClassSet.kitti(), ranges_m=(5, 20))
+    for method, evaluation in found.methods.items():
+        labels = labelled[0].methods[method].prediction.classes
+        truth = labelled[0].methods[method].truth.classes
+        names = labelled[0].methods[method].prediction.names
+        car = labels == names.index("car")
+        counts = evaluation.semantic["Car"]
+        # two frames that are the same
+        assert counts.tp == 2 * int((car & (truth == 2)).sum())
+        assert counts.fp == 2 * int((car & (truth != 2)).sum())
+    assert found.by_iterations[200].semantic.mean_iou == found.methods[FULL].semantic.mean_iou
+    assert found.by_range[5].semantic["Car"].tp == 0
+    assert [score.name for score in found.objects] == ["Car", "Pedestrian"] * 2
+    with pytest.raises(ldls.InputError, match="got no frame"):
+        paper.score([], classes=ClassSet.kitti())
+
+
+def test_on_real_frames_each_step_of_the_method_gains(data_folder):
+    frames = KittiFrames(data_folder / "kitti/training", boxes=True)
+    found = paper.score(list(paper.label(frames, iterations=())), classes=ClassSet.kitti())
+    for name in ("Car", "Pedestrian"):
+        iou = {method: evaluation.semantic[name].iou for method, evaluation in found.methods.items()}
+        assert iou[DIRECT_PROJECTION] < iou[DIFFUSION] < iou[FULL]
+        assert iou[CLUSTERING] < iou[FULL]
+
+
+def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
+    out = tmp_path / "out"
+    ran = CliRunner().invoke(app, ["reproduce", str(folder), "--out", str(out)])
+    assert ran.exit_code == 0, ran.output
+    for title in ("Points by class", "Instances", "Ablation", "maximum range", "number of iterations"):
+        assert title in ran.output
+    written = {path.name for path in out.iterdir()}
+    stems = ("comparison", "instances", "panoptic", "ablation", "range", "iterations")
+    assert {f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")} <= written
+    assert {"range.png", "objects.png", "iterations.png"} <= written
+    assert "nan" not in ran.output.lower()
