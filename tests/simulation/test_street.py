@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ldls.simulation import SimulatedFrame, street_scene
-from ldls.simulation.layout import street
-from ldls.simulation.street import photograph
+from ldls.simulation.demo.layout import street
+from ldls.simulation.demo.street import photograph
 
 SEEDS = (0, 1, 2)
 

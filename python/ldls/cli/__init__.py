@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ldls.cli import annotate, demo, evaluate, reproduce, segment
+from ldls.cli import annotate, demo, evaluate, reproduce, segment, simulate
 
 app = typer.Typer(
     name="ldls",
@@ -16,9 +16,10 @@ app = typer.Typer(
 )
 app.command(name="segment")(segment.segment)
 app.command(name="demo")(demo.demo)
+app.command(name="simulate")(simulate.simulate)
+app.command(name="annotate")(annotate.annotate)
 app.command(name="evaluate")(evaluate.evaluate)
 app.command(name="reproduce")(reproduce.reproduce)
-app.command(name="annotate")(annotate.annotate)
 
 
 @app.callback(invoke_without_command=True)

@@ -1,5 +1,45 @@
-"""Street scenes with perfect labels."""
+"""Scenes with perfect labels: the small street of the demo, and whole scenes with sensors and their errors.
 
-from ldls.simulation.street import SimulatedFrame, street_scene
+`street_scene` needs nothing more; all else needs `pip install 'ldls[sim]'` when it is called.
+"""
 
-__all__ = ["SimulatedFrame", "street_scene"]
+from ldls.simulation.demo.street import SimulatedFrame, street_scene
+from ldls.simulation.errors import SegmenterErrors, SensorErrors
+from ldls.simulation.frame import SceneFrame, View, scene_frame
+from ldls.simulation.kitti_layout import write_kitti
+from ldls.simulation.lidars import LIDARS, Lidar
+from ldls.simulation.objects import SceneObject
+from ldls.simulation.photograph import PixelTruth
+from ldls.simulation.production import FrameOrder, FrameSummary, make_frames
+from ldls.simulation.rig import Rig, make_rig
+from ldls.simulation.scenes import Scene, make_scene
+from ldls.simulation.segmenting import segmented, true_masks
+from ldls.simulation.suite import make_suite, suite, suite_folder, suite_orders
+
+__all__ = [
+    "LIDARS",
+    "FrameOrder",
+    "FrameSummary",
+    "Lidar",
+    "PixelTruth",
+    "Rig",
+    "Scene",
+    "SceneFrame",
+    "SceneObject",
+    "SegmenterErrors",
+    "SensorErrors",
+    "SimulatedFrame",
+    "View",
+    "make_frames",
+    "make_rig",
+    "make_scene",
+    "make_suite",
+    "scene_frame",
+    "segmented",
+    "street_scene",
+    "suite",
+    "suite_folder",
+    "suite_orders",
+    "true_masks",
+    "write_kitti",
+]

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ldls.simulation.layout import street
-from ldls.simulation.rendering import shade
-from ldls.simulation.solids import F32, I32, Solids, first_hits, normals
+from ldls.simulation.demo.layout import street
+from ldls.simulation.demo.rendering import shade
+from ldls.simulation.demo.solids import F32, I32, Solids, first_hits, normals
 
 T = TypeVar("T", bound=np.generic)
 WIDTH, HEIGHT = 1242, 375

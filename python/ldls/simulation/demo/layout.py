@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ldls.simulation import models
-from ldls.simulation.solids import GROUND_M, I32, Part, Shape, Solids, Surface, Vector, place
+from ldls.simulation.demo import models
+from ldls.simulation.demo.solids import GROUND_M, I32, Part, Shape, Solids, Surface, Vector, place
 
 KERB_M = 0.12
 ROAD_M = (-3.7, 6.8)  # y of the kerbs

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.simulation.solids import F32, GROUND_M, I32, Solids, Surface, first_hits, normals
+from ldls.simulation.demo.solids import F32, GROUND_M, I32, Solids, Surface, first_hits, normals
 
 SUN = np.array([-0.60, -0.40, 0.693], np.float32)  # from the world to the sun
 SUNLIGHT = np.array([1.22, 1.12, 0.94], np.float32)

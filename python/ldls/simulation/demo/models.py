@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ldls.simulation.solids import Part, Shape, Surface, Vector
+from ldls.simulation.demo.solids import Part, Shape, Surface, Vector
 
 BOX, CYLINDER, BALL = Shape.BOX, Shape.CYLINDER, Shape.ELLIPSOID
 RUBBER: Vector = (0.07, 0.07, 0.08)

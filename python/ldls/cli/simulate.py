@@ -1,0 +1,148 @@
+"""`ldls simulate`: scenes with perfect labels, as files."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from ldls.cli.messages import console, speaks_plainly
+from ldls.errors import ParameterError
+
+if TYPE_CHECKING:
+    from ldls.simulation.production import FrameOrder, FrameSummary
+
+
+class SceneKind(StrEnum):
+    """Kinds of scenes."""
+
+    STREET = "street"
+    CAMPUS = "campus"
+
+
+class LidarName(StrEnum):
+    """Lidars."""
+
+    HDL_64E = "hdl-64e"
+    HDL_32E = "hdl-32e"
+    VLP_16 = "vlp-16"
+    OS1_128 = "os1-128"
+
+
+class CameraName(StrEnum):
+    """Sets of cameras."""
+
+    KITTI = "kitti"
+    ROBOT = "robot"
+    RING = "ring"
+
+
+class SuitePart(StrEnum):
+    """Parts of the suite."""
+
+    VALIDATION = "validation"
+    TUNING = "tuning"
+
+
+@speaks_plainly
+def simulate(
+    out: Annotated[Path, typer.Argument(help="Folder for the frames; made if need be.", file_okay=False)],
+    frames: Annotated[int, typer.Option(min=1, help="How many frames.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first frame; each next frame has the next seed.")] = 0,
+    scene: Annotated[SceneKind, typer.Option(help="What the scenes are.")] = SceneKind.STREET,
+    lidar: Annotated[LidarName, typer.Option(help="Beam table, ranges and noise of the sweep.")] = LidarName.HDL_64E,
+    camera: Annotated[
+        CameraName,
+        typer.Option(help="KITTI's 1242 x 375, a robot's 640 x 480, or a ring of six of 1600 x 900."),
+    ] = CameraName.KITTI,
+    suite: Annotated[
+        SuitePart | None,
+        typer.Option(
+            help="Write this part of the suite (200 or 20 fixed frames); the options above then do not count."
+        ),
+    ] = None,
+    errors: Annotated[
+        bool,
+        typer.Option("--errors/--no-errors", help="Masks, calibration and clocks wrong as in life, or perfect."),
+    ] = True,
+    processes: Annotated[int, typer.Option(min=1, help="Frames made at a time.")] = 2,
+) -> None:
+    """Make scenes with perfect labels: streets and campuses, seen by a lidar and a camera.
+
+    Writes KITTI's object layout to OUT/training: velodyne (points), image_2, calib, label_2 (boxes), masks (COCO
+    JSON: what a segmenter would find) and annotations (`instance class`, a line a point, `-1 DontCare` for none).
+    A ring's other cameras go to image_ring_1 to image_ring_5, with calib_ring_K and masks_ring_K.
+
+    A seed is a frame: the same one gives the same files. Frames that are there already are kept.
+    Needs: pip install 'ldls\\[sim]'.
+
+    Example: ldls simulate scenes --frames 5 --scene campus, and then ldls segment
+    --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt
+    --masks scenes/training/masks/000000.json --out results
+    """
+    orders = _suite_orders(suite, errors) if suite else _orders(frames, seed, scene, lidar, camera, errors)
+    summaries = _make(out, orders, processes)
+    screen = console()
+    made = [s for s in summaries if s is not None]
+    if made:
+        screen.print(summary_table(made))
+    kept = len(summaries) - len(made)
+    screen.print(f"wrote {len(made)} frames to {out / 'training'}", highlight=False, soft_wrap=True)
+    if kept:
+        screen.print(f"kept {kept} that were there; delete them to make them anew", highlight=False)
+
+
+def summary_table(made: list[FrameSummary]) -> Table:
+    """Objects with points and their points, by category, over all frames."""
+    from ldls.categories import COCO_NAMES
+
+    points, objects = sum(s.points for s in made), sum(sum(s.objects.values()) for s in made)
+    masks, labelled = sum(s.masks for s in made), sum(sum(s.object_points.values()) for s in made)
+    title = f"{len(made)} frames, {points:,} points, {masks:,} masks"
+    table = Table(title=title, show_footer=True)
+    table.add_column("category", footer="all")
+    table.add_column("objects", justify="right", footer=f"{objects:,}")
+    table.add_column("points", justify="right", footer=f"{labelled:,}")
+    for category in sorted({c for s in made for c in s.objects}):
+        count = sum(s.objects.get(category, 0) for s in made)
+        table.add_row(COCO_NAMES[category], f"{count:,}", f"{sum(s.object_points.get(category, 0) for s in made):,}")
+    return table
+
+
+def _orders(
+    frames: int, seed: int, scene: SceneKind, lidar: LidarName, camera: CameraName, errors: bool
+) -> list[FrameOrder]:
+    from ldls.simulation import FrameOrder, SegmenterErrors, SensorErrors
+
+    return [
+        FrameOrder(
+            name=f"{number:06d}",
+            seed=seed + number,
+            kind=scene.value,
+            lidar=lidar.value,
+            camera=camera.value,
+            segmenter=SegmenterErrors() if errors else SegmenterErrors.none(),
+            sensors=SensorErrors() if errors else SensorErrors.none(),
+        )
+        for number in range(frames)
+    ]
+
+
+def _suite_orders(part: SuitePart, errors: bool) -> list[FrameOrder]:
+    from ldls.simulation import suite_orders
+
+    if not errors:
+        raise ParameterError("--no-errors: the suite's errors are part of it; use --frames and --seed without --suite")
+    return suite_orders(part.value)
+
+
+def _make(out: Path, orders: list[FrameOrder], processes: int) -> list[FrameSummary | None]:
+    from rich.progress import track
+
+    from ldls.simulation import make_frames
+
+    frames = make_frames(out, orders, processes=processes)
+    return list(track(frames, "simulating", total=len(orders), console=console(), transient=True))

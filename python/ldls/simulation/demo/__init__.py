@@ -1,0 +1,1 @@
+"""The small street of `ldls demo`: numpy alone, no ray-casting library."""

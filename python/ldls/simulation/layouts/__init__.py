@@ -1,0 +1,7 @@
+"""What stands where: one module a kind of scene."""
+
+from ldls.simulation.layouts.campus import campus
+from ldls.simulation.layouts.street import street
+
+LAYOUTS = {"street": street, "campus": campus}
+"""Each kind of scene: a random generator in, a plan out."""

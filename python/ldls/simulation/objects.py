@@ -1,0 +1,53 @@
+"""The objects of a scene and where they stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+PERSON, BICYCLE, CAR, MOTORCYCLE, BUS, TRUCK = 1, 2, 3, 4, 6, 8
+BENCH, DOG, CHAIR, POTTED_PLANT = 15, 18, 62, 64
+"""COCO's ids of the categories that scenes hold."""
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One object and the upright box around it.
+
+    Attributes:
+        category: COCO id.
+        centre_m: Middle of the box, in metres.
+        length_m: Extent along its heading, in metres.
+        width_m: Extent across, in metres.
+        height_m: Extent upwards, in metres.
+        yaw: Heading, in radians from x towards y.
+        velocity_m_s: Metres a second along x and y.
+    """
+
+    category: int
+    centre_m: tuple[float, float, float]
+    length_m: float
+    width_m: float
+    height_m: float
+    yaw: float
+    velocity_m_s: tuple[float, float] = (0.0, 0.0)
+
+    def after(self, seconds: float) -> SceneObject:
+        """The object `seconds` later."""
+        (x, y, z), (vx, vy) = self.centre_m, self.velocity_m_s
+        return replace(self, centre_m=(x + vx * seconds, y + vy * seconds, z))
+
+    def below(self, height_m: float) -> SceneObject:
+        """The object in a frame whose origin lies `height_m` higher."""
+        x, y, z = self.centre_m
+        return replace(self, centre_m=(x, y, z - height_m))
+
+    def corners_m(self) -> NDArray[np.float64]:
+        """(8, 3) corners of the box, in metres."""
+        signs = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+        local = signs * (np.array([self.length_m, self.width_m, self.height_m]) / 2)
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        corners: NDArray[np.float64] = local @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + self.centre_m
+        return corners

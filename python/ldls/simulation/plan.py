@@ -1,0 +1,76 @@
+"""A scene under construction: things are put where there is room for them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.simulation.ground import Ground
+from ldls.simulation.objects import SceneObject
+from ldls.simulation.shapes.shape import Shape
+
+CLEAR_M = 3.2
+"""Nothing stands nearer to the sensor than this."""
+
+
+class Plan:
+    """Shapes on a ground, each a scenery or an object, none in the place of another.
+
+    Attributes:
+        ground: What they stand on.
+        placed: Each shape with the number of its object, 0 for scenery.
+        objects: Object m is `objects[m - 1]`.
+    """
+
+    def __init__(self, ground: Ground) -> None:
+        self.ground = ground
+        self.placed: list[tuple[int, Shape]] = [(0, ground.shape())]
+        self.objects: list[SceneObject] = []
+        self._discs = np.array([[0.0, 0.0, CLEAR_M]])
+
+    def scenery(self, shape: Shape, x_m: float, y_m: float, *, yaw: float = 0.0, room_m: float = 0.3) -> None:
+        """Put a shape there, if `room_m` metres around the place are free; 0 asks for no room."""
+        disc = np.array([[x_m, y_m, room_m]])
+        if room_m > 0 and not self._free(disc):
+            return
+        if room_m > 0:
+            self._discs = np.vstack([self._discs, disc])
+        self.placed.append((0, self._stand(shape, x_m, y_m, yaw)))
+
+    def put(
+        self, category: int, shape: Shape, x_m: float, y_m: float, *, yaw: float = 0.0, speed_m_s: float = 0.0
+    ) -> bool:
+        """Put an object there that moves along its heading; False where there is no room."""
+        discs = _footprint(shape, x_m, y_m, yaw)
+        if not self._free(discs):
+            return False
+        self._discs = np.vstack([self._discs, discs])
+        length, width, height = shape.size_m
+        low, high = shape.vertices_m.min(axis=0), shape.vertices_m.max(axis=0)
+        c, s = np.cos(yaw), np.sin(yaw)
+        middle = (low + high) / 2
+        x, y = x_m + c * middle[0] - s * middle[1], y_m + s * middle[0] + c * middle[1]
+        centre = (float(x), float(y), self.ground.height_m(x_m, y_m) + float(middle[2]))
+        velocity = (float(speed_m_s * c), float(speed_m_s * s))
+        size = (float(length), float(width), float(height))
+        self.objects.append(SceneObject(category, centre, *size, float(yaw), velocity))
+        self.placed.append((len(self.objects), self._stand(shape, x_m, y_m, yaw)))
+        return True
+
+    def _stand(self, shape: Shape, x_m: float, y_m: float, yaw: float) -> Shape:
+        return shape.turned(yaw).moved((x_m, y_m, self.ground.height_m(x_m, y_m)))
+
+    def _free(self, discs: NDArray[np.float64]) -> bool:
+        apart = np.linalg.norm(discs[:, None, :2] - self._discs[None, :, :2], axis=-1)
+        return bool((apart > discs[:, None, 2] + self._discs[None, :, 2]).all())
+
+
+def _footprint(shape: Shape, x_m: float, y_m: float, yaw: float) -> NDArray[np.float64]:
+    """(D, 3) discs (x, y, radius) that cover the shape's length."""
+    length, width, _ = shape.size_m
+    radius = max(min(length, width) / 2, 0.15) + 0.06
+    reach = max(max(length, width) / 2 - radius, 0)
+    along = np.linspace(-reach, reach, max(int(np.ceil(reach / radius)), 1) + 1)
+    heading = yaw if length >= width else yaw + np.pi / 2
+    centres = np.column_stack([x_m + along * np.cos(heading), y_m + along * np.sin(heading)])
+    return np.column_stack([centres, np.full(len(centres), radius)])
