@@ -22,8 +22,8 @@ def kitti_name(category: int) -> str:
 
 
 def annotation_name(category: int) -> str:
-    """Name in point annotations: KITTI's where it has one, else COCO's with _ for spaces."""
-    return KITTI_NAMES.get(category, COCO_NAMES[category].replace(" ", "_"))
+    """Name in point annotations: KITTI's where it has one, else COCO's."""
+    return KITTI_NAMES.get(category, COCO_NAMES[category])
 
 
 def label_rows(things: tuple[SceneObject, ...], view: View) -> list[str]:

@@ -5,7 +5,7 @@ OUT/training/image_2/NNNNNN.png      image ahead
 OUT/training/calib/NNNNNN.txt        calibration as given; P0, P1 and P3 repeat P2, as there is one camera
 OUT/training/label_2/NNNNNN.txt      boxes of the objects in the image
 OUT/training/masks/NNNNNN.json       what the segmenter finds, as COCO JSON with scores
-OUT/training/annotations/NNNNNN.txt  `instance class`, a line a point of the whole cloud; `-1 DontCare` for no object
+OUT/training/annotations/NNNNNN.txt  `instance class`, a line a point of the whole cloud; `0 background` for no object
 
 The other cameras of a ring have image_ring_K, calib_ring_K (their P2) and masks_ring_K, K from 1 to 5, to the left.
 """
@@ -27,7 +27,7 @@ from ldls.masks import InstanceMasks
 from ldls.simulation.boxes import annotation_name, label_rows
 from ldls.simulation.frame import SceneFrame, View
 
-NOTHING = "-1 DontCare"
+NOTHING = "0 background"
 """The line of a point of no object."""
 
 
