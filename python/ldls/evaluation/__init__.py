@@ -12,6 +12,7 @@ from ldls.evaluation.annotations import read_annotations, write_annotations
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.evaluate import Evaluation, FrameCounts, evaluate
+from ldls.evaluation.figures import iou_against_iterations, iou_against_range, scores_against_range
 from ldls.evaluation.formats import FORMATS, Format, read_labeling
 from ldls.evaluation.instance import InstanceScores
 from ldls.evaluation.kitti_boxes import label_by_boxes, points_in_box, read_kitti_boxes
@@ -50,6 +51,8 @@ __all__ = [
     "from_instance_labels",
     "from_segmentation",
     "instance_table",
+    "iou_against_iterations",
+    "iou_against_range",
     "label_by_boxes",
     "object_scores",
     "panoptic_table",
@@ -64,6 +67,7 @@ __all__ = [
     "read_semantic_kitti",
     "read_squeezeseg",
     "read_squeezeseg_ranges",
+    "scores_against_range",
     "semantic_table",
     "write_annotations",
     "write_labeling",

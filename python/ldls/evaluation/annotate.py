@@ -21,8 +21,10 @@ SURROUNDINGS_M = 1.0
 """How far around a box the ground is looked for."""
 BOX_ERROR_M = 0.5
 """How far the ground can lie above or below the bottom of a box."""
-LOWEST_SHARE = 0.1
-"""Share of the returns around a box that counts as its lowest; single returns lie below the ground by reflection."""
+GROUND_SCATTER_M = 0.1
+"""Returns around a box that lie higher above the fitted ground than this are something else: kerbs, bushes, walls."""
+ROUNDS = 5
+"""How often the ground is fitted, each time without what the last fit left above it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,26 +62,42 @@ def annotate(objects: Sequence[KittiObject], points: ArrayLike, camera: Camera, 
     for row, found in enumerate(objects, start=1):
         members = np.flatnonzero(labeling.instances == row)
         if len(members):
-            up = in_box_frame(placed[members], found)[:, 1]
-            ground[members] = up <= ground_height(placed, found) + GROUND_THICKNESS_M
+            along, up, across = in_box_frame(placed[members], found).T
+            height, slope_along, slope_across = ground_plane(placed, found)
+            ground[members] = up - (height + slope_along * along + slope_across * across) <= GROUND_THICKNESS_M
     classes, instances = (np.where(ground, 0, values) for values in (labeling.classes, labeling.instances))
     return Annotation(replace(labeling, classes=classes, instances=instances), int(ground.sum()))
 
 
-def ground_height(points_camera: NDArray[np.float64], found: KittiObject) -> float:
-    """Height of the ground above the bottom of a box, in metres, by the lowest returns around it.
+def ground_plane(points_camera: NDArray[np.float64], found: KittiObject) -> NDArray[np.float64]:
+    """(3,) height of the ground above the middle of a box's bottom, in metres, and its slopes along and across the box.
 
-    Without a return around it, the ground is where the box ends.
+    A plane is fitted to the returns around the box, and again to those that it does not leave above it: roads are
+    cambered, and the camera's frame is tilted against them. Without a return around it, the ground is the box's bottom.
 
     Args:
         points_camera: (N, 3) points in the rectified camera frame.
         found: The object with the box.
     """
+    along, up, across = _around(points_camera, found).T
+    plane = np.zeros(3)
+    kept = np.ones(len(up), bool)
+    for _ in range(ROUNDS if len(up) else 0):
+        # two more rows say that the ground is level, which counts where hardly a return says otherwise
+        design = np.stack([np.ones(len(up)), along, across], axis=1)
+        rows = np.vstack([design[kept], [[0, 1, 0], [0, 0, 1]]])
+        plane = np.linalg.lstsq(rows, np.append(up[kept], [0, 0]), rcond=None)[0]
+        kept = up - design @ plane <= GROUND_SCATTER_M
+    return plane
+
+
+def _around(points_camera: NDArray[np.float64], found: KittiObject) -> NDArray[np.float64]:
+    """(n, 3) points beside a box at about the height of its bottom: along, up and across it."""
     _, width, length = found.dimensions
     # what no box can reach is most of the cloud, and cheap to leave out
     away = np.abs(points_camera - found.location)
-    near = points_camera[(away <= length + width + SURROUNDINGS_M).all(axis=1)]
-    along, up, across = in_box_frame(near, found).T
+    near = in_box_frame(points_camera[(away <= length + width + SURROUNDINGS_M).all(axis=1)], found)
+    along, up, across = near.T
     beside = np.maximum(np.abs(along) - length / 2, np.abs(across) - width / 2)
-    around = up[(beside > 0) & (beside <= SURROUNDINGS_M) & (np.abs(up) <= BOX_ERROR_M)]
-    return float(np.quantile(around, LOWEST_SHARE)) if len(around) else 0.0
+    around: NDArray[np.float64] = near[(beside > 0) & (beside <= SURROUNDINGS_M) & (np.abs(up) <= BOX_ERROR_M)]
+    return around

@@ -1,0 +1,111 @@
+"""Plots of scores, as PNG files.
+
+Drawn by matplotlib's own objects on its Agg canvas, so that no window opens and no global state changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+from ldls._optional import require
+from ldls.errors import ParameterError
+from ldls.evaluation.counts import Counts
+from ldls.io.whole_file import whole_file
+
+DPI = 150
+FONT_SIZE = 11
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Okabe and Ito's, which colour-blind readers can tell apart."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+IOU_LABEL = "IoU (%)"
+
+
+def scores_against_range(curves: Mapping[str, Mapping[float, Counts]], path: str | PathLike[str]) -> None:
+    """Draw precision and recall, side by side, against the maximum range.
+
+    Args:
+        curves: For each name in the legend, such as a class, the counts by maximum range in metres.
+        path: PNG file to write.
+
+    Raises:
+        ParameterError: There is nothing to draw.
+    """
+    figure = _figure(curves, width=9.0)
+    for axes, score in zip(figure.subplots(1, 2, sharey=True), ("precision", "recall"), strict=True):
+        for k, (name, counts) in enumerate(curves.items()):
+            scores = {range_m: getattr(counts[range_m], score) for range_m in sorted(counts)}
+            _line(axes, k, name, scores)
+        _dress(axes, "maximum range (m)", f"{score} (%)")
+    _save(figure, path)
+
+
+def iou_against_range(scatter: Mapping[str, Sequence[tuple[float, float]]], path: str | PathLike[str]) -> None:
+    """Draw the IoU of each object against its range.
+
+    Args:
+        scatter: For each name in the legend, (range in metres, IoU from 0 to 1) of each object, as in `ObjectScore`.
+        path: PNG file to write.
+
+    Raises:
+        ParameterError: There is nothing to draw.
+    """
+    figure = _figure(scatter, width=7.0)
+    axes = figure.subplots()
+    for k, (name, objects) in enumerate(scatter.items()):
+        ranges, ious = [x for x, _ in objects], [100 * iou for _, iou in objects]
+        style = {"color": COLORS[k % len(COLORS)], "marker": MARKERS[k % len(MARKERS)], "linewidths": 0}
+        axes.scatter(ranges, ious, s=24, alpha=0.6, label=name, **style)
+    _dress(axes, "range of the object (m)", IOU_LABEL)
+    _save(figure, path)
+
+
+def iou_against_iterations(curves: Mapping[str, Mapping[int, float | None]], path: str | PathLike[str]) -> None:
+    """Draw IoU against the number of diffusion steps.
+
+    Args:
+        curves: For each name in the legend, IoU from 0 to 1 by number of steps; None is left out.
+        path: PNG file to write.
+
+    Raises:
+        ParameterError: There is nothing to draw.
+    """
+    figure = _figure(curves, width=7.0)
+    axes = figure.subplots()
+    for k, (name, scores) in enumerate(curves.items()):
+        _line(axes, k, name, {steps: scores[steps] for steps in sorted(scores)})
+    _dress(axes, "diffusion steps", IOU_LABEL)
+    _save(figure, path)
+
+
+def _figure(named: Mapping[str, Any], *, width: float) -> Any:  # noqa: ANN401
+    if not any(named.values()):
+        raise ParameterError("nothing to draw; expected one or more names with values")
+    figure = require("matplotlib.figure", "eval").Figure(figsize=(width, 4.5), layout="constrained")
+    require("matplotlib.backends.backend_agg", "eval").FigureCanvasAgg(figure)
+    return figure
+
+
+def _line(axes: Any, k: int, name: str, scores: Mapping[float, float | None]) -> None:  # noqa: ANN401
+    there = {x: 100 * score for x, score in scores.items() if score is not None}
+    style = {"color": COLORS[k % len(COLORS)], "marker": MARKERS[k % len(MARKERS)], "markersize": 5}
+    axes.plot(list(there), list(there.values()), label=name, **style)
+
+
+def _dress(axes: Any, x_label: str, y_label: str) -> None:  # noqa: ANN401
+    axes.set_xlabel(x_label, fontsize=FONT_SIZE)
+    axes.set_ylabel(y_label, fontsize=FONT_SIZE)
+    axes.tick_params(labelsize=FONT_SIZE - 1, labelleft=True)
+    axes.set_ylim(-3, 103)
+    axes.grid(True, color="0.88", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _save(figure: Any, path: str | PathLike[str]) -> None:  # noqa: ANN401
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    # below the axes, where it can cover no curve
+    figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), 4), fontsize=FONT_SIZE)
+    with whole_file(path) as file:
+        figure.savefig(file, format="png", dpi=DPI)

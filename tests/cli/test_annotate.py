@@ -1,0 +1,70 @@
+import shutil
+
+import pytest
+from typer.testing import CliRunner
+
+import ldls
+from ldls.cli import app
+from ldls.evaluation import read_annotations
+
+run = CliRunner().invoke
+FRAMES = ("000000", "000001", "000002", "000003")
+
+
+def test_real_frames(data_folder, tmp_path):
+    training = data_folder / "kitti/training"
+    outcome = run(app, ["annotate", str(training), str(tmp_path / "new/out")])
+    assert outcome.exit_code == 0, outcome.output
+    for text in ("annotated", "Pedestrian", "points of ground under objects left them", "wrote 4 files"):
+        assert text in outcome.output
+    assert sorted(path.name for path in (tmp_path / "new/out").iterdir()) == [f"{name}.txt" for name in FRAMES]
+    for name in FRAMES:
+        found = read_annotations(tmp_path / f"new/out/{name}.txt")
+        assert len(found) == len(ldls.read_points(training / f"velodyne/{name}.bin"))
+    assert {"Car", "DontCare"} <= {*found.names}
+
+
+def test_annotations_are_truth_for_evaluate_and_score_full_against_their_boxes(data_folder, tmp_path):
+    training = data_folder / "kitti/training"
+    outcome = run(app, ["annotate", str(training), str(tmp_path / "out"), "--no-clean"])
+    assert outcome.exit_code == 0, outcome.output
+    assert "points of ground" not in outcome.output
+    outcome = run(
+        app,
+        ["evaluate", str(tmp_path / "out"), str(training / "label_2"), "--prediction-format", "annotations",
+         "--truth-format", "kitti-boxes", "--points", str(training / "velodyne"), "--calib", str(training / "calib"),
+         "--images", str(training / "image_2"), "--out", str(tmp_path / "tables")],
+    )  # fmt: skip
+    assert outcome.exit_code == 0, outcome.output
+    assert (tmp_path / "tables/semantic.csv").read_text().splitlines()[1] == "out" + ",100.0" * 7
+
+
+@pytest.fixture
+def broken(data_folder, tmp_path):
+    training = data_folder / "kitti/training"
+    for folder, ending in (("label_2", "txt"), ("velodyne", "bin"), ("calib", "txt")):
+        (tmp_path / "training" / folder).mkdir(parents=True)
+        shutil.copy(training / f"{folder}/000003.{ending}", tmp_path / "training" / folder)
+    return tmp_path / "training"
+
+
+def test_faults_are_one_line(broken, tmp_path):
+    (broken / "label_2/000003.txt").write_text("Car 1 2 3\n")
+    outcome = run(app, ["annotate", str(broken), str(tmp_path / "out")])
+    assert outcome.exit_code == 1
+    assert "000003.txt, line 1: expected 15 fields" in outcome.stderr
+    assert not any((tmp_path / "out").iterdir())
+    outcome = run(app, ["annotate", str(tmp_path), str(tmp_path / "none")])
+    assert outcome.exit_code == 1
+    assert "has no label_2/*.txt" in outcome.stderr
+    assert not (tmp_path / "none").exists()
+
+
+def test_without_images_the_usual_size_is_taken(broken, tmp_path):
+    outcome = run(app, ["annotate", str(broken), str(tmp_path / "out")])
+    assert outcome.exit_code == 0, outcome.output
+    (broken / "image_2").mkdir()
+    (broken / "image_2/000003.png").write_bytes(b"PNG")
+    outcome = run(app, ["annotate", str(broken), str(tmp_path / "out")])
+    assert outcome.exit_code == 1
+    assert "000003.png: not an image" in outcome.stderr
