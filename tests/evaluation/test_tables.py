@@ -62,10 +62,14 @@ def test_a_table_holds_no_nan_and_no_gap():
 
 def test_methods_stand_side_by_side(methods):
     table = semantic_table(methods)
-    assert table.columns[1:4] == ("Car precision", "Car recall", "Car IoU")
+    assert table.columns == ("method", "class", "true points", "precision", "recall", "IoU")
     assert table.rows == (
-        ("direct projection", 100.0, 50.0, 50.0, None, None, None, 50.0),
-        ("full method", 100.0, 100.0, 100.0, None, None, None, 100.0),
+        ("direct projection", "Car", 2, 100.0, 50.0, 50.0),
+        ("direct projection", "Pedestrian", 0, None, None, None),
+        ("direct projection", "mean", None, None, None, 50.0),
+        ("full method", "Car", 2, 100.0, 100.0, 100.0),
+        ("full method", "Pedestrian", 0, None, None, None),
+        ("full method", "mean", None, None, None, 100.0),
     )
 
 

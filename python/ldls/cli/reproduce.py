@@ -77,10 +77,18 @@ def _tables(found: Experiment) -> dict[str, Table]:
 
 
 def _draw(found: Experiment, out: Path) -> list[Path]:
+    """The figures drawn: those for which there is something to draw."""
     from ldls.evaluation import figures
+    from ldls.evaluation.methods import FULL
 
-    paths = [out / "range.png", out / "objects.png", out / "iterations.png"]
-    figures.scores_against_range(found.by_range, paths[0])
-    figures.iou_against_range(found.objects, paths[1])
-    figures.iou_against_iterations(found.by_iterations, paths[2])
+    names = found.methods[FULL].names
+    by_range = {name: {limit: one.semantic[name] for limit, one in found.by_range.items()} for name in names}
+    objects = {name: [(score.range_m, score.iou) for score in found.objects if score.name == name] for name in names}
+    after = {name: {count: one.semantic[name].iou for count, one in found.by_iterations.items()} for name in names}
+    paths = [out / "range.png", out / "iterations.png"]
+    figures.scores_against_range(by_range, paths[0])
+    figures.iou_against_iterations(after, paths[1])
+    if any(objects.values()):
+        paths.append(out / "objects.png")
+        figures.iou_against_range(objects, paths[-1])
     return paths

@@ -73,11 +73,11 @@ def simulate(
     """Make scenes with perfect labels: streets and campuses, seen by a lidar and a camera.
 
     Writes KITTI's object layout to OUT/training: velodyne (points), image_2, calib, label_2 (boxes), masks (COCO
-    JSON: what a segmenter would find) and annotations (`instance class`, a line a point, `-1 DontCare` for none).
+    JSON: what a segmenter would find) and annotations (`instance class`, a line a point, `0 background` for none).
     A ring's other cameras go to image_ring_1 to image_ring_5, with calib_ring_K and masks_ring_K.
 
     A seed is a frame: the same one gives the same files. Frames that are there already are kept.
-    Needs: pip install 'ldls\\[sim]'.
+    Needs the extra sim of ldls (pip).
 
     Example: ldls simulate scenes --frames 5 --scene campus, and then ldls segment
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt

@@ -100,13 +100,15 @@ class Table:
 def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Precision, recall and IoU of each class by method, over all points (Table I of the paper)."""
     names = _classes(evaluations)
-    columns = [f"{name} {score}" for name in names for score in ("precision", "recall", "IoU")]
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     for method, found in evaluations.items():
-        counts = [found.semantic[name] for name in names]
-        scores = [score for c in counts for score in (c.precision, c.recall, c.iou)]
-        rows.append((method, *map(_percent, scores), _percent(found.semantic.mean_iou)))
-    return Table("Points by class", ("method", *columns, "mean IoU"), tuple(rows), PERCENT)
+        for name in names:
+            c = found.semantic[name]
+            rows.append((method, name, c.tp + c.fn, *map(_percent, (c.precision, c.recall, c.iou))))
+        if len(names) > 1:
+            rows.append((method, "mean", None, None, None, _percent(found.semantic.mean_iou)))
+    columns = ("method", "class", "true points", "precision", "recall", "IoU")
+    return Table("Points by class", columns, tuple(rows), PERCENT)
 
 
 def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
