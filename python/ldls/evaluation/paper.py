@@ -23,7 +23,7 @@ from ldls.evaluation.results import from_instance_labels
 from ldls.params import Params
 from ldls.segmentation import segment
 
-ITERATIONS: tuple[int, ...] = (1, 5, 10, 20, 50, 100, 200, 500, 1000)
+ITERATIONS: tuple[int, ...] = (1, 5, 10, 20, 50, 100, 200, 500)
 RANGES_M: tuple[float, ...] = (10, 15, 20, 25, 30, 40, 50, 60, 70)
 
 

@@ -44,17 +44,15 @@ impl Series {
         };
         let mut nodes = 256;
         loop {
-            let coefficients = interpolate(sum, interval, nodes);
+            let mut coefficients = interpolate(sum, interval, nodes);
+            // the sum is a polynomial of degree `terms` - 1: beyond it there is rounding and nothing else
+            coefficients.truncate(terms);
+            let all = coefficients.len() == terms;
             let degree = degree_within(&coefficients, tolerance.0 * sum(interval.high));
             // far from the last coefficient: those that were cut off are smaller still
-            if 4 * degree < 3 * coefficients.len() || nodes >= 1 << 14 {
-                let (kept, rest) = coefficients.split_at((degree + 1).min(terms));
-                let whole = kept.len() == terms;
-                let tail = if whole {
-                    0.0
-                } else {
-                    rest.iter().map(|c| c.abs()).sum()
-                };
+            if all || 4 * degree < 3 * coefficients.len() || nodes >= 1 << 14 {
+                let (kept, rest) = coefficients.split_at(degree + 1);
+                let tail = rest.iter().map(|c| c.abs()).sum();
                 return Self {
                     interval,
                     coefficients: kept.to_vec(),
