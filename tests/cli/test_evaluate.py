@@ -47,7 +47,9 @@ def test_tables_are_printed_and_written(frames):
         assert text in outcome.output
     written = {path.name for path in (frames / "new/tables").iterdir()}
     assert written == {
-        f"{stem}.{ending}" for stem in ("semantic", "instances", "panoptic") for ending in ("md", "csv", "json")
+        f"{stem}.{ending}"
+        for stem in ("semantic", "instances", "panoptic", "frames")
+        for ending in ("md", "csv", "json")
     }
     row = scores(frames / "new/tables")
     assert (row["Car precision"], row["Car recall"], row["Pedestrian recall"]) == (100.0, 75.0, 0.0)
@@ -83,8 +85,8 @@ def test_a_frame_without_its_pair(frames):
     assert not (frames / "t").exists()
     outcome = evaluate(frames, "--missing", "skip")
     assert outcome.exit_code == 0, outcome.output
-    assert "1 frames, 4 of 4" in outcome.output
-    assert "1 frames without their pair were left out" in outcome.output
+    assert "1 frame, 4 of 4" in outcome.output
+    assert "left out for want of their pair: 1 frame" in outcome.output
 
 
 @pytest.mark.parametrize(
@@ -138,3 +140,10 @@ def test_real_frames_against_their_boxes(data_folder, tmp_path):
     row = scores(tmp_path / "t")
     assert row["Car IoU"] > 60
     assert row["Pedestrian IoU"] > 60
+
+
+def test_names_of_ones_own_can_be_background(frames):
+    (frames / "truth/1.txt").write_text("1 Car\n1 Car\n1 gnome\n0 background\n")
+    outcome = evaluate(frames, "--background", "gnome", "--out", frames / "t")
+    assert outcome.exit_code == 0, outcome.output
+    assert scores(frames / "t")["Car precision"] == 100.0

@@ -45,6 +45,8 @@ def test_what_is_left_out_is_an_option_and_scored_classes_are_not_left_out():
 
 
 def test_own_classes_take_part():
+    assert not ClassSet.kitti().knows("gnome")
+    assert ClassSet.kitti(background=("gnome",)).knows("gnome")
     found = ClassSet.kitti(("gnome", "bicycle"))
     assert found.index("gnome") == 1
     assert found.index("vehicle.bicycle") == 2

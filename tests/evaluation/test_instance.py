@@ -26,8 +26,8 @@ def test_a_case_worked_by_hand():
     assert scores["Pedestrian", 0.5].recall == 0.0
 
 
-def test_the_sum_of_ious_is_largest_where_the_nearest_match_would_be_greedy():
-    # truth 1: 1-4, truth 2: 5-7. Greedy takes (1, a) 3/5 and leaves truth 2 nothing; best takes what sums highest.
+def test_the_sum_of_ious_is_larger_than_by_taking_the_best_pair_first():
+    # the best pair, truth 1 with prediction 1, has IoU 1/2 and leaves truth 2 nothing; the others sum to 7/12
     truth = labeling([1] * 7, [1, 1, 1, 1, 2, 2, 2])
     prediction = labeling([1] * 7, [2, 1, 1, 1, 1, 1, 0])
     found = instance_overlaps(prediction, truth, "Car")

@@ -13,6 +13,7 @@ from ldls.evaluation import (
     Table,
     ablation_table,
     evaluate,
+    frame_table,
     instance_table,
     panoptic_table,
     semantic_table,
@@ -83,6 +84,12 @@ def test_instances_have_a_row_a_class_and_threshold(methods):
 
 def test_panoptic_quality_has_its_parts(methods):
     assert panoptic_table(methods).rows[2] == ("full method", "Car", 100.0, 100.0, 100.0, 1, 0, 0)
+
+
+def test_frames_have_a_row_each(methods):
+    table = frame_table(methods["direct projection"])
+    assert table.columns == ("frame", "points", "counted", "Car IoU", "Pedestrian IoU")
+    assert table.rows == (("a", 4, 4, 50.0, None),)
 
 
 def test_ablation_tells_the_gain(methods):

@@ -43,6 +43,7 @@ def evaluate(
         str | None,
         typer.Option(help='True classes that do not count; "" for none. [default: Van,Cyclist,Misc,DontCare]'),
     ] = None,
+    background: Annotated[str, typer.Option(help="Names of your own that truth holds and that are background.")] = "",
     max_range: Annotated[float | None, typer.Option(help="Only points this near count, in metres.")] = None,
     min_points: Annotated[int, typer.Option(min=0, help="True instances of fewer points do not count.")] = 0,
     points: Annotated[
@@ -71,7 +72,10 @@ def evaluate(
     from ldls.evaluation.pairing import pair_files
 
     scored = ClassSet.kitti(
-        _words(classes), merge_sitting=merge_sitting, leave_out=None if leave_out is None else _words(leave_out)
+        _words(classes),
+        merge_sitting=merge_sitting,
+        leave_out=None if leave_out is None else _words(leave_out),
+        background=_words(background),
     )
     formats = {"prediction_format": prediction_format, "truth_format": truth_format}
     files, lacking = pair_files(predictions, truth, missing=missing.value, **formats)
@@ -80,11 +84,11 @@ def evaluate(
     found = score(pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
     _show(name or predictions.stem, found, out)
     if lacking:
-        typer.echo(f"{len(lacking)} frames without their pair were left out")
+        typer.echo(f"left out for want of their pair: {_frames(len(lacking))}")
 
 
 def _show(method: str, found: Evaluation, out: Path | None) -> None:
-    from ldls.evaluation import instance_table, panoptic_table, semantic_table
+    from ldls.evaluation import frame_table, instance_table, panoptic_table, semantic_table
 
     by_method = {method: found}
     tables = {
@@ -95,13 +99,20 @@ def _show(method: str, found: Evaluation, out: Path | None) -> None:
     if out:
         for stem, table in tables.items():
             table.write(out, stem)
+        frame_table(found).write(out, "frames")
     screen = console()
     for table in tables.values():
         screen.print(table.rich())
     counted, all_points = (sum(getattr(f, field) for f in found.frames) for field in ("n_counted", "n_points"))
-    screen.print(f"{len(found.frames)} frames, {counted:,} of {all_points:,} points counted", highlight=False)
+    screen.print(f"{_frames(len(found.frames))}, {counted:,} of {all_points:,} points counted", highlight=False)
     if out:
-        screen.print(f"wrote {', '.join(tables)} as .md, .csv and .json to {out}", highlight=False, soft_wrap=True)
+        screen.print(
+            f"wrote {', '.join(tables)} and frames as .md, .csv and .json to {out}", highlight=False, soft_wrap=True
+        )
+
+
+def _frames(number: int) -> str:
+    return "1 frame" if number == 1 else f"{number} frames"
 
 
 def _words(text: str) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from ldls.evaluation.results import from_instance_labels, from_segmentation, rea
 from ldls.evaluation.semantic import SemanticScores
 from ldls.evaluation.semantic_kitti import read_semantic_kitti
 from ldls.evaluation.squeezeseg import read_squeezeseg, read_squeezeseg_ranges
-from ldls.evaluation.tables import Table, ablation_table, instance_table, panoptic_table, semantic_table
+from ldls.evaluation.tables import Table, ablation_table, frame_table, instance_table, panoptic_table, semantic_table
 
 __all__ = [
     "FORMATS",
@@ -48,6 +48,7 @@ __all__ = [
     "ablation_table",
     "annotate",
     "evaluate",
+    "frame_table",
     "from_instance_labels",
     "from_segmentation",
     "instance_table",

@@ -62,6 +62,7 @@ class ClassSet:
         *,
         merge_sitting: bool = True,
         leave_out: Sequence[str] | None = None,
+        background: Sequence[str] = (),
     ) -> Self:
         """Classes by name, with the synonyms of KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes.
 
@@ -70,6 +71,8 @@ class ClassSet:
             merge_sitting: Whether Person_sitting counts as Pedestrian; left out otherwise, unless it is scored.
             leave_out: Classes whose points in truth do not count; `LEFT_OUT`, less those scored, by default. Points
                 that a data set calls unlabeled are left out whatever this says.
+            background: Names of your own that truth may hold and that are background; those of the vocabularies are
+                known.
 
         Raises:
             ParameterError: A name is scored and left out, or `leave_out` holds a name of no vocabulary.
@@ -86,12 +89,12 @@ class ClassSet:
         left_out = {alias for name in wanted for alias in synonyms(name)}
         left_out |= {*VOID} | (set() if merge_sitting else {SITTING})
         left_out -= {*names, *aliases}
-        background = known - left_out - {*names, *aliases}
+        others = (known | {*background}) - left_out - {*names, *aliases}
         return cls(
             names=tuple(names),
             aliases=aliases,
             left_out=tuple(sorted(left_out)),
-            background=tuple(sorted(background)),
+            background=tuple(sorted(others)),
         )
 
     @property

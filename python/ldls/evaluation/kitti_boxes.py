@@ -15,7 +15,6 @@ from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.vocabularies import BACKGROUND, KITTI
 from ldls.stages import project
 
-NAMES = (BACKGROUND, *KITTI)
 IMAGE_SIZE = (375, 1242)
 """Height and width of most of KITTI's images, where that of the frame is not known."""
 
@@ -35,7 +34,7 @@ def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Ca
 
     Of several boxes the smallest wins: who stands at a car is smaller than the car's box. Points outside all boxes
     whose pixel lies in a DontCare rectangle are DontCare, which `ClassSet.kitti` leaves out unless told otherwise.
-    Points out of the camera's view are ignored.
+    Points out of the camera's view are ignored. A row without a box, its dimensions -1, holds no point.
 
     Args:
         objects: Rows of a label_2 file.
@@ -44,17 +43,18 @@ def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Ca
     """
     cloud = as_points(points)
     in_view, pixels = project(cloud, camera, image_size=camera.image_size or IMAGE_SIZE, keep_origin=True)
+    names = tuple(dict.fromkeys([BACKGROUND, *KITTI, *(found.type for found in objects)]))
     classes, instances = np.zeros((2, len(cloud)), np.int32)
     for region in (found for found in objects if found.is_region):
-        classes[in_view[_in_rectangle(pixels, region)]] = NAMES.index(region.type)
+        classes[in_view[_in_rectangle(pixels, region)]] = names.index(region.type)
     seen = in_camera_frame(cloud[in_view], camera)
     boxes = [(row, found) for row, found in enumerate(objects, start=1) if not found.is_region]
     for row, found in sorted(boxes, key=lambda box: -np.prod(box[1].dimensions)):
         inside = in_view[points_in_box(seen, found)]
-        classes[inside], instances[inside] = NAMES.index(found.type), row
+        classes[inside], instances[inside] = names.index(found.type), row
     ignored = np.ones(len(cloud), bool)
     ignored[in_view] = False
-    return Labeling(classes, instances, ignored, NAMES)
+    return Labeling(classes, instances, ignored, names)
 
 
 def in_camera_frame(points: ArrayLike, camera: Camera) -> NDArray[np.float64]:

@@ -9,17 +9,16 @@ from pathlib import Path
 
 from ldls.errors import CorruptFileError, TruncatedFileError
 from ldls.evaluation.text import read_lines
-from ldls.evaluation.vocabularies import KITTI
 
 N_FIELDS = 15
 
 
 @dataclass(frozen=True, kw_only=True)
 class KittiObject:
-    """One row of a label_2 file; the unknown fields of DontCare rows hold -1, -10 or -1000.
+    """One row of a label_2 file; unknown fields, such as those of DontCare rows, hold -1, -10 or -1000.
 
     Attributes:
-        type: Class.
+        type: Class; KITTI's or, in files of anyone's own, another.
         truncated: Share of the object outside the image, 0 to 1.
         occluded: 0 visible, 1 partly, 2 largely occluded, 3 unknown.
         alpha: Angle of observation in radians.
@@ -51,8 +50,7 @@ def read_kitti_objects(path: str | PathLike[str]) -> tuple[KittiObject, ...]:
 
     Raises:
         TruncatedFileError: A line has too few fields.
-        CorruptFileError: A line has too many fields, an unknown class, no number where one belongs, or an object
-            without size.
+        CorruptFileError: A line has too many fields, or no number where one belongs.
         FileNotFoundError: There is no such file.
     """
     path = Path(path)
@@ -65,11 +63,7 @@ def _object(place: str, words: list[str]) -> KittiObject:
         raise TruncatedFileError(f"{place}: expected 15 fields, or 16 with a score, got {len(words)}")
     if len(words) > N_FIELDS + 1:
         raise CorruptFileError(f"{place}: expected 15 fields, or 16 with a score, got {len(words)}")
-    if words[0] not in KITTI:
-        raise CorruptFileError(f"{place}: unknown class {words[0]!r}, expected one of {', '.join(KITTI)}")
     v = [_number(place, word) for word in words[1:]]
-    if words[0] != "DontCare" and not min(v[7:10]) > 0:
-        raise CorruptFileError(f"{place}: expected height, width and length above 0, got {v[7:10]}")
     return KittiObject(
         type=words[0],
         truncated=v[0],

@@ -26,7 +26,8 @@ class Labeling:
         classes: (N,) int32: index into `names`; 0 is background.
         instances: (N,) int32: 0 none. A pair (class, instance) names an instance, so that the first car and the first
             pedestrian may both be 1.
-        ignored: (N,) bool: points that no score counts, such as those out of view.
+        ignored: (N,) bool: points that no score counts, such as those out of the camera's view. Scores leave out what
+            truth or prediction ignores, so methods compared with one another must ignore the same points.
         names: Class names; the first is "background".
 
     Raises:
@@ -55,7 +56,9 @@ class Labeling:
         object.__setattr__(self, "ignored", ignored)
 
     @classmethod
-    def from_codes(cls, codes: NDArray[Any], table: Mapping[int, str], *, instances: ArrayLike | None = None) -> Self:
+    def from_codes(
+        cls, codes: NDArray[Any], table: Mapping[int, str], *, instances: NDArray[Any] | None = None
+    ) -> Self:
         """Labels from a data set's class numbers `codes` (N,) and their names.
 
         Raises:
@@ -71,7 +74,7 @@ class Labeling:
             first = int((classes < 0).argmax())
             raise InputError(f"point {first} has class {codes[first]}, expected one of {', '.join(map(str, table))}")
         none = np.zeros(len(classes), np.int32)
-        return cls(classes, none if instances is None else instances, none.astype(bool), names)  # type: ignore[arg-type]
+        return cls(classes, none if instances is None else instances, none.astype(bool), names)
 
     def __len__(self) -> int:
         return len(self.classes)
@@ -97,8 +100,8 @@ class Labeling:
         """These labels with the names of `vocabulary`.
 
         What is not scored becomes background. In truth, names that the vocabulary leaves out are ignored, and a name
-        that it does not know is an error; in a prediction both are background, for a method must not choose which
-        points count.
+        that it does not know is an error; in a prediction both are background, for what a method predicts must not
+        choose which points count.
 
         Raises:
             InputError: This is truth and holds an unknown class.

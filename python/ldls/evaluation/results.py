@@ -18,14 +18,15 @@ if TYPE_CHECKING:
 
 
 def read_results(path: str | PathLike[str]) -> Labeling:
-    """Labels of an `.npz` file with a segmentation's arrays, or with `classes`, `names` and, if any, `instances` and
-    `ignored`.
+    """Labels of an `.npz` file.
+
+    It holds a segmentation's arrays, or `classes`, `names` and, if there are any, `instances` and `ignored`.
 
     Raises:
         UnsupportedFormatError: The arrays are of neither kind.
         CorruptFileError: It is not a whole `.npz` file, or its arrays do not fit one another.
         FileNotFoundError: There is no such file.
-    """  # noqa: D205
+    """
     arrays = read_npz(path)
     try:
         if {"labels", "object_name"} <= arrays.keys():

@@ -120,7 +120,7 @@ def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
                 c = found.instance[name, threshold]
                 scores = _percent(c.precision), _percent(c.recall)
                 rows.append((method, name, f"{threshold:.2f}", c.tp, c.fp, c.fn, *scores))
-    columns = ("method", "class", "from IoU", "TP", "FP", "FN", "precision", "recall")
+    columns = ("method", "class", "IoU from", "TP", "FP", "FN", "precision", "recall")
     return Table("Instances", columns, tuple(rows), PERCENT)
 
 
@@ -148,6 +148,16 @@ def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
         rows.append((variant, *(_percent(found.semantic[name].iou) for name in names), mean, gain))
     columns = ("variant", *(f"{name} IoU" for name in names), "mean IoU", "gain")
     return Table("Ablation", columns, tuple(rows), f"{PERCENT} Gain: points of mean IoU over the first row.")
+
+
+def frame_table(found: Evaluation) -> Table:
+    """Points, those that count, and IoU of each class, by frame."""
+    rows = [
+        (f.name, f.n_points, f.n_counted, *(_percent(f.classes[name].iou) for name in found.names))
+        for f in found.frames
+    ]
+    columns = ("frame", "points", "counted", *(f"{name} IoU" for name in found.names))
+    return Table("Frames", columns, tuple(rows), PERCENT)
 
 
 def _classes(evaluations: Mapping[str, Evaluation]) -> tuple[str, ...]:
