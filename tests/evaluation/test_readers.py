@@ -208,7 +208,7 @@ def test_endings_tell_formats(name, format):
 
 
 def test_what_no_ending_tells_is_asked_for(tmp_path):
-    with pytest.raises(UnsupportedFormatError, match="may be annotations or kitti-boxes; say which"):
+    with pytest.raises(UnsupportedFormatError, match="may be annotations or kitti-boxes; say which by format="):
         read_labeling("a.txt")
     with pytest.raises(UnsupportedFormatError, match="no format of labels has this name; expected nuscenes-lidarseg"):
         read_labeling("a.bin")

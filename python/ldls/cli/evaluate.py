@@ -32,16 +32,18 @@ def evaluate(
     truth: Annotated[Path, typer.Argument(help="True labels: a file or a folder.", **EXISTING)],
     classes: Annotated[str, typer.Option(help="Classes to score, separated by commas.")] = "Car,Pedestrian",
     prediction_format: Annotated[
-        str | None, typer.Option(help=f"One of {FORMAT_NAMES}. [default: by the files' ending]")
+        str | None, typer.Option(help=f"One of {FORMAT_NAMES}.", show_default="by the files' ending")
     ] = None,
-    truth_format: Annotated[str | None, typer.Option(help="The same for the truth.")] = None,
+    truth_format: Annotated[
+        str | None, typer.Option(help="The same for the truth.", show_default="by the files' ending")
+    ] = None,
     missing: Annotated[Missing, typer.Option(help="What becomes of a frame without its pair.")] = Missing.ERROR,
     merge_sitting: Annotated[
         bool, typer.Option("--merge-sitting/--keep-sitting", help="Is Person_sitting a Pedestrian, or left out?")
     ] = True,
     leave_out: Annotated[
         str | None,
-        typer.Option(help='True classes that do not count; "" for none. [default: Van,Cyclist,Misc,DontCare]'),
+        typer.Option(help='True classes that do not count; "" for none.', show_default="Van,Cyclist,Misc,DontCare"),
     ] = None,
     background: Annotated[str, typer.Option(help="Names of your own that truth holds and that are background.")] = "",
     max_range: Annotated[float | None, typer.Option(help="Only points this near count, in metres.")] = None,
@@ -53,7 +55,7 @@ def evaluate(
     images: Annotated[
         Path | None, typer.Option(help="Folder of the images, for their size, for kitti-boxes.", **FOLDER)
     ] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the method. [default: that of PREDICTIONS]")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the method.", show_default="that of PREDICTIONS")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the tables as Markdown, CSV and JSON.", file_okay=False)
     ] = None,

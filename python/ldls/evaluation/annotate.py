@@ -41,8 +41,9 @@ class Annotation:
 
     def objects(self) -> dict[str, int]:
         """Objects of each class that have points."""
-        pairs = set(zip(self.labeling.classes.tolist(), self.labeling.instances.tolist(), strict=True))
-        return dict(Counter(self.labeling.names[k] for k, instance in pairs if instance))
+        rows = np.flatnonzero(self.labeling.instances)
+        pairs = np.unique(np.stack([self.labeling.classes[rows], self.labeling.instances[rows]]), axis=1)
+        return dict(Counter(self.labeling.names[k] for k in pairs[0]))
 
 
 def annotate(objects: Sequence[KittiObject], points: ArrayLike, camera: Camera, *, clean: bool = True) -> Annotation:

@@ -47,6 +47,9 @@ FORMATS: dict[str, Format] = {
 """Formats by name; longer endings come before the shorter ones that they end in."""
 
 
+SAY_WHICH = "say which by format=, or by --truth-format and --prediction-format"
+
+
 def read_labeling(
     path: str | PathLike[str],
     *,
@@ -91,9 +94,9 @@ def guess_format(path: str | PathLike[str]) -> str:
     if len(fitting) == 1:
         return fitting[0]
     if fitting:
-        raise UnsupportedFormatError(f"{path}: may be {' or '.join(fitting)}; say which (format)")
+        raise UnsupportedFormatError(f"{path}: may be {' or '.join(fitting)}; {SAY_WHICH}")
     known = ", ".join(f"{key} (*{found.ending})" for key, found in FORMATS.items())
-    raise UnsupportedFormatError(f"{path}: no format of labels has this name; expected {known}, or say which (format)")
+    raise UnsupportedFormatError(f"{path}: no format of labels has this name; expected {known}; {SAY_WHICH}")
 
 
 def check_format(format: str) -> str:

@@ -92,7 +92,7 @@ def _check_complete(
     sides = ((predictions, "no truth", sorted(only_ours)), (truth, "no prediction", sorted(only_theirs)))
     lacking = [f"{_listed(names)} of {side} have {what}" for side, what, names in sides if names]
     if lacking:
-        raise InputError(f"frames without their pair: {'; '.join(lacking)}; add them, or skip them (missing)")
+        raise InputError(f"frames without their pair: {'; '.join(lacking)}; add them, or skip them (--missing skip)")
 
 
 def _listed(names: list[str]) -> str:

@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+from PIL import Image
+
+from ldls.errors import InputError, ShapeError
+from ldls.evaluation.frame_inputs import FrameInputs
+from ldls.evaluation.frames import read_pairs
+from ldls.evaluation.pairing import FrameFiles, pair_files
+
+CALIB = """P0: 1 0 0 0 0 1 0 0 0 0 1 0
+P2: 100 0 50 0 0 100 40 0 0 0 1 0
+R0_rect: 1 0 0 0 1 0 0 0 1
+Tr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0
+"""
+POINTS = np.array([[1.5, 1.0, 20.0, 0.5], [5.0, 0.0, 20.0, 0.1], [30.0, 0.0, 20.0, 0.1]], np.float32)
+
+
+@pytest.fixture
+def boxes(tmp_path):
+    for folder in ("mine", "label_2", "velodyne", "calib", "image_2"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "label_2/7.txt").write_text("Car 0 0 0 0 0 9 9 1.5 1.6 4.0 1.0 1.5 20.0 0\n")
+    (tmp_path / "calib/7.txt").write_text(CALIB)
+    (tmp_path / "velodyne/7.bin").write_bytes(POINTS.tobytes())
+    (tmp_path / "mine/7.txt").write_text("1 Car\n0 background\n0 background\n")
+    Image.new("RGB", (100, 80)).save(tmp_path / "image_2/7.png")
+    return tmp_path
+
+
+def read(folder, **inputs):
+    formats = {"prediction_format": "annotations", "truth_format": "kitti-boxes"}
+    frames, _ = pair_files(folder / "mine", folder / "label_2", **formats)
+    (pair,) = read_pairs(frames, inputs=FrameInputs(**{k: folder / v for k, v in inputs.items()}), **formats)
+    return pair
+
+
+def test_boxes_take_points_calibration_and_the_size_of_the_image(boxes):
+    pair = read(boxes, points="velodyne", calib="calib", images="image_2")
+    assert pair.truth.names[pair.truth.classes[0]] == "Car"
+    np.testing.assert_allclose(pair.ranges_m, np.linalg.norm(POINTS[:, :3], axis=1), rtol=1e-6)
+    assert pair.truth.ignored.tolist() == [False, False, True]
+    # KITTI's usual image is wide enough for the third point
+    assert not read(boxes, points="velodyne", calib="calib").truth.ignored.any()
+
+
+def test_what_boxes_need_is_named(boxes):
+    with pytest.raises(InputError, match="frame 7: needs its points; .*--points"):
+        read(boxes)
+    with pytest.raises(InputError, match="frame 7: needs its calibration; .*--calib"):
+        read(boxes, points="velodyne")
+    with pytest.raises(FileNotFoundError, match=r"calib.7\.bin"):
+        read(boxes, points="calib", calib="calib")
+    (boxes / "mine/7.txt").write_text("1 Car\n")
+    with pytest.raises(ShapeError, match="frame 7: prediction has 1 points, truth 3"):
+        read(boxes, points="velodyne", calib="calib")
+
+
+def test_squeezeseg_brings_its_ranges(tmp_path):
+    image = np.zeros((64, 512, 6))
+    image[0, 0, 4:] = 12.5, 1
+    np.save(tmp_path / "truth.npy", image)
+    np.save(tmp_path / "mine.npy", image[:, :, 5].astype(np.uint8))
+    (pair,) = read_pairs([FrameFiles("a", tmp_path / "mine.npy", tmp_path / "truth.npy")])
+    assert pair.ranges_m[:2].tolist() == [12.5, 0]
+    (pair,) = read_pairs([FrameFiles("a", tmp_path / "mine.npy", tmp_path / "mine.npy")])
+    assert pair.ranges_m is None
