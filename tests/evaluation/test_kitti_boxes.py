@@ -60,6 +60,7 @@ def test_broken_rows_are_named(tmp_path, row, error, message):
         # rotation_y turns x towards -z: the nose of a box turned by 45 degrees points right and back
         pytest.param((2.3, 1.0, 18.7), np.pi / 4, True, id="45 degrees, along the nose"),
         pytest.param((2.3, 1.0, 21.3), np.pi / 4, False, id="45 degrees, across the nose"),
+        pytest.param((2.5, 1.0, 18.5), np.pi / 4, False, id="45 degrees, beyond the nose"),
         pytest.param((np.nan, 1.0, 20.0), 0.0, False, id="nan"),
     ],
 )
