@@ -77,7 +77,7 @@ def simulate(
     A ring's other cameras go to image_ring_1 to image_ring_5, with calib_ring_K and masks_ring_K.
 
     A seed is a frame: the same one gives the same files. Frames that are there already are kept.
-    Needs the extra sim of ldls (pip).
+    Needs the extra `sim` of ldls.
 
     Example: ldls simulate scenes --frames 5 --scene campus, and then ldls segment
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt

@@ -18,8 +18,11 @@ class SegmenterErrors:
         mask_cells: A mask is drawn on this many cells across its box and enlarged, as networks do; 0 for pixels.
         box_slip: Each side of the box is off by this share of the box's side (standard deviation).
         bleed_px: Mean distance by which a mask reaches over the object's edge, in pixels; each instance has its own.
+        bleed_cells: How much further a mask reaches on average, in cells of a grid of 28 across the object: the coarser
+            a network draws a large object, the farther it is off.
         ragged_px: How far an edge wavers, in pixels (standard deviation); never more than a quarter of the object.
-        missed: Probability that a large, wholly visible object is not found; small and hidden ones up to six times it.
+        missed: Probability that a large, wholly visible object is not found; small ones up to six times
+            that, hidden ones three times.
         merged: Probability that an object whose box meets that of another of its category is found as one with it.
         invented: How many things an image has, on average, that are not there.
         wrong_class: Probability of a wrong category.
@@ -29,6 +32,7 @@ class SegmenterErrors:
     mask_cells: int = 28
     box_slip: float = 0.02
     bleed_px: float = 1.8
+    bleed_cells: float = 0.3
     ragged_px: float = 1.0
     missed: float = 0.05
     merged: float = 0.05

@@ -11,13 +11,14 @@ from ldls.simulation.errors import SegmenterErrors
 
 Mask = NDArray[np.bool_]
 MARGIN_PX = 12
+NETWORK_CELLS = 28
 WAVE_PX = 6.0
 """An edge wavers over about this many pixels of its length."""
 
 
 def drawn(silhouette: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mask:
     """(H, W) the mask that a network draws of `silhouette`; the same where all strengths are 0."""
-    window = _window(silhouette, MARGIN_PX + int(2 * errors.bleed_px))
+    window = _window(silhouette, MARGIN_PX + int(2 * _mean_bleed(silhouette, errors)))
     part = silhouette[window]
     cells = _on_cells(part, errors, rng) if errors.mask_cells or errors.box_slip else part
     mask = np.zeros_like(silhouette)
@@ -55,13 +56,19 @@ def _slipped(extent: slice, slip: NDArray[np.float64], size: int) -> slice:
 
 def _edged(part: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mask:
     """`part` with its edge moved outwards by a bleed of its own, and wavering."""
-    if not (errors.bleed_px or errors.ragged_px):
+    if not (errors.bleed_px or errors.bleed_cells or errors.ragged_px):
         return part
     ndimage = require("scipy.ndimage", "sim")
     outside, inside = ndimage.distance_transform_edt(~part), ndimage.distance_transform_edt(part)
-    bleed = errors.bleed_px * rng.gamma(4.0, 0.25)
+    bleed = _mean_bleed(part, errors) * rng.gamma(4.0, 0.25)
     wave = ndimage.gaussian_filter(rng.normal(size=part.shape), WAVE_PX / 2)
     # a sliver is not frayed away
     wave *= min(errors.ragged_px, 0.25 * float(inside.max())) / max(float(wave.std()), 1e-9)
     grown: Mask = np.where(part, inside - 0.5, 0.5 - outside) + bleed + wave >= 0
     return grown if grown.any() else part
+
+
+def _mean_bleed(part: Mask, errors: SegmenterErrors) -> float:
+    rows, columns = _window(part, 0)
+    side_px = ((rows.stop - rows.start) * (columns.stop - columns.start)) ** 0.5
+    return float(errors.bleed_px + errors.bleed_cells * side_px / NETWORK_CELLS)

@@ -32,8 +32,9 @@ CONFUSED_WITH = {
 
 @dataclass(frozen=True, eq=False)
 class _Find:
-    """One instance as found so far; `visible` is the share of it that nothing hides."""
+    """One instance as found so far, of the object `number`; `visible` is the share of it that nothing hides."""
 
+    number: int
     category: int
     mask: Mask
     visible: float
@@ -50,11 +51,16 @@ def segmented(truth: PixelTruth, *, errors: SegmenterErrors | None = None, seed:
     errors = SegmenterErrors() if errors is None else errors
     if errors == SegmenterErrors.none():
         return true_masks(truth)
-    rng = np.random.default_rng((seed, 2))
-    found = [f for f in _visible(truth, SMALLEST_PX) if rng.random() >= _miss_chance(f, errors)]
-    found = [replace(f, mask=drawn(f.mask, errors, rng)) for f in _merged(found, errors, rng)]
-    found = [_named(_scored(f, errors, rng), errors, rng) for f in found]
-    found += [_invented(truth, rng) for _ in range(int(rng.poisson(errors.invented)))]
+    # each error has numbers of its own, so that the strength of one does not change what another does
+    missing, merging, naming, inventing = (np.random.default_rng((seed, 2, k)) for k in range(4))
+    seen = _visible(truth, SMALLEST_PX)
+    found = [f for f, chance in zip(seen, missing.random(len(seen)), strict=True) if chance >= _miss_chance(f, errors)]
+    found = [
+        replace(f, mask=drawn(f.mask, errors, np.random.default_rng((seed, 3, f.number))))
+        for f in _merged(found, errors, merging)
+    ]
+    found = [_named(_scored(f, errors, naming), errors, naming) for f in found]
+    found += [_invented(truth, inventing) for _ in range(int(inventing.poisson(errors.invented)))]
     return _as_masks(sorted(found, key=lambda f: -f.score), truth)
 
 
@@ -62,14 +68,14 @@ def _visible(truth: PixelTruth, smallest_px: int) -> list[_Find]:
     counts = np.bincount(truth.instances.ravel(), minlength=len(truth.categories) + 1)[1:]
     shares = np.clip(counts / np.maximum(truth.expected_px, counts).clip(1), 0, 1)
     return [
-        _Find(int(truth.categories[m]), truth.instances == m + 1, float(shares[m]))
-        for m in np.flatnonzero(counts >= smallest_px)
+        _Find(m + 1, int(truth.categories[m]), truth.instances == m + 1, float(shares[m]))
+        for m in np.flatnonzero(counts >= smallest_px).tolist()
     ]
 
 
 def _miss_chance(find: _Find, errors: SegmenterErrors) -> float:
     hidden = 1 + 2 * (1 - find.visible)
-    small = 1 + float(np.exp(-np.count_nonzero(find.mask) / 400))
+    small = 1 + 5 * float(np.exp(-np.count_nonzero(find.mask) / 300))
     return float(min(errors.missed * hidden * small, 0.95))
 
 
@@ -86,26 +92,28 @@ def _merged(found: list[_Find], errors: SegmenterErrors, rng: np.random.Generato
 
 
 def _meet(one: Mask, other: Mask) -> bool:
-    """Whether the boxes of two masks overlap."""
+    """Whether the boxes of two masks overlap or touch."""
     spans = [
         [(np.flatnonzero(mask.any(axis=axis))[0], np.flatnonzero(mask.any(axis=axis))[-1]) for axis in (1, 0)]
         for mask in (one, other)
     ]
-    return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(*spans, strict=True))
+    return all(a[0] <= b[1] + 2 and b[0] <= a[1] + 2 for a, b in zip(*spans, strict=True))
 
 
 def _scored(find: _Find, errors: SegmenterErrors, rng: np.random.Generator) -> _Find:
+    noise = abs(rng.normal())
     if errors.score_noise == 0:
         return find
     small = 0.25 * np.exp(-np.count_nonzero(find.mask) / 600) + 0.15 * (1 - find.visible)
-    return replace(find, score=float(np.clip(0.99 - small - abs(rng.normal(0, errors.score_noise)), 0.3, 1)))
+    return replace(find, score=float(np.clip(0.99 - small - errors.score_noise * noise, 0.3, 1)))
 
 
 def _named(find: _Find, errors: SegmenterErrors, rng: np.random.Generator) -> _Find:
-    if rng.random() >= errors.wrong_class:
+    chance, choice = rng.random(2)
+    if chance >= errors.wrong_class:
         return find
     others = CONFUSED_WITH[find.category]
-    return replace(find, category=others[int(rng.integers(len(others)))], score=0.8 * find.score)
+    return replace(find, category=others[int(choice * len(others))], score=0.8 * find.score)
 
 
 def _invented(truth: PixelTruth, rng: np.random.Generator) -> _Find:
@@ -116,7 +124,7 @@ def _invented(truth: PixelTruth, rng: np.random.Generator) -> _Find:
     tall, wide = rng.uniform(0.03, 0.12) * height, rng.uniform(0.02, 0.12) * height
     blob = ((v - row) / tall) ** 2 + ((u - column) / wide) ** 2 <= 1
     categories = list(CONFUSED_WITH)
-    return _Find(categories[int(rng.integers(len(categories)))], blob, 1.0, float(rng.uniform(0.3, 0.65)))
+    return _Find(0, categories[int(rng.integers(len(categories)))], blob, 1.0, float(rng.uniform(0.3, 0.65)))
 
 
 def _as_masks(found: list[_Find], truth: PixelTruth) -> InstanceMasks:

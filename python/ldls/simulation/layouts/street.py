@@ -63,7 +63,7 @@ def _traffic(plan: Plan, across: Profile, rng: np.random.Generator) -> None:
         (objects.TRUCK, vehicles.truck),
         (objects.MOTORCYCLE, cycles.motorcycle),
     )
-    for lane_m, yaw, spots in ((0.0, 0.0, (14.0, 27.0, 42.0, -14.0)), (3.4, np.pi, (9.0, 20.0, 33.0, 48.0, -16.0))):
+    for lane_m, yaw, spots in ((0.0, 0.0, (16.0, 28.0, 42.0, -14.0)), (3.4, np.pi, (13.0, 23.0, 34.0, 48.0, -16.0))):
         for x in spots:
             if rng.random() < 0.45:
                 category, build = kinds[int(rng.choice(4, p=(0.68, 0.1, 0.12, 0.1)))]
@@ -77,7 +77,8 @@ def _parked(plan: Plan, across: Profile, rng: np.random.Generator) -> None:
     for y, yaw in ((across.right_kerb_m + 1.15, 0.0), (across.left_kerb_m - 1.1, np.pi)):
         x, full = -25.0, rng.uniform(0.25, 0.75)
         while x < 55:
-            if rng.random() < full:
+            beside = 3 < x < 9  # the mouth of a drive, often kept free
+            if rng.random() < (0.4 * full if beside else full):
                 truck = rng.random() < 0.06
                 category, build = (objects.TRUCK, vehicles.truck) if truck else (objects.CAR, vehicles.car)
                 turn = yaw + rng.normal(0, 0.025) + (np.pi if rng.random() < 0.15 else 0.0)

@@ -1,0 +1,176 @@
+"""Every reader reads what is written; the suite is what it is by its seeds."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import ldls
+from ldls.errors import ParameterError
+from ldls.evaluation import ClassSet, read_annotations
+from ldls.simulation import (
+    SceneFrame,
+    SegmenterErrors,
+    SensorErrors,
+    make_frames,
+    make_rig,
+    scene_frame,
+    suite_folder,
+    suite_orders,
+    write_kitti,
+)
+from ldls.simulation import suite as make_whole_suite
+from ldls.simulation.boxes import annotation_name
+from ldls.simulation.kitti_layout import is_whole
+from ldls.simulation.production import FrameOrder
+
+
+@pytest.fixture(scope="module")
+def frame() -> SceneFrame:
+    return scene_frame(21, kind="campus")
+
+
+@pytest.fixture(scope="module")
+def training(frame, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("scenes")
+    write_kitti(folder, "000021", frame)
+    return folder / "training"
+
+
+def test_points_come_back(frame, training):
+    np.testing.assert_array_equal(ldls.read_points(training / "velodyne/000021.bin"), frame.points)
+
+
+def test_the_calibration_comes_back(frame, training):
+    for number in range(4):
+        camera = ldls.Camera.from_kitti(training / "calib/000021.txt", camera=number)
+        np.testing.assert_allclose(camera.projection, frame.camera.projection, atol=1e-9)
+        np.testing.assert_allclose(camera.T_camera_lidar, frame.camera.T_camera_lidar, atol=1e-9)
+
+
+def test_masks_come_back(frame, training):
+    masks = ldls.InstanceMasks.from_coco(training / "masks/000021.json")
+    np.testing.assert_array_equal(masks.to_array(), frame.masks.to_array())
+    np.testing.assert_array_equal(masks.categories, frame.masks.categories)
+    np.testing.assert_allclose(masks.scores, frame.masks.scores, atol=1e-4)
+
+
+def test_the_image_comes_back(frame, training):
+    with Image.open(training / "image_2/000021.png") as image:
+        np.testing.assert_array_equal(np.asarray(image), frame.image)
+
+
+def test_annotations_have_a_line_for_each_point(frame, training):
+    truth = read_annotations(training / "annotations/000021.txt")
+    np.testing.assert_array_equal(truth.instances, frame.instances)
+    names = np.array(truth.names)[truth.classes]
+    assert not truth.ignored.any()
+    assert set(names[frame.instances == 0]) == {"background"}
+    assert set(names[frame.categories == 1]) == {"Pedestrian"}
+    assert set(names[frame.categories == 3]) == {"Car"}
+
+
+def test_names_are_those_that_evaluation_knows():
+    names = [annotation_name(category) for category in (1, 3, 8, 6, 64)]
+    assert names == ["Pedestrian", "Car", "Truck", "bus", "potted plant"]
+    assert all(ClassSet.kitti().knows(name) for name in names)
+
+
+def test_boxes_hold_the_points_of_their_objects(frame, training):
+    rows = [line.split() for line in (training / "label_2/000021.txt").read_text().splitlines()]
+    assert {len(row) for row in rows} == {15}
+    assert {row[0] for row in rows} <= {"Car", "Pedestrian", "Truck", "Misc"}
+    boxes = np.array([row[1:] for row in rows], float)
+    transform = frame.camera.T_camera_lidar
+    points = frame.points[:, :3].astype(float) @ transform[:3, :3].T + transform[:3, 3]
+    checked = 0
+    for m, thing in enumerate(frame.objects, start=1):
+        mine = points[frame.instances == m]
+        bottom = transform[:3, :3] @ (np.array(thing.centre_m) - (0, 0, thing.height_m / 2)) + transform[:3, 3]
+        near = np.abs(boxes[:, 10:13] - bottom).max(axis=1) < 0.01
+        if len(mine) < 20 or not near.any():
+            continue
+        height, width, length, x, y, z, turn = boxes[near][0, 7:14]
+        c, s = np.cos(turn), np.sin(turn)
+        local = (mine - (x, y, z)) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        inside = (np.abs(local[:, 0]) < length / 2 + 0.15) & (np.abs(local[:, 2]) < width / 2 + 0.15)
+        inside &= (local[:, 1] < 0.15) & (local[:, 1] > -height - 0.15)
+        assert inside.mean() > 0.97
+        checked += 1
+    assert checked >= 5
+
+
+def test_image_boxes_lie_in_the_image_and_around_the_pixels(frame, training):
+    rows = np.array([line.split()[1:] for line in (training / "label_2/000021.txt").read_text().splitlines()], float)
+    left, top, right, bottom = rows[:, 3:7].T
+    assert ((left >= 0) & (left <= right) & (right <= 1241) & (top >= 0) & (top <= bottom) & (bottom <= 374)).all()
+    assert ((rows[:, 0] >= 0) & (rows[:, 0] <= 1) & np.isin(rows[:, 1], (0, 1, 2))).all()
+
+
+def test_the_method_runs_on_the_files(training):
+    result = ldls.segment(
+        ldls.read_points(training / "velodyne/000021.bin"),
+        ldls.InstanceMasks.from_coco(training / "masks/000021.json"),
+        ldls.Camera.from_kitti(training / "calib/000021.txt"),
+    )
+    assert (result.labels > 0).sum() > 200
+
+
+def test_a_ring_has_a_folder_for_each_camera(tmp_path):
+    rig = make_rig(lidar="vlp-16", camera="ring")
+    write_kitti(tmp_path, "000000", scene_frame(0, rig=rig))
+    for k in range(1, 6):
+        camera = ldls.Camera.from_kitti(tmp_path / f"training/calib_ring_{k}/000000.txt")
+        assert camera.projection[0, 0] == pytest.approx(809.2 if k == 3 else 1266.4)
+        assert (tmp_path / f"training/image_ring_{k}/000000.png").stat().st_size > 10_000
+        assert ldls.InstanceMasks.from_coco(tmp_path / f"training/masks_ring_{k}/000000.json").image_size == (900, 1600)
+
+
+def orders(count):
+    errors = {"segmenter": SegmenterErrors(), "sensors": SensorErrors()}
+    return [FrameOrder(name=f"{n:06d}", seed=n, lidar="vlp-16", camera="robot", **errors) for n in range(count)]
+
+
+def test_whole_frames_are_kept_and_broken_ones_made_anew(tmp_path):
+    first = list(make_frames(tmp_path, orders(2), processes=1))
+    assert [s.name for s in first] == ["000000", "000001"]
+    (tmp_path / "training/annotations/000001.txt").unlink()
+    assert not is_whole(tmp_path, "000001")
+    again = list(make_frames(tmp_path, orders(2), processes=1))
+    assert again[0] is None and again[1] == first[1]
+
+
+def test_two_processes_write_what_one_writes(tmp_path):
+    alone, together = tmp_path / "one", tmp_path / "two"
+    list(make_frames(alone, orders(2), processes=1))
+    list(make_frames(together, orders(2), processes=2))
+    files = sorted(p.relative_to(alone) for p in alone.rglob("*") if p.is_file())
+    assert len(files) == 12
+    assert all((alone / f).read_bytes() == (together / f).read_bytes() for f in files)
+
+
+def test_no_process_is_refused(tmp_path):
+    with pytest.raises(ParameterError, match="processes"):
+        list(make_frames(tmp_path, orders(1), processes=0))
+
+
+def test_the_suite_is_fixed():
+    validation, tuning = suite_orders("validation"), suite_orders("tuning")
+    assert [o.seed for o in validation] == list(range(1000, 1200))
+    assert [o.seed for o in tuning] == list(range(2000, 2020))
+    assert {o.kind for o in validation[:100]} == {"street", "campus"}
+    assert {(o.lidar, o.camera) for o in validation + tuning} == {("hdl-64e", "kitti")}
+    with pytest.raises(ParameterError, match="validation, tuning"):
+        suite_orders("test")
+
+
+def test_the_suite_is_kept_in_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("LDLS_CACHE", str(tmp_path))
+    folder = suite_folder("tuning")
+    assert folder.is_relative_to(tmp_path) and "suite-v1" in folder.parts
+    (folder / "training/annotations").mkdir(parents=True)
+    for order in suite_orders("tuning"):
+        (folder / f"training/annotations/{order.name}.txt").touch()
+    assert make_whole_suite("tuning") == folder
+    assert not (folder / "training/velodyne").exists()
