@@ -83,3 +83,11 @@ def test_real_objects_lose_their_ground_and_keep_the_rest(data_folder):
     assert left.sum() == cleaned.n_ground
     kept = cleaned.labeling.instances > 0
     assert points[left, 2].max() < np.median(points[kept, 2])
+
+
+def test_frames_without_objects_and_points_without_coordinates():
+    points = np.vstack([ground(0.0, 0.05), body(), np.full((1, 3), np.nan), [[np.inf, -np.inf, np.inf]]])
+    assert annotate([], points, CAMERA).objects() == {}
+    made = annotate([BOX], points, CAMERA)
+    assert made.labeling.ignored[-2:].all()
+    assert (made.labeling.instances > 0).sum() == len(body())

@@ -62,6 +62,7 @@ def test_broken_rows_are_named(tmp_path, row, error, message):
         pytest.param((2.3, 1.0, 21.3), np.pi / 4, False, id="45 degrees, across the nose"),
         pytest.param((2.5, 1.0, 18.5), np.pi / 4, False, id="45 degrees, beyond the nose"),
         pytest.param((np.nan, 1.0, 20.0), 0.0, False, id="nan"),
+        pytest.param((np.inf, 1.0, np.inf), np.pi / 4, False, id="infinite"),
     ],
 )
 def test_points_in_a_box(point, turn, inside):

@@ -61,7 +61,9 @@ def in_camera_frame(points: ArrayLike, camera: Camera) -> NDArray[np.float64]:
     """(N, 3) `points` of the lidar frame in the rectified camera frame, in metres: x right, y down, z forward."""
     xyz = np.asarray(points)[:, :3].astype(np.float64)
     transform = camera.T_camera_lidar
-    placed: NDArray[np.float64] = xyz @ transform[:3, :3].T + transform[:3, 3]
+    # infinite coordinates become NaN, which lies in no box
+    with np.errstate(invalid="ignore"):
+        placed: NDArray[np.float64] = xyz @ transform[:3, :3].T + transform[:3, 3]
     return placed
 
 
@@ -69,7 +71,8 @@ def in_box_frame(points_camera: NDArray[np.float64], found: KittiObject) -> NDAr
     """(N, 3) points of the camera frame along the length, up from the bottom, and across the width, in metres."""
     x, y, z = (points_camera - found.location).T
     cos, sin = np.cos(found.rotation_y), np.sin(found.rotation_y)
-    return np.stack([cos * x - sin * z, -y, sin * x + cos * z], axis=1)
+    with np.errstate(invalid="ignore"):
+        return np.stack([cos * x - sin * z, -y, sin * x + cos * z], axis=1)
 
 
 def points_in_box(points_camera: NDArray[np.float64], found: KittiObject) -> NDArray[np.bool_]:
