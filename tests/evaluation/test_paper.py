@@ -129,3 +129,11 @@ def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
     assert {f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")} <= written
     assert {"range.png", "objects.png", "iterations.png"} <= written
     assert "nan" not in ran.output.lower()
+
+
+@pytest.mark.parametrize("arguments", [[], ["FOLDER", "--suite", "tuning"]], ids=["neither", "both"])
+def test_the_command_wants_a_folder_or_a_suite(folder, tmp_path, arguments):
+    arguments = [str(folder) if argument == "FOLDER" else argument for argument in arguments]
+    ran = CliRunner().invoke(app, ["reproduce", *arguments, "--out", str(tmp_path / "out")])
+    assert ran.exit_code != 0
+    assert "expected a folder of frames or --suite" in ran.output

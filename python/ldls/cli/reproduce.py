@@ -10,6 +10,7 @@ import typer
 
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.progress import progress
+from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
     from ldls.evaluation.paper import Experiment
@@ -23,13 +24,25 @@ class Truth(StrEnum):
     BOXES = "boxes"
 
 
+class Suite(StrEnum):
+    """Part of the simulated suite."""
+
+    VALIDATION = "validation"
+    TUNING = "tuning"
+
+
 @speaks_plainly
 def reproduce(
-    folder: Annotated[
-        Path,
-        typer.Argument(help="Folder with velodyne, calib, masks and the truth.", exists=True, file_okay=False),
-    ],
     out: Annotated[Path, typer.Option(help="Folder for tables and figures; made if need be.", file_okay=False)],
+    folder: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Folder with velodyne, calib, masks and the truth, or its parent.", exists=True, file_okay=False
+        ),
+    ] = None,
+    suite: Annotated[
+        Suite | None, typer.Option(help="Instead of FOLDER: the simulated frames, made if they are not there yet.")
+    ] = None,
     truth: Annotated[
         Truth, typer.Option(help="Point annotations, or the 3D boxes of label_2, which are noisy.")
     ] = Truth.ANNOTATIONS,
@@ -42,14 +55,15 @@ def reproduce(
     the scores by maximum range and by number of iterations. Only points in view of the camera count. Writes the
     tables as Markdown, CSV and JSON, and the figures as PNG.
 
-    Example: ldls reproduce kitti/training --truth boxes --out tables
+    Examples: ldls reproduce kitti/training --truth boxes --out tables
+    and, with nothing downloaded, ldls reproduce --suite validation --out tables
     """
     from ldls.evaluation import ClassSet
     from ldls.evaluation.kitti_frames import KittiFrames
     from ldls.evaluation.paper import label, score
     from ldls.params import Params
 
-    frames = KittiFrames(folder, boxes=truth is Truth.BOXES)
+    frames = KittiFrames(_folder(folder, suite), boxes=truth is Truth.BOXES)
     names = tuple(word.strip() for word in classes.split(",") if word.strip())
     labelled = progress(label(frames, params=Params(threads=threads)), len(frames), "labelling")
     found = score(list(labelled), classes=ClassSet.kitti(names))
@@ -61,6 +75,18 @@ def reproduce(
     figures = _draw(found, out)
     screen.print(f"{len(frames)} frames; wrote {', '.join(tables)} as .md, .csv and .json", highlight=False)
     screen.print(f"and {', '.join(path.name for path in figures)} to {out}", highlight=False, soft_wrap=True)
+
+
+def _folder(folder: Path | None, suite: Suite | None) -> Path:
+    if suite is None and folder is not None:
+        return folder / "training" if (folder / "training").is_dir() else folder
+    if suite is None or folder is not None:
+        raise ParameterError("expected a folder of frames or --suite, one of the two")
+    from ldls.simulation import make_suite, suite_folder, suite_orders
+
+    for _ in progress(make_suite(suite.value), len(suite_orders(suite.value)), "simulating"):
+        pass
+    return suite_folder(suite.value) / "training"
 
 
 def _tables(found: Experiment) -> dict[str, Table]:
