@@ -18,8 +18,8 @@ class SegmenterErrors:
         mask_cells: A mask is drawn on this many cells across its box and enlarged, as networks do; 0 for pixels.
         box_slip: Each side of the box is off by this share of the box's side (standard deviation).
         bleed_px: Mean distance by which a mask reaches over the object's edge, in pixels; each instance has its own.
-        bleed_cells: How much further a mask reaches on average, in cells of a grid of 28 across the object: the coarser
-            a network draws a large object, the farther it is off.
+        bleed_cells: How much further a mask reaches on average, in cells of which 28 make the shorter side of its box:
+            the larger an object, the coarser a network draws it.
         ragged_px: How far an edge wavers, in pixels (standard deviation); never more than a quarter of the object.
         missed: Probability that a large, wholly visible object is not found; small ones up to six times
             that, hidden ones three times.

@@ -70,5 +70,5 @@ def _edged(part: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mas
 
 def _mean_bleed(part: Mask, errors: SegmenterErrors) -> float:
     rows, columns = _window(part, 0)
-    side_px = ((rows.stop - rows.start) * (columns.stop - columns.start)) ** 0.5
+    side_px = min(rows.stop - rows.start, columns.stop - columns.start)
     return float(errors.bleed_px + errors.bleed_cells * side_px / NETWORK_CELLS)

@@ -12,7 +12,7 @@ from ldls.simulation.raycasting import MISS, RayCaster
 from ldls.simulation.scenes import Scene
 from ldls.simulation.shapes.shape import Material
 
-GLASS_PASSES = 0.85
+GLASS_PASSES = 0.9
 """Share of laser pulses that a window lets through."""
 MAX_WINDOWS = 6
 F64 = NDArray[np.float64]
