@@ -24,6 +24,7 @@ from ldls.simulation import suite as make_whole_suite
 from ldls.simulation.boxes import annotation_name
 from ldls.simulation.kitti_layout import is_whole
 from ldls.simulation.production import FrameOrder
+from ldls.stages import project
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +119,10 @@ def test_the_method_runs_on_the_files(training):
 
 
 def test_a_ring_has_a_folder_for_each_camera(tmp_path):
-    rig = make_rig(lidar="vlp-16", camera="ring")
-    write_kitti(tmp_path, "000000", scene_frame(0, rig=rig))
+    frame = scene_frame(0, rig=make_rig(lidar="hdl-32e", camera="ring"))
+    write_kitti(tmp_path, "000000", frame)
+    views = [project(frame.points, view.camera, image_size=(900, 1600))[0] for view in frame.views]
+    assert len(np.unique(np.concatenate(views))) > 0.5 * len(frame.points)
     for k in range(1, 6):
         camera = ldls.Camera.from_kitti(tmp_path / f"training/calib_ring_{k}/000000.txt")
         assert camera.projection[0, 0] == pytest.approx(809.2 if k == 3 else 1266.4)

@@ -121,21 +121,18 @@ def test_windows_let_a_laser_through(frame):
 
 
 @pytest.mark.parametrize(
-    ("lidar", "camera", "size", "views"),
+    ("lidar", "camera"),
     [
-        pytest.param("vlp-16", "robot", (480, 640), 1, id="robot"),
-        pytest.param("os1-128", "robot", (480, 640), 1, id="OS1"),
-        pytest.param("hdl-32e", "ring", (900, 1600), 6, id="ring of six"),
+        pytest.param("vlp-16", "robot", id="robot"),
+        pytest.param("os1-128", "robot", id="OS1"),
     ],
 )
-def test_other_rigs(lidar, camera, size, views):
+def test_other_rigs(lidar, camera):
     frame = scene_frame(1, kind="campus", rig=make_rig(lidar=lidar, camera=camera), **PERFECT)
-    assert len(frame.views) == views
-    assert frame.image.shape == (*size, 3)
+    assert len(frame.views) == 1
+    assert frame.image.shape == (480, 640, 3)
     seen, truth = pixel_instances(frame)
     assert (seen == truth).mean() > 0.9
-    covered = {i for view in frame.views for i in project(frame.points, view.camera, image_size=size)[0].tolist()}
-    assert len(covered) > (0.5 if views == 6 else 0.03) * len(frame.points)
 
 
 def test_unknown_kinds_of_scene_are_refused():
