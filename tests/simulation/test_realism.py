@@ -51,7 +51,7 @@ def test_points_spread_over_the_scan_lines_alike(real, simulated):
         np.mean([points_by_elevation(c.points) for c in clouds], axis=0) for clouds in (full, simulated)
     )
     assert np.abs(share - real_share).max() < 0.045
-    assert np.abs(share - real_share)[4:].max() < 0.03  # the car hides part of the lowest lines
+    assert np.abs(share - real_share)[4:].max() < 0.03  # the lowest lines differ most
 
 
 def test_a_car_has_as_many_points_at_its_range(real, simulated):
