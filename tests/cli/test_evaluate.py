@@ -55,6 +55,33 @@ def test_tables_are_printed_and_written(frames):
     assert (row["Car precision"], row["Car recall"], row["Pedestrian recall"]) == (100.0, 75.0, 0.0)
 
 
+def test_methods_stand_side_by_side(frames):
+    shutil.copytree(frames / "mine", frames / "other")
+    outcome = evaluate(frames, "--beside", f"a network={frames / 'other'}", "--out", frames / "t")
+    assert outcome.exit_code == 0, outcome.output
+    rows = json.loads((frames / "t/semantic.json").read_text())["rows"]
+    assert [row["method"] for row in rows] == ["mine"] * 3 + ["a network"] * 3
+    assert [row["IoU"] for row in rows[:3]] == [row["IoU"] for row in rows[3:]]
+    assert "a network: 2 frames, 7 of 8 points counted" in outcome.output
+    assert "do not compare" not in outcome.output
+
+
+def test_methods_that_label_different_points_are_told_apart(frames):
+    shutil.copytree(frames / "mine", frames / "other")
+    write_labeling(
+        frames / "other/1.npz", Labeling(np.array([1, 1, 0, 0]), np.array([1, 1, 0, 0]), np.arange(4) > 2, NAMES)
+    )
+    outcome = evaluate(frames, "--beside", f"other={frames / 'other'}")
+    assert "label different points" in outcome.output
+
+
+@pytest.mark.parametrize("text", ["other", "=mine", "other=nowhere"])
+def test_another_method_needs_a_name_and_a_path(frames, text):
+    outcome = evaluate(frames, "--beside", text)
+    assert outcome.exit_code != 0
+    assert "expected NAME=PATH" in outcome.output
+
+
 def test_options_reach_the_scores(frames):
     assert evaluate(frames, "--out", frames / "t", "--leave-out", "").exit_code == 0
     assert scores(frames / "t")["Car precision"] == 75.0

@@ -10,6 +10,7 @@ import typer
 
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.progress import progress
+from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
     from ldls.evaluation import Evaluation
@@ -56,6 +57,9 @@ def evaluate(
         Path | None, typer.Option(help="Folder of the images, for their size, for kitti-boxes.", **FOLDER)
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the method.", show_default="that of PREDICTIONS")] = None,
+    beside: Annotated[
+        list[str] | None, typer.Option(help="NAME=PATH of another method for the same tables; may be repeated.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the tables as Markdown, CSV and JSON.", file_okay=False)
     ] = None,
@@ -80,19 +84,31 @@ def evaluate(
         background=_words(background),
     )
     formats = {"prediction_format": prediction_format, "truth_format": truth_format}
-    files, lacking = pair_files(predictions, truth, missing=missing.value, **formats)
     inputs = FrameInputs(points=points, calib=calib, images=images)
-    pairs = progress(read_pairs(files, inputs=inputs, **formats), len(files), "scoring")
-    found = score(pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
-    _show(name or predictions.stem, found, out)
-    if lacking:
-        typer.echo(f"left out for want of their pair: {_frames(len(lacking))}")
+    by_method = {}
+    for method, path in {name or predictions.stem: predictions, **_named(beside or [])}.items():
+        files, lacking = pair_files(path, truth, missing=missing.value, **formats)
+        pairs = progress(read_pairs(files, inputs=inputs, **formats), len(files), "scoring")
+        by_method[method] = score(pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
+        if lacking:
+            typer.echo(f"{method}: left out for want of their pair: {_frames(len(lacking))}")
+    _show(by_method, out)
 
 
-def _show(method: str, found: Evaluation, out: Path | None) -> None:
+def _named(beside: list[str]) -> dict[str, Path]:
+    """Paths of other methods by their names."""
+    named = {}
+    for text in beside:
+        method, equals, path = text.partition("=")
+        if not (method and equals and Path(path).exists()):
+            raise ParameterError(f"--beside: got {text!r}, expected NAME=PATH with a file or folder that exists")
+        named[method] = Path(path)
+    return named
+
+
+def _show(by_method: dict[str, Evaluation], out: Path | None) -> None:
     from ldls.evaluation import frame_table, instance_table, panoptic_table, semantic_table
 
-    by_method = {method: found}
     tables = {
         "semantic": semantic_table(by_method),
         "instances": instance_table(by_method),
@@ -101,12 +117,16 @@ def _show(method: str, found: Evaluation, out: Path | None) -> None:
     if out:
         for stem, table in tables.items():
             table.write(out, stem)
-        frame_table(found).write(out, "frames")
+        frame_table(next(iter(by_method.values()))).write(out, "frames")
     screen = console()
     for table in tables.values():
         screen.print(table.rich())
-    counted, all_points = (sum(getattr(f, field) for f in found.frames) for field in ("n_counted", "n_points"))
-    screen.print(f"{_frames(len(found.frames))}, {counted:,} of {all_points:,} points counted", highlight=False)
+    for method, found in by_method.items():
+        counted, all_points = (sum(getattr(f, field) for f in found.frames) for field in ("n_counted", "n_points"))
+        counts = f"{_frames(len(found.frames))}, {counted:,} of {all_points:,} points counted"
+        screen.print(counts if len(by_method) == 1 else f"{method}: {counts}", highlight=False)
+    if len({sum(f.n_counted for f in found.frames) for found in by_method.values()}) > 1:
+        screen.print("the methods label different points: their scores do not compare", highlight=False)
     if out:
         screen.print(
             f"wrote {', '.join(tables)} and frames as .md, .csv and .json to {out}", highlight=False, soft_wrap=True
