@@ -47,7 +47,7 @@ def reproduce(
         Truth, typer.Option(help="Point annotations, or the 3D boxes of label_2, which are noisy.")
     ] = Truth.ANNOTATIONS,
     classes: Annotated[str, typer.Option(help="Classes to score, separated by commas.")] = "Car,Pedestrian",
-    threads: Annotated[int | None, typer.Option(help="Frames at a time. [default: all cores]")] = None,
+    threads: Annotated[int | None, typer.Option(help="Frames at a time.", show_default="all cores")] = None,
 ) -> None:
     """Run the paper's experiments: direct projection, project + DBSCAN, diffusion without and with outlier removal.
 

@@ -39,7 +39,7 @@ def segment(
     image_id: Annotated[int | None, typer.Option(help="Which image of a COCO file that holds several.")] = None,
     formats: Annotated[
         list[Output] | None,
-        typer.Option("--format", help="What to write; may be repeated. [default: all]"),
+        typer.Option("--format", help="What to write; may be repeated.", show_default="all"),
     ] = None,
     neighbors: Annotated[int, typer.Option(help="K: nearest neighbours a point.")] = 10,
     sigma: Annotated[float, typer.Option(help="Reach of point edges exp(-d^2/sigma), in square metres.")] = 1.0,
@@ -54,7 +54,7 @@ def segment(
         bool,
         typer.Option("--keep-outliers/--remove-outliers", help="Keep points off an object's main part?"),
     ] = False,
-    threads: Annotated[int | None, typer.Option(help="Threads. [default: all cores]")] = None,
+    threads: Annotated[int | None, typer.Option(help="Threads.", show_default="all cores")] = None,
 ) -> None:
     """Label the points of one lidar sweep by the instance masks of one image.
 
