@@ -12,6 +12,7 @@ from sklearn.semi_supervised import LabelSpreading
 
 from benches.frames import Frame
 from benches.scipy_pipeline import project
+from ldls.evaluation.methods import DBSCAN_MIN_POINTS, DBSCAN_RADIUS_M
 
 
 def project_and_cluster(frame: Frame, masks: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -22,7 +23,7 @@ def project_and_cluster(frame: Frame, masks: NDArray[np.bool_]) -> NDArray[np.in
         inside = np.flatnonzero(mask[pixels[:, 1], pixels[:, 0]])
         if len(inside) == 0:
             continue
-        clusters = DBSCAN(eps=0.5, min_samples=5).fit_predict(xyz[inside])
+        clusters = DBSCAN(eps=DBSCAN_RADIUS_M, min_samples=DBSCAN_MIN_POINTS).fit_predict(xyz[inside])
         if (clusters >= 0).any():
             labels[inside[clusters == np.bincount(clusters[clusters >= 0]).argmax()]] = m
     return labels

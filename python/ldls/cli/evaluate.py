@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import words
 from ldls.cli.progress import progress
 from ldls.errors import ParameterError
 
@@ -78,10 +79,10 @@ def evaluate(
     from ldls.evaluation.pairing import pair_files
 
     scored = ClassSet.kitti(
-        _words(classes),
+        words(classes),
         merge_sitting=merge_sitting,
-        leave_out=None if leave_out is None else _words(leave_out),
-        background=_words(background),
+        leave_out=None if leave_out is None else words(leave_out),
+        background=words(background),
     )
     formats = {"prediction_format": prediction_format, "truth_format": truth_format}
     inputs = FrameInputs(points=points, calib=calib, images=images)
@@ -135,7 +136,3 @@ def _show(by_method: dict[str, Evaluation], out: Path | None) -> None:
 
 def _frames(number: int) -> str:
     return "1 frame" if number == 1 else f"{number} frames"
-
-
-def _words(text: str) -> tuple[str, ...]:
-    return tuple(word.strip() for word in text.split(",") if word.strip())

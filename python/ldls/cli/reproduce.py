@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import SuitePart, words
 from ldls.cli.progress import progress
 from ldls.errors import ParameterError
 
@@ -24,13 +25,6 @@ class Truth(StrEnum):
     BOXES = "boxes"
 
 
-class Suite(StrEnum):
-    """Part of the simulated suite."""
-
-    VALIDATION = "validation"
-    TUNING = "tuning"
-
-
 @speaks_plainly
 def reproduce(
     out: Annotated[Path, typer.Option(help="Folder for tables and figures; made if need be.", file_okay=False)],
@@ -41,7 +35,7 @@ def reproduce(
         ),
     ] = None,
     suite: Annotated[
-        Suite | None, typer.Option(help="Instead of FOLDER: the simulated frames, made if they are not there yet.")
+        SuitePart | None, typer.Option(help="Instead of FOLDER: the simulated frames, made if they are not there yet.")
     ] = None,
     truth: Annotated[
         Truth, typer.Option(help="Point annotations, or the 3D boxes of label_2, which are noisy.")
@@ -64,9 +58,8 @@ def reproduce(
     from ldls.params import Params
 
     frames = KittiFrames(_folder(folder, suite), boxes=truth is Truth.BOXES)
-    names = tuple(word.strip() for word in classes.split(",") if word.strip())
     labelled = progress(label(frames, params=Params(threads=threads)), len(frames), "labelling")
-    found = score(list(labelled), classes=ClassSet.kitti(names))
+    found = score(list(labelled), classes=ClassSet.kitti(words(classes)))
     screen = console()
     tables = _tables(found)
     for stem, table in tables.items():
@@ -77,7 +70,7 @@ def reproduce(
     screen.print(f"and {', '.join(path.name for path in figures)} to {out}", highlight=False, soft_wrap=True)
 
 
-def _folder(folder: Path | None, suite: Suite | None) -> Path:
+def _folder(folder: Path | None, suite: SuitePart | None) -> Path:
     if suite is None and folder is not None:
         return folder / "training" if (folder / "training").is_dir() else folder
     if suite is None or folder is not None:

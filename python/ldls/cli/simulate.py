@@ -10,6 +10,7 @@ import typer
 from rich.table import Table
 
 from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import SuitePart
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -38,13 +39,6 @@ class CameraName(StrEnum):
     KITTI = "kitti"
     ROBOT = "robot"
     RING = "ring"
-
-
-class SuitePart(StrEnum):
-    """Parts of the suite."""
-
-    VALIDATION = "validation"
-    TUNING = "tuning"
 
 
 @speaks_plainly

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ldls.evaluation.evaluate import Evaluation
-from ldls.evaluation.tables import PERCENT, Cell, Table
+from ldls.evaluation.tables import PERCENT, Cell, Table, percent
 
 
 def range_table(by_range: Mapping[float, Evaluation]) -> Table:
@@ -14,7 +14,7 @@ def range_table(by_range: Mapping[float, Evaluation]) -> Table:
     for limit_m, found in by_range.items():
         for name in found.names:
             counts = found.semantic[name]
-            scores = (_percent(score) for score in (counts.precision, counts.recall, counts.iou))
+            scores = (percent(score) for score in (counts.precision, counts.recall, counts.iou))
             rows.append((f"{limit_m:g}", name, counts.tp + counts.fn, *scores))
     columns = ("maximum range, m", "class", "true points", "precision", "recall", "IoU")
     return Table("Points by maximum range", columns, tuple(rows), PERCENT)
@@ -25,11 +25,7 @@ def iteration_table(by_iterations: Mapping[int, Evaluation]) -> Table:
     names = next(iter(by_iterations.values())).names if by_iterations else ()
     rows: list[tuple[Cell, ...]] = []
     for count, found in by_iterations.items():
-        scores = (_percent(found.semantic[name].iou) for name in names)
-        rows.append((count, *scores, _percent(found.semantic.mean_iou)))
+        scores = (percent(found.semantic[name].iou) for name in names)
+        rows.append((count, *scores, percent(found.semantic.mean_iou)))
     columns = ("iterations", *(f"{name} IoU" for name in names), "mean IoU")
     return Table("Points by number of iterations", columns, tuple(rows), PERCENT)
-
-
-def _percent(score: float | None) -> float | None:
-    return None if score is None else 100 * score

@@ -14,6 +14,7 @@ from ldls._ldls import default_threads
 from ldls.errors import InputError
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.evaluate import Evaluation, evaluate
+from ldls.evaluation.frame_inputs import ranges_of
 from ldls.evaluation.kitti_frames import LabelledFrame
 from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.methods import FULL, OUT_OF_VIEW, compare
@@ -109,7 +110,7 @@ def _label(frame: LabelledFrame, params: Params, iterations: Sequence[int]) -> L
     in_view = np.flatnonzero(next(iter(found.values())) != OUT_OF_VIEW)
     truth = _rows(frame.truth, in_view)
     names = np.array([mask.name for mask in frame.masks], np.str_)
-    ranges_m = np.linalg.norm(frame.points[in_view, :3].astype(np.float64), axis=1)
+    ranges_m = ranges_of(frame.points[in_view])
 
     def pair(labels: NDArray[np.int32]) -> Pair:
         return Pair(frame.name, from_instance_labels(labels[in_view], names), truth, ranges_m)

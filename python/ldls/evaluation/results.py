@@ -30,7 +30,7 @@ def read_results(path: str | PathLike[str]) -> Labeling:
     arrays = read_npz(path)
     try:
         if {"labels", "object_name"} <= arrays.keys():
-            return _by_object(arrays["labels"], arrays["object_name"])
+            return from_instance_labels(arrays["labels"], arrays["object_name"])
         if {"classes", "names"} <= arrays.keys():
             return _by_array(arrays)
     except (InputError, IndexError) as error:
@@ -48,7 +48,7 @@ def write_labeling(path: str | PathLike[str], labeling: Labeling) -> None:
 
 def from_segmentation(result: Segmentation) -> Labeling:
     """Labels of a segmentation, its instances by their masks; points out of view are ignored."""
-    return _by_object(result.labels, np.array([mask.name for mask in result.masks], np.str_))
+    return from_instance_labels(result.labels, np.array([mask.name for mask in result.masks], np.str_))
 
 
 def from_instance_labels(labels: NDArray[Any], class_names: NDArray[np.str_]) -> Labeling:
@@ -57,10 +57,6 @@ def from_instance_labels(labels: NDArray[Any], class_names: NDArray[np.str_]) ->
     Raises:
         InputError: A label has no name.
     """
-    return _by_object(labels, class_names)
-
-
-def _by_object(labels: NDArray[Any], class_names: NDArray[np.str_]) -> Labeling:
     objects = [str(name) for name in class_names]
     if labels.size and not (labels.min() >= -1 and labels.max() <= len(objects)):
         raise InputError(f"labels: got {labels.min()} to {labels.max()}, expected -1 to {len(objects)}")

@@ -104,9 +104,9 @@ def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     for method, found in evaluations.items():
         for name in names:
             c = found.semantic[name]
-            rows.append((method, name, c.tp + c.fn, *map(_percent, (c.precision, c.recall, c.iou))))
+            rows.append((method, name, c.tp + c.fn, *map(percent, (c.precision, c.recall, c.iou))))
         if len(names) > 1:
-            rows.append((method, "mean", None, None, None, _percent(found.semantic.mean_iou)))
+            rows.append((method, "mean", None, None, None, percent(found.semantic.mean_iou)))
     columns = ("method", "class", "true points", "precision", "recall", "IoU")
     return Table("Points by class", columns, tuple(rows), PERCENT)
 
@@ -118,7 +118,7 @@ def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
         for name in found.names:
             for threshold in found.instance.thresholds:
                 c = found.instance[name, threshold]
-                scores = _percent(c.precision), _percent(c.recall)
+                scores = percent(c.precision), percent(c.recall)
                 rows.append((method, name, f"{threshold:.2f}", c.tp, c.fp, c.fn, *scores))
     columns = ("method", "class", "IoU from", "TP", "FP", "FN", "precision", "recall")
     return Table("Instances", columns, tuple(rows), PERCENT)
@@ -130,7 +130,7 @@ def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     for method, found in evaluations.items():
         for name in found.names:
             q = found.panoptic[name]
-            scores = _percent(q.pq), _percent(q.sq), _percent(q.rq)
+            scores = percent(q.pq), percent(q.sq), percent(q.rq)
             rows.append((method, name, *scores, q.counts.tp, q.counts.fp, q.counts.fn))
     columns = ("method", "class", "PQ", "SQ", "RQ", "TP", "FP", "FN")
     return Table("Panoptic quality", columns, tuple(rows), PERCENT)
@@ -142,10 +142,10 @@ def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     first: float | None = None
     for variant, found in evaluations.items():
-        mean = _percent(found.semantic.mean_iou)
+        mean = percent(found.semantic.mean_iou)
         first = mean if not rows else first
         gain = None if mean is None or first is None else mean - first
-        rows.append((variant, *(_percent(found.semantic[name].iou) for name in names), mean, gain))
+        rows.append((variant, *(percent(found.semantic[name].iou) for name in names), mean, gain))
     columns = ("variant", *(f"{name} IoU" for name in names), "mean IoU", "gain")
     return Table("Ablation", columns, tuple(rows), f"{PERCENT} Gain: points of mean IoU over the first row.")
 
@@ -153,8 +153,7 @@ def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
 def frame_table(found: Evaluation) -> Table:
     """Points, those that count, and IoU of each class, by frame."""
     rows = [
-        (f.name, f.n_points, f.n_counted, *(_percent(f.classes[name].iou) for name in found.names))
-        for f in found.frames
+        (f.name, f.n_points, f.n_counted, *(percent(f.classes[name].iou) for name in found.names)) for f in found.frames
     ]
     columns = ("frame", "points", "counted", *(f"{name} IoU" for name in found.names))
     return Table("Frames", columns, tuple(rows), PERCENT)
@@ -167,7 +166,8 @@ def _classes(evaluations: Mapping[str, Evaluation]) -> tuple[str, ...]:
     return sets.pop()
 
 
-def _percent(score: float | None) -> float | None:
+def percent(score: float | None) -> float | None:
+    """A score from 0 to 1 in percent; None stays None."""
     return None if score is None else 100 * score
 
 

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 /// Rows of a block.
 pub(crate) const BLOCK: usize = 16;
+
 /// The blocks of a graph: from which of them values flow to each.
 #[derive(Debug)]
 pub(crate) struct Blocks {

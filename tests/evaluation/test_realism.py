@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.simulation import scene_frame
-from ldls.simulation.realism import (
+from ldls.evaluation import read_kitti_objects
+from ldls.evaluation.realism import (
     LabelledCloud,
     labelled_by_boxes,
     mask_overlap,
     points_by_elevation,
     points_by_range,
 )
+from ldls.simulation import scene_frame
 from ldls.stages import project
 
 FRAMES = ("000000", "000001", "000002", "000003")
@@ -22,10 +23,10 @@ def real(data_folder):
     training = data_folder / "kitti/training"
     return [
         labelled_by_boxes(
+            read_kitti_objects(training / f"label_2/{name}.txt"),
             ldls.read_points(training / f"velodyne/{name}.bin"),
             ldls.InstanceMasks.from_coco(training / f"masks/{name}.json"),
             ldls.Camera.from_kitti(training / f"calib/{name}.txt"),
-            (training / f"label_2/{name}.txt").read_text().splitlines(),
         )
         for name in FRAMES
     ]

@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
+from ldls.evaluation.kitti_boxes import in_box_frame, in_camera_frame, points_in_box
+from ldls.evaluation.kitti_objects import KittiObject
 from ldls.masks import InstanceMasks
 from ldls.stages import direct_labels, project
 
 ELEVATIONS_DEG = np.arange(-24.0, 2.1, 2.0)
 RANGES_M = (5.0, 10.0, 15.0, 20.0, 30.0, 45.0)
+CATEGORIES = {"Car": 3, "Pedestrian": 1, "Person_sitting": 1}
+"""COCO's categories of KITTI's boxes."""
+GROUND_M = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,27 +75,15 @@ def mask_overlap(clouds: Sequence[LabelledCloud], category: int) -> tuple[float,
 
 
 def labelled_by_boxes(
-    points: NDArray[np.float32], masks: InstanceMasks, camera: Camera, rows: Sequence[str]
+    objects: Sequence[KittiObject], points: NDArray[np.float32], masks: InstanceMasks, camera: Camera
 ) -> LabelledCloud:
-    """A real frame, its points labelled by the boxes of cars and people in KITTI's label_2 rows.
+    """A real frame, its points labelled by KITTI's boxes of cars and people.
 
     A box's lowest 0.1 m is left out, as ground stands in it.
     """
-    transform = camera.T_camera_lidar
-    in_camera = points[:, :3].astype(np.float64) @ transform[:3, :3].T + transform[:3, 3]
+    seen = in_camera_frame(points, camera)
     instances, categories = np.zeros(len(points), np.int32), np.zeros(len(points), np.int32)
-    boxes = [row.split() for row in rows]
-    named = {"Car": 3, "Pedestrian": 1, "Person_sitting": 1}
-    for number, box in enumerate((b for b in boxes if b[0] in named), start=1):
-        inside = _inside(in_camera, [float(field) for field in box[8:15]])
-        instances[inside], categories[inside] = number, named[box[0]]
+    for number, found in enumerate((one for one in objects if one.type in CATEGORIES), start=1):
+        inside = points_in_box(seen, found) & (in_box_frame(seen, found)[:, 1] >= GROUND_M)
+        instances[inside], categories[inside] = number, CATEGORIES[found.type]
     return LabelledCloud(points, instances, categories, masks, camera)
-
-
-def _inside(points: NDArray[np.float64], box: Sequence[float]) -> NDArray[np.bool_]:
-    height, width, length, x, y, z, turn = box
-    c, s = np.cos(turn), np.sin(turn)
-    local = (points - (x, y, z)) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    flat = (np.abs(local[:, 0]) <= length / 2) & (np.abs(local[:, 2]) <= width / 2)
-    inside: NDArray[np.bool_] = flat & (local[:, 1] <= -0.1) & (local[:, 1] >= -height)
-    return inside
