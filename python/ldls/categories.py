@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+
+from ldls.errors import ParameterError
+
 COCO_NAMES: dict[int, str] = {
     1: "person", 2: "bicycle", 3: "car", 4: "motorcycle", 5: "airplane", 6: "bus", 7: "train",
     8: "truck", 9: "boat", 10: "traffic light", 11: "fire hydrant", 13: "stop sign",
@@ -21,3 +26,22 @@ COCO_NAMES: dict[int, str] = {
 
 CONTIGUOUS_IDS: tuple[int, ...] = tuple(COCO_NAMES)
 """COCO id of the class at each position: networks number the 80 classes without gaps, Matterport's from 1."""
+
+
+def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> list[int]:
+    """Ids of the categories `wanted`, each an id or a name, among `names`.
+
+    Raises:
+        ParameterError: There is no such category; the message has the nearest name.
+    """
+    return [category for one in wanted for category in _ids(one, names)]
+
+
+def _ids(wanted: int | str, names: Mapping[int, str]) -> list[int]:
+    found = [category for category, name in names.items() if wanted in (category, name)]
+    if found:
+        return found
+    near = get_close_matches(str(wanted), names.values(), n=1)
+    some = ", ".join(list(names.values())[:8]) + (", ..." if len(names) > 8 else "")
+    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {some}"
+    raise ParameterError(f"categories: {wanted!r} is unknown; {hint}")

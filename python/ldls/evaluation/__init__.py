@@ -16,7 +16,6 @@ from ldls.evaluation.figures import iou_against_iterations, iou_against_range, s
 from ldls.evaluation.formats import FORMATS, Format, read_labeling
 from ldls.evaluation.instance import InstanceScores
 from ldls.evaluation.kitti_boxes import label_by_boxes, points_in_box, read_kitti_boxes
-from ldls.evaluation.kitti_objects import KittiObject, read_kitti_objects
 from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.nuscenes import read_lidarseg, read_panoptic
 from ldls.evaluation.object_scores import ObjectScore, object_scores
@@ -27,6 +26,7 @@ from ldls.evaluation.semantic import SemanticScores
 from ldls.evaluation.semantic_kitti import read_semantic_kitti
 from ldls.evaluation.squeezeseg import read_squeezeseg, read_squeezeseg_ranges
 from ldls.evaluation.tables import Table, ablation_table, frame_table, instance_table, panoptic_table, semantic_table
+from ldls.io.kitti_objects import KittiObject, read_kitti_objects
 
 __all__ = [
     "FORMATS",

@@ -12,8 +12,8 @@ import numpy as np
 
 from ldls.errors import CorruptFileError
 from ldls.evaluation.labeling import MAX_LABEL, Labeling
-from ldls.evaluation.text import read_lines
 from ldls.evaluation.vocabularies import BACKGROUND
+from ldls.io.text import read_lines
 from ldls.io.whole_file import whole_file
 
 DONT_CARE = "DontCare"

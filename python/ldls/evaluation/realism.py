@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
 from ldls.evaluation.kitti_boxes import in_box_frame, in_camera_frame, points_in_box
-from ldls.evaluation.kitti_objects import KittiObject
+from ldls.io.kitti_objects import KittiObject
 from ldls.masks import InstanceMasks
 from ldls.stages import direct_labels, project
 

@@ -20,6 +20,7 @@ mod kdtree;
 mod lanes;
 mod masks;
 mod memory;
+mod morphology;
 mod neighbors;
 mod params;
 mod pass;

@@ -97,6 +97,26 @@ impl InstanceMasks {
         &self.masks
     }
 
+    /// Sets the pixels of mask m in image m of `pixels`, row by row, all `false` before.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where `pixels` does not hold one image a mask.
+    pub fn paint(&self, pixels: &mut [bool]) -> Result<()> {
+        let image = self.height * self.width;
+        if self.masks.len().checked_mul(image) != Some(pixels.len()) {
+            let problem = format!("{} values for {} masks", pixels.len(), self.masks.len());
+            return Err(Error::Mismatch {
+                name: "pixels",
+                problem,
+            });
+        }
+        let images = pixels.par_chunks_mut(image);
+        images
+            .zip(&self.masks)
+            .for_each(|(pixels, mask)| mask.paint(pixels));
+        Ok(())
+    }
+
     /// The pixel edges of points that fall on the pixels `uv`: each point is joined to the pixels of the `window` x
     /// `window` square centred on its nearest pixel that lie in the image, each with weight `pixel_weight`.
     ///

@@ -1,6 +1,7 @@
 //! One mask as run lengths: column by column, runs of zeros and ones in turn, zeros first, as COCO has it.
 
 use crate::{Error, Result};
+use std::ops::Range;
 
 /// Most pixels of an image: what Pillow takes for a decompression bomb.
 pub(crate) const MAX_PIXELS: usize = 178_956_970;
@@ -74,25 +75,11 @@ impl Rle {
                 problem,
             });
         }
-        let columns =
-            (0..width).flat_map(|column| (0..height).map(move |row| pixels[row * width + column]));
-        let mut runs = Vec::new();
-        let mut inside = false;
-        let mut run = 0;
-        for pixel in columns {
-            if pixel != inside {
-                runs.push(run);
-                inside = pixel;
-                run = 0;
-            }
-            run += 1;
-        }
-        runs.push(run);
-        Ok(Self {
+        Ok(Self::from_switches(
             height,
             width,
-            runs,
-        })
+            switches(height, width, pixels),
+        ))
     }
 
     /// A mask from the positions, in column-major order, at which it switches between zeros and ones. Two switches at
@@ -126,14 +113,49 @@ impl Rle {
     /// If the sizes differ.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
+        self.assert_same_size(other);
+        let mut spans: Vec<(u32, u32)> = self.spans().chain(other.spans()).collect();
+        spans.sort_unstable();
+        Self::from_spans(self.height, self.width, spans)
+    }
+
+    /// Where `self` has a pixel and `other`, of the same size, has none.
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    #[must_use]
+    pub fn difference(&self, other: &Self) -> Self {
+        self.assert_same_size(other);
+        self.complement().union(other).complement()
+    }
+
+    /// Where `self` has no pixel.
+    #[must_use]
+    pub fn complement(&self) -> Self {
+        let runs = match self.runs.split_first() {
+            Some((0, rest)) if !rest.is_empty() => rest.to_vec(),
+            _ => std::iter::once(0)
+                .chain(self.runs.iter().copied())
+                .collect(),
+        };
+        Self { runs, ..*self }
+    }
+
+    fn assert_same_size(&self, other: &Self) {
         assert_eq!(
             (self.height, self.width),
             (other.height, other.width),
             "masks of one image"
         );
-        let mut spans: Vec<(u32, u32)> = self.spans().chain(other.spans()).collect();
-        spans.sort_unstable();
-        let mut switches = Vec::with_capacity(2 * spans.len());
+    }
+
+    /// A mask from half-open spans in ascending order of their starts; they may overlap.
+    pub(crate) fn from_spans(
+        height: usize,
+        width: usize,
+        spans: impl IntoIterator<Item = (u32, u32)>,
+    ) -> Self {
+        let mut switches = Vec::new();
         let mut open: Option<(u32, u32)> = None;
         for (start, end) in spans {
             open = match open {
@@ -145,7 +167,7 @@ impl Rle {
             };
         }
         switches.extend(open.into_iter().flat_map(|(first, last)| [first, last]));
-        Self::from_switches(self.height, self.width, switches)
+        Self::from_switches(height, width, switches)
     }
 
     /// Rows of the image.
@@ -226,16 +248,52 @@ impl Rle {
             });
         }
         let mut pixels = vec![false; height * width];
-        for at in self
-            .spans()
-            .flat_map(|(start, end)| start as usize..end as usize)
-        {
-            let (column, row) = (at / self.height, at % self.height);
-            if (top..top + height).contains(&row) && (left..left + width).contains(&column) {
-                pixels[(row - top) * width + column - left] = true;
+        for (column, rows) in self.column_spans() {
+            if (left..left + width).contains(&column) {
+                let rows = rows.start.max(top)..rows.end.min(top + height);
+                for row in rows {
+                    pixels[(row - top) * width + column - left] = true;
+                }
             }
         }
         Ok(pixels)
+    }
+
+    /// Sets the object's pixels in an image of this mask's size, row by row, that is all `false`.
+    ///
+    /// # Panics
+    /// If `pixels` has another length.
+    pub fn paint(&self, pixels: &mut [bool]) {
+        assert_eq!(pixels.len(), self.height * self.width, "one value a pixel");
+        for (column, rows) in self.column_spans() {
+            let end = rows.end * self.width;
+            for at in (rows.start * self.width + column..end).step_by(self.width) {
+                pixels[at] = true;
+            }
+        }
+    }
+
+    /// The object's pixels as a column and a range of rows each.
+    pub(crate) fn column_spans(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+        self.spans().flat_map(move |(start, end)| {
+            let (start, end) = (start as usize, end as usize);
+            let columns = start / self.height..end.div_ceil(self.height);
+            columns.map(move |column| {
+                let first = column * self.height;
+                let rows = start.max(first) - first..end.min(first + self.height) - first;
+                (column, rows)
+            })
+        })
+    }
+
+    /// The runs as COCO's compressed string; see [`Rle::from_compressed`].
+    pub fn to_compressed(&self) -> Vec<u8> {
+        let mut counts = Vec::with_capacity(2 * self.runs.len());
+        for (i, &run) in self.runs.iter().enumerate() {
+            let before_last = if i > 2 { self.runs[i - 2] } else { 0 };
+            write_number(i64::from(run) - i64::from(before_last), &mut counts);
+        }
+        counts
     }
 }
 
@@ -248,6 +306,47 @@ pub(crate) fn check_size(height: usize, width: usize) -> Result<usize> {
             width,
             limit: MAX_PIXELS,
         }),
+    }
+}
+
+/// Column-major positions at which `pixels`, row by row, switch between zeros and ones. Rows are compared with the rows
+/// above them, so that memory is read in its order; most of it is equal and passed over 32 pixels at a time.
+fn switches(height: usize, width: usize, pixels: &[bool]) -> Vec<u32> {
+    const CHUNK: usize = 32;
+    let position = |row: usize, column: usize| (column * height + row) as u32;
+    let mut found = Vec::new();
+    // above the top of a column is the bottom of the one before it
+    let bottom = &pixels[(height - 1) * width..];
+    let before = std::iter::once(&false).chain(bottom);
+    for (column, (pixel, above)) in pixels[..width].iter().zip(before).enumerate() {
+        if pixel != above {
+            found.push(position(0, column));
+        }
+    }
+    for row in 1..height {
+        let [above, pixels] = [row - 1, row].map(|r| &pixels[r * width..(r + 1) * width]);
+        for (chunk, (a, b)) in above.chunks(CHUNK).zip(pixels.chunks(CHUNK)).enumerate() {
+            if a != b {
+                let switched = (0..a.len()).filter(|&i| a[i] != b[i]);
+                found.extend(switched.map(|i| position(row, chunk * CHUNK + i)));
+            }
+        }
+    }
+    found
+}
+
+/// Appends a number as [`read_number`] reads it, in as few digits as hold it.
+fn write_number(number: i64, counts: &mut Vec<u8>) {
+    let mut rest = number;
+    loop {
+        let digit = (rest & 0x1f) as u8;
+        rest >>= 5;
+        let negative = digit & 0x10 != 0;
+        let done = rest == if negative { -1 } else { 0 };
+        counts.push(48 + digit + if done { 0 } else { 0x20 });
+        if done {
+            return;
+        }
     }
 }
 
@@ -343,6 +442,9 @@ mod tests {
         )) {
             let rle = Rle::from_pixels(height, width, &pixels).unwrap();
             prop_assert_eq!(&pixels_of(&rle), &pixels);
+            let mut painted = vec![false; height * width];
+            rle.paint(&mut painted);
+            prop_assert_eq!(&painted, &pixels);
             prop_assert_eq!(rle.area(), pixels.iter().filter(|&&p| p).count());
             prop_assert_eq!(&rle, &Rle::from_runs(height, width, rle.runs().to_vec()).unwrap());
         }
@@ -353,6 +455,23 @@ mod tests {
             let both = Rle::from_pixels(5, 7, &a).unwrap().union(&Rle::from_pixels(5, 7, &b).unwrap());
             let expected: Vec<bool> = a.iter().zip(&b).map(|(&p, &q)| p || q).collect();
             prop_assert_eq!(pixels_of(&both), expected);
+        }
+
+        #[test]
+        fn a_difference_has_the_pixels_of_one_alone(a in proptest::collection::vec(any::<bool>(), 35),
+                                                    b in proptest::collection::vec(any::<bool>(), 35)) {
+            let one = Rle::from_pixels(5, 7, &a).unwrap().difference(&Rle::from_pixels(5, 7, &b).unwrap());
+            let expected: Vec<bool> = a.iter().zip(&b).map(|(&p, &q)| p && !q).collect();
+            prop_assert_eq!(pixels_of(&one), expected.clone());
+            prop_assert_eq!(one, Rle::from_pixels(5, 7, &expected).unwrap());
+        }
+
+        #[test]
+        fn compressed_strings_survive_the_round_trip(runs in proptest::collection::vec(0_u32..3_000_000, 1..40)) {
+            let width = runs.iter().sum::<u32>().max(1) as usize;
+            let runs = if runs.iter().all(|&run| run == 0) { vec![1] } else { runs };
+            let rle = Rle::from_runs(1, width, runs).unwrap();
+            prop_assert_eq!(&Rle::from_compressed(1, width, &rle.to_compressed()).unwrap(), &rle);
         }
 
         #[test]

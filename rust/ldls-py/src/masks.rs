@@ -2,11 +2,14 @@
 
 use crate::arrays::{matrix, slice};
 use crate::call::run;
+use crate::errors::raise;
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray3,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 /// One mask as column-major run lengths.
 #[pyclass(frozen, module = "ldls._ldls", skip_from_py_object)]
@@ -82,6 +85,26 @@ impl Rle {
         self.0.bounding_box().into()
     }
 
+    fn to_compressed<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.0.to_compressed())
+    }
+
+    fn grow(&self, py: Python<'_>, radius: usize) -> PyResult<Self> {
+        run(py, None, || Ok(self.0.grow(radius))).map(Self)
+    }
+
+    fn shrink(&self, py: Python<'_>, radius: usize) -> PyResult<Self> {
+        run(py, None, || Ok(self.0.shrink(radius))).map(Self)
+    }
+
+    fn union(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
+        run(py, None, || Ok(self.0.union(&other.0))).map(Self)
+    }
+
+    fn difference(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
+        run(py, None, || Ok(self.0.difference(&other.0))).map(Self)
+    }
+
     fn runs(&self, py: Python<'_>) -> Py<PyArray1<u32>> {
         self.0.runs().to_vec().into_pyarray(py).unbind()
     }
@@ -134,6 +157,18 @@ impl Masks {
 
     fn __len__(&self) -> usize {
         self.0.len()
+    }
+
+    fn paint(
+        &self,
+        py: Python<'_>,
+        mut pixels: PyReadwriteArray3<'_, bool>,
+        threads: Option<usize>,
+    ) -> PyResult<()> {
+        let pixels = pixels
+            .as_slice_mut()
+            .map_err(|error| raise(py, "InputError", &format!("pixels: {error}")))?;
+        run(py, threads, || self.0.paint(pixels))
     }
 
     fn rle(&self, index: usize) -> PyResult<Rle> {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -14,36 +13,18 @@ import numpy as np
 from ldls import _ldls
 from ldls.categories import COCO_NAMES
 from ldls.errors import CorruptFileError, LimitError, MaskError
+from ldls.io.masks.records import MaskRecords
 
 MAX_FILE_BYTES = 1 << 30
 """Larger files hold whole data sets; parsed, they take many times their size in memory."""
 
 
-@dataclass(frozen=True)
-class CocoImage:
-    """The instances of one image.
-
-    Attributes:
-        size: (height, width) in pixels.
-        rles: Their pixels.
-        categories: Their category ids.
-        scores: Their scores; 1 where the source has none.
-        names: Name of each category id.
-    """
-
-    size: tuple[int, int]
-    rles: list[_ldls.Rle]
-    categories: list[int]
-    scores: list[float]
-    names: Mapping[int, str]
-
-
-def read_image(
+def read(
     source: str | PathLike[str] | Mapping[str, Any] | Sequence[Mapping[str, Any]],
     *,
     image_id: int | str | None = None,
     image_size: tuple[int, int] | None = None,
-) -> CocoImage:
+) -> MaskRecords:
     """The instances of one image of a COCO file or of its parsed content.
 
     Raises:
@@ -60,7 +41,7 @@ def read_image(
     size = image_size or _size_of(place, images, image_id, chosen)
     labels = [f"{place}: annotation {a.get('id', i)}" for i, a in enumerate(chosen)]
     scores = _scores(labels, chosen)
-    return CocoImage(
+    return MaskRecords(
         size=size,
         rles=[_rle(label, a, size) for label, a in zip(labels, chosen, strict=True)],
         categories=[_category(label, a, names) for label, a in zip(labels, chosen, strict=True)],

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -13,24 +11,14 @@ from numpy.typing import NDArray
 from ldls import _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
 from ldls.errors import MaskError, UnsupportedFormatError
+from ldls.io.masks.records import MaskRecords
 from ldls.io.npz import read_npz, write_npz
 
 if TYPE_CHECKING:
     from ldls.masks import InstanceMasks
 
 
-@dataclass(frozen=True)
-class StoredMasks:
-    """Masks as a file holds them: size (height, width), run lengths, and one category and score each."""
-
-    size: tuple[int, int]
-    rles: list[_ldls.Rle]
-    categories: NDArray[np.int32]
-    scores: NDArray[np.float32]
-    names: Mapping[int, str]
-
-
-def read(path: str | PathLike[str]) -> StoredMasks:
+def read(path: str | PathLike[str]) -> MaskRecords:
     """The masks of a file of either kind.
 
     Raises:
@@ -68,14 +56,14 @@ def write(path: str | PathLike[str], masks: InstanceMasks) -> None:
     )
 
 
-def _from_runs(arrays: dict[str, NDArray[Any]]) -> StoredMasks:
+def _from_runs(arrays: dict[str, NDArray[Any]]) -> MaskRecords:
     height, width = (int(s) for s in arrays["size"])
     ends = np.cumsum(arrays["run_counts"])
     if ends.size and (arrays["run_counts"].min() < 0 or ends[-1] != arrays["runs"].size):
         raise MaskError(f"run_counts sum to {ends[-1]}, runs holds {arrays['runs'].size}")
     split = np.split(arrays["runs"].astype(np.uint32), ends[:-1]) if ends.size else []
     names = zip(arrays["category_ids"].tolist(), arrays["category_names"].tolist(), strict=True)
-    return StoredMasks(
+    return MaskRecords(
         size=(height, width),
         rles=[_ldls.Rle.from_runs(height, width, np.ascontiguousarray(runs)) for runs in split],
         categories=arrays["categories"],
@@ -84,7 +72,7 @@ def _from_runs(arrays: dict[str, NDArray[Any]]) -> StoredMasks:
     )
 
 
-def _from_research_code(arrays: dict[str, NDArray[Any]]) -> StoredMasks:
+def _from_research_code(arrays: dict[str, NDArray[Any]]) -> MaskRecords:
     masks, classes = arrays["masks"], arrays["class_ids"]
     if masks.ndim != 3 or masks.shape[2] != classes.size:
         raise MaskError(f"masks: expected (height, width, {classes.size}), got {masks.shape}; one mask a class id")
@@ -92,7 +80,7 @@ def _from_research_code(arrays: dict[str, NDArray[Any]]) -> StoredMasks:
     if wrong.any():
         raise MaskError(f"class_ids: {classes[wrong][0]} at {wrong.argmax()}, expected 1 to 80")
     pixels = (np.ascontiguousarray(masks[:, :, m] != 0) for m in range(classes.size))
-    return StoredMasks(
+    return MaskRecords(
         size=(masks.shape[0], masks.shape[1]),
         rles=[_ldls.Rle.from_pixels(mask) for mask in pixels],
         categories=np.array(CONTIGUOUS_IDS, np.int32)[classes - 1],

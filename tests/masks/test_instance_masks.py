@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 from pycocotools import mask as cocomask
+from scipy import ndimage
 
 import ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
@@ -263,3 +264,74 @@ def test_a_cut_npz_is_corrupt(tmp_path):
     path.write_bytes(path.read_bytes()[:-30])
     with pytest.raises(ldls.CorruptFileError, match="not a whole"):
         ldls.InstanceMasks.from_npz(path)
+
+
+def disk(radius):
+    v, u = np.mgrid[-radius : radius + 1, -radius : radius + 1]
+    return u * u + v * v <= radius * radius
+
+
+def three_masks():
+    pixels = np.zeros((3, 20, 30), bool)
+    pixels[0, 2:12, 3:15] = True
+    pixels[1, 8:18, 10:28] = True
+    pixels[2, 9:11, 11:13] = True
+    return ldls.InstanceMasks.from_array(pixels, categories=[3, 1, 18], scores=[0.9, 0.5, 0.7])
+
+
+@pytest.mark.parametrize(
+    ("options", "kept"),
+    [
+        pytest.param({}, [0, 1, 2], id="all"),
+        pytest.param({"min_score": 0.7}, [0, 2], id="score as given in single precision"),
+        pytest.param({"categories": ["car", 1]}, [0, 1], id="names and ids"),
+        pytest.param({"min_area": 5}, [0, 1], id="area"),
+        pytest.param({"categories": ["bus"]}, [], id="none left"),
+    ],
+)
+def test_a_filter_keeps_what_is_wanted(options, kept):
+    masks = three_masks()
+    found = masks.filter(**options)
+    np.testing.assert_array_equal(found.to_array(), masks.to_array()[kept])
+    assert found.categories.tolist() == masks.categories[kept].tolist()
+    assert found.scores.tolist() == masks.scores[kept].tolist()
+
+
+def test_an_unknown_category_is_answered_with_the_nearest():
+    with pytest.raises(ldls.ParameterError, match="'persn' is unknown; did you mean 'person'"):
+        three_masks().filter(categories=["persn"])
+
+
+@pytest.mark.parametrize(
+    ("by", "order"),
+    [
+        pytest.param("score", [0, 2, 1], id="highest score"),
+        pytest.param("area", [2, 0, 1], id="smallest"),
+        pytest.param("order", [0, 1, 2], id="first"),
+    ],
+)
+def test_overlaps_go_to_one_mask(by, order):
+    pixels = three_masks().to_array()
+    expected, taken = np.zeros_like(pixels), np.zeros(pixels.shape[1:], bool)
+    for i in order:
+        expected[i] = pixels[i] & ~taken
+        taken |= pixels[i]
+    found = three_masks().resolve_overlaps(by)
+    np.testing.assert_array_equal(found.to_array(), expected)
+    assert found.scores.tolist() == three_masks().scores.tolist()
+
+
+@pytest.mark.parametrize("radius", [0, 1, 2, 5, 40])
+def test_masks_grow_and_shrink_by_a_disk(radius):
+    masks = ldls.InstanceMasks.from_array(random_pixels(3, 23, 31))
+    pixels = masks.to_array()
+    grown = [ndimage.binary_dilation(p, disk(radius)) if radius else p for p in pixels]
+    shrunk = [ndimage.binary_erosion(p, disk(radius), border_value=1) if radius else p for p in pixels]
+    np.testing.assert_array_equal(masks.grow(radius).to_array(), grown)
+    np.testing.assert_array_equal(masks.shrink(radius).to_array(), shrunk)
+
+
+@pytest.mark.parametrize("radius", [-1, 1.5, 10**9])
+def test_a_radius_that_is_none_is_refused(radius):
+    with pytest.raises(ldls.ParameterError, match="radius"):
+        three_masks().grow(radius)

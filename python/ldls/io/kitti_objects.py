@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from ldls.errors import CorruptFileError, TruncatedFileError
-from ldls.evaluation.text import read_lines
+from ldls.io.text import read_lines
 
 N_FIELDS = 15
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls import _ldls
-from ldls.categories import COCO_NAMES
-from ldls.errors import MaskError
-from ldls.io import coco, mask_npz
+from ldls.categories import COCO_NAMES, find_categories
+from ldls.errors import MaskError, ParameterError
+from ldls.io.masks import coco, npz
+from ldls.io.masks.records import MaskRecords
+
+MAX_RADIUS = 10_000
+"""Farthest that masks grow or shrink, in pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,14 +139,8 @@ class InstanceMasks:
             CorruptFileError: The file is not JSON.
             FileNotFoundError: There is no such file.
         """
-        image = coco.read_image(source, image_id=image_id, image_size=image_size)
-        return cls(
-            image.rles,
-            image.size,
-            categories=np.array(image.categories, np.int32),
-            scores=np.array(image.scores, np.float32),
-            names=names or image.names,
-        )
+        records = coco.read(source, image_id=image_id, image_size=image_size)
+        return cls._of(records if names is None else replace(records, names=names))
 
     @classmethod
     def from_npz(cls, path: str | PathLike[str]) -> Self:
@@ -153,18 +151,11 @@ class InstanceMasks:
             MaskError: The arrays do not fit one another.
             FileNotFoundError: There is no such file.
         """
-        stored = mask_npz.read(path)
-        return cls(
-            stored.rles,
-            stored.size,
-            categories=stored.categories,
-            scores=stored.scores,
-            names=stored.names,
-        )
+        return cls._of(npz.read(path))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write an `.npz` that `from_npz` reads."""
-        mask_npz.write(path, self)
+        npz.write(path, self)
 
     @property
     def height(self) -> int:
@@ -197,10 +188,91 @@ class InstanceMasks:
 
     def to_array(self) -> NDArray[np.bool_]:
         """(M, H, W) pixels; M * H * W bytes."""
-        dense = np.zeros((len(self), self.height, self.width), np.bool_)
-        for pixels, mask in zip(dense, self, strict=True):
-            pixels[...] = mask.to_array()
-        return dense
+        pixels = np.zeros((len(self), self.height, self.width), np.bool_)
+        self.core.paint(pixels, None)
+        return pixels
+
+    def select(self, indices: ArrayLike) -> Self:
+        """The masks at `indices`, whole numbers or one bool a mask, in that order."""
+        chosen = np.arange(len(self))[_as_index(indices)]
+        return self._with([self.core.rle(int(i)) for i in chosen], chosen)
+
+    def filter(
+        self,
+        *,
+        min_score: float = 0.0,
+        categories: Iterable[int | str] | None = None,
+        min_area: int = 0,
+    ) -> Self:
+        """The masks that are wanted, in their order.
+
+        Args:
+            min_score: Lowest score that is kept, 0 to 1.
+            categories: Ids or names of the categories that are kept; all without them.
+            min_area: Fewest pixels that are kept.
+
+        Raises:
+            ParameterError: A bound outside its range, or a category that `names` does not have.
+        """
+        if not 0 <= min_score <= 1:
+            raise ParameterError(f"min_score: got {min_score!r}, expected 0 to 1")
+        wanted = set(self.names) if categories is None else set(find_categories(categories, self.names))
+        areas = np.array([mask.area for mask in self], np.int64)
+        kept = (self.scores >= np.float32(min_score)) & np.isin(self.categories, list(wanted)) & (areas >= min_area)
+        return self.select(kept)
+
+    def resolve_overlaps(self, by: Literal["score", "area", "order"] = "score") -> Self:
+        """These masks, each pixel left to one of them; a mask may become empty.
+
+        Args:
+            by: Who keeps a pixel: the highest "score", the smallest "area" (what lies in front is often smaller), or
+                the first in "order". The first also wins where scores or areas are equal.
+        """
+        keys = {
+            "score": -self.scores,
+            "area": np.array([mask.area for mask in self]),
+            "order": np.arange(len(self)),
+        }
+        if by not in keys:
+            raise ParameterError(f"by: got {by!r}, expected {', '.join(keys)}")
+        rles = [mask.rle for mask in self]
+        taken = None
+        for i in np.argsort(keys[by], kind="stable"):
+            own = rles[i]
+            rles[i] = own if taken is None else own.difference(taken)
+            taken = own if taken is None else own.union(taken)
+        return self._with(rles)
+
+    def grow(self, radius: int) -> Self:
+        """These masks with every pixel at most `radius` pixels from them, centre to centre."""
+        return self._with([mask.rle.grow(_radius(radius)) for mask in self])
+
+    def shrink(self, radius: int) -> Self:
+        """These masks without the pixels at most `radius` pixels from what is beside them; a mask may become empty.
+
+        Masks of networks bleed over edges; points behind an object then fall on its mask. At the edge of the image
+        nothing is taken away.
+        """
+        return self._with([mask.rle.shrink(_radius(radius)) for mask in self])
+
+    def _with(self, rles: Sequence[_ldls.Rle], chosen: Any = ...) -> Self:  # noqa: ANN401
+        return type(self)(
+            rles,
+            self.image_size,
+            categories=self.categories[chosen],
+            scores=self.scores[chosen],
+            names=self.names,
+        )
+
+    @classmethod
+    def _of(cls, records: MaskRecords) -> Self:
+        return cls(
+            records.rles,
+            records.size,
+            categories=records.categories,
+            scores=records.scores,
+            names=records.names,
+        )
 
     def _check(self) -> None:
         for i, (category, score) in enumerate(zip(self.categories, self.scores, strict=True)):
@@ -264,6 +336,17 @@ def _per_mask(name: str, values: ArrayLike, count: int, dtype: type) -> NDArray[
     array = array.astype(dtype)
     array.flags.writeable = False
     return array
+
+
+def _as_index(indices: ArrayLike) -> NDArray[Any]:
+    array = np.asarray(indices)
+    return array.astype(np.int64) if array.size == 0 and array.dtype.kind == "f" else array
+
+
+def _radius(radius: int) -> int:
+    if not isinstance(radius, int | np.integer) or not 0 <= radius <= MAX_RADIUS:
+        raise ParameterError(f"radius: got {radius!r}, expected 0 to {MAX_RADIUS} pixels")
+    return int(radius)
 
 
 def _some(names: Mapping[int, str]) -> str:

@@ -1,0 +1,1 @@
+"""Files of instance masks: one module a format."""

@@ -1,0 +1,5 @@
+"""Instance masks of an image, and the ways to get them from what other programs hold in memory."""
+
+from ldls.masks.instance_masks import InstanceMask, InstanceMasks
+
+__all__ = ["InstanceMask", "InstanceMasks"]
