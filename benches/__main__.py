@@ -192,6 +192,41 @@ def batch(measured: Frame, threads: int, runs: int, _most: int) -> Table:
     return table
 
 
+def masks(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
+    """Masks of 1920 x 1080 pixels from and to COCO's run lengths, against pycocotools."""
+    import warnings
+
+    from pycocotools import mask as coco_tools
+
+    from benches import mask_coding
+
+    warnings.filterwarnings("ignore", "__array__ implementation", DeprecationWarning)
+    pixels = mask_coding.outlines()
+    rles = mask_coding.encoded(pixels)
+    listed = mask_coding.results(rles)
+    columns_first = [np.asfortranarray(mask, np.uint8) for mask in pixels]
+    sides: dict[str, tuple[Callable[[], object], Callable[[], object]]] = {
+        "results to pixels": (
+            lambda: coco_tools.decode(rles),
+            lambda: ldls.InstanceMasks.from_coco(listed).to_array(),
+        ),
+        "pixels to run lengths": (
+            lambda: [coco_tools.encode(mask) for mask in columns_first],
+            lambda: ldls.InstanceMasks.from_array(pixels),
+        ),
+    }
+    differ = int((np.moveaxis(coco_tools.decode(rles), -1, 0) != sides["results to pixels"][1]()).sum())
+    table = _table(
+        f"{mask_coding.COUNT} masks of {mask_coding.WIDTH} x {mask_coding.HEIGHT} pixels",
+        ["work", "pycocotools, ms", "ldls, ms", "ratio"],
+        f"pycocotools on one thread, ldls on {threads}; pixels that differ: {differ}",
+    )
+    for name, (peer, own) in sides.items():
+        found = medians({"peer": peer, "ldls": own}, runs=min(runs, 7))
+        _add_ratio(table, name, found["peer"], found["ldls"])
+    return table
+
+
 SECTIONS = {
     "scipy": against_scipy,
     "learners": against_learners,
@@ -200,6 +235,7 @@ SECTIONS = {
     "instances": instances,
     "threads": thread_scaling,
     "batch": batch,
+    "masks": masks,
 }
 
 
