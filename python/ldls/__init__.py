@@ -18,6 +18,7 @@ from ldls.errors import (
     ShapeError,
     TruncatedFileError,
     UnsafeFileError,
+    UnsafePathError,
     UnsupportedFormatError,
 )
 from ldls.io import read_points
@@ -50,6 +51,7 @@ __all__ = [
     "ShapeError",
     "TruncatedFileError",
     "UnsafeFileError",
+    "UnsafePathError",
     "UnsupportedFormatError",
     "__version__",
     "read_points",

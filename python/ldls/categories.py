@@ -27,6 +27,10 @@ COCO_NAMES: dict[int, str] = {
 CONTIGUOUS_IDS: tuple[int, ...] = tuple(COCO_NAMES)
 """COCO id of the class at each position: networks number the 80 classes without gaps, Matterport's from 1."""
 
+OWN_IDS_FROM = 100
+"""Id of class 0 of a network whose classes are not COCO's."""
+_COCO_IDS = {name: category for category, name in COCO_NAMES.items()}
+
 
 def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> list[int]:
     """Ids of the categories `wanted`, each an id or a name, among `names`.
@@ -35,6 +39,23 @@ def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> li
         ParameterError: There is no such category; the message has the nearest name.
     """
     return [category for one in wanted for category in _ids(one, names)]
+
+
+def category_ids(names: Mapping[int, str]) -> dict[int, int]:
+    """Category id of each class of a network: COCO's where COCO has the name, otherwise 100 + the class.
+
+    Capitals do not matter. Ids of a network's own classes thus never meet those of COCO, which end at 90.
+
+    Args:
+        names: Name of each class by its index, from 0.
+
+    Raises:
+        ParameterError: A negative index.
+    """
+    wrong = [index for index in names if index < 0]
+    if wrong:
+        raise ParameterError(f"names: class {wrong[0]} is negative, expected 0 or more")
+    return {index: _COCO_IDS.get(name.strip().lower(), OWN_IDS_FROM + index) for index, name in names.items()}
 
 
 def _ids(wanted: int | str, names: Mapping[int, str]) -> list[int]:

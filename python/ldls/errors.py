@@ -87,6 +87,12 @@ class UnsafeFileError(FileFormatError):
     code = "unsafe_file"
 
 
+class UnsafePathError(LdlsError):
+    """A path in a file that leads out of the folder it belongs to."""
+
+    code = "unsafe_path"
+
+
 class LimitError(LdlsError):
     """Input that exceeds a stated limit."""
 

@@ -1,0 +1,29 @@
+import pytest
+
+from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids
+from ldls.errors import ParameterError
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        pytest.param({}, {}, id="no classes"),
+        pytest.param({0: "person", 2: "car"}, {0: 1, 2: 3}, id="names of COCO"),
+        pytest.param({0: "Car", 1: " Potted Plant"}, {0: 3, 1: 64}, id="capitals and spaces"),
+        pytest.param({0: "cone", 1: "dog", 7: "drone"}, {0: 100, 1: 18, 7: 107}, id="names of its own"),
+        pytest.param(
+            dict(enumerate(COCO_NAMES.values())), dict(enumerate(CONTIGUOUS_IDS)), id="COCO's 80 classes without gaps"
+        ),
+    ],
+)
+def test_category_ids_of_classes(names, expected):
+    assert category_ids(names) == expected
+
+
+def test_own_ids_never_meet_those_of_coco():
+    assert not set(category_ids({i: f"thing {i}" for i in range(200)}).values()) & set(COCO_NAMES)
+
+
+def test_negative_class():
+    with pytest.raises(ParameterError, match="class -1 is negative"):
+        category_ids({-1: "cone"})
