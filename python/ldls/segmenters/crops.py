@@ -1,0 +1,55 @@
+"""Instances as small masks with a place, and the instance masks they make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls import _ldls
+from ldls.masks import InstanceMasks
+from ldls.segmenters.classes import Classes
+
+
+@dataclass(frozen=True, eq=False)
+class Crop:
+    """One instance: what it covers of a rectangle of the image, and nothing outside.
+
+    Attributes:
+        pixels: (h, w) bool; the rectangle lies within the image.
+        top: Row of its first pixel.
+        left: Column of its first pixel.
+        category: Category id.
+        score: 0 to 1.
+    """
+
+    pixels: NDArray[np.bool_]
+    top: int
+    left: int
+    category: int
+    score: float
+
+
+def assemble(crops: Iterable[Crop], image_size: tuple[int, int], classes: Classes) -> InstanceMasks:
+    """Masks of an image of (height, width) pixels; instances without a pixel are left out."""
+    canvas = np.zeros(image_size, np.bool_)
+    kept = [crop for crop in crops if crop.pixels.any()]
+    return InstanceMasks(
+        [_encode(crop, canvas) for crop in kept],
+        image_size,
+        categories=np.array([crop.category for crop in kept], np.int32),
+        scores=np.array([crop.score for crop in kept], np.float32),
+        names=classes.names,
+    )
+
+
+def _encode(crop: Crop, canvas: NDArray[np.bool_]) -> _ldls.Rle:
+    """Run lengths by way of one canvas for all, which is left clean."""
+    height, width = crop.pixels.shape
+    window = canvas[crop.top : crop.top + height, crop.left : crop.left + width]
+    window[...] = crop.pixels
+    rle = _ldls.Rle.from_pixels(canvas)
+    window[...] = False
+    return rle

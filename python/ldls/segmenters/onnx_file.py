@@ -1,0 +1,247 @@
+"""ONNX files, looked through before anything runs them.
+
+Weights of a model may lie in other files, which it names; its operators may come from libraries. Neither is followed
+out of the model's folder or out of what onnxruntime brings along.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from ldls._optional import require
+from ldls.errors import (
+    CorruptFileError,
+    LimitError,
+    TruncatedFileError,
+    UnsafePathError,
+    UnsupportedFormatError,
+)
+
+MAX_BYTES = 2 << 30
+"""Largest model file; protobuf, of which ONNX is made, ends there. Larger weights lie in files of their own."""
+DOMAINS = frozenset({"", "ai.onnx", "ai.onnx.ml", "com.microsoft"})
+"""Domains whose operators onnxruntime has itself."""
+OPERATORS_WITH_FILES = frozenset({("com.microsoft", "EPContext"), ("com.microsoft", "PythonOp")})
+"""Operators of these domains that load a file or run Python."""
+LFS_POINTER = b"version https://git-lfs"
+
+
+@dataclass(frozen=True, eq=False)
+class OnnxFile:
+    """A model that was looked through.
+
+    Attributes:
+        path: Where it lies.
+        model: `onnx.ModelProto`, without the weights in other files.
+        content: Its bytes.
+        has_external_data: Whether weights lie in other files.
+    """
+
+    path: Path
+    model: Any
+    content: bytes
+    has_external_data: bool
+
+
+def read_onnx(path: str | PathLike[str]) -> OnnxFile:
+    """The model at `path`, whose operators and files of weights can be trusted to be what they seem.
+
+    Raises:
+        TruncatedFileError: It, or a file of its weights, ends too early.
+        CorruptFileError: It is not an ONNX model, or a file of its weights is missing.
+        UnsupportedFormatError: It needs operators from a library.
+        UnsafePathError: Its weights lie outside its folder.
+        LimitError: It is larger than `MAX_BYTES`.
+        FileNotFoundError: There is no such file.
+        ImportError: `ldls[onnx]` is not installed.
+    """
+    path = Path(path)
+    content = _read(path)
+    model = _parse(path, content)
+    _check_operators(path, model)
+    external = [tensor for tensor in _tensors(model) if tensor.data_location == tensor.EXTERNAL]
+    for tensor in external:
+        _check_external(path, tensor)
+    return OnnxFile(path, model, content, bool(external))
+
+
+def _read(path: Path) -> bytes:
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        raise LimitError(f"{path}: {size} bytes, expected at most {MAX_BYTES}; save the weights as external data")
+    return path.read_bytes()
+
+
+def _parse(path: Path, content: bytes) -> Any:  # noqa: ANN401
+    onnx = require("onnx", "onnx")
+    message = require("google.protobuf.message", "onnx")
+    if content.startswith(LFS_POINTER):
+        raise CorruptFileError(f"{path}: a Git LFS pointer, not the model itself; run: git lfs pull")
+    _check_fields(path, content)
+    try:
+        model = onnx.load_model_from_string(content)
+    except (message.DecodeError, ValueError) as error:
+        raise CorruptFileError(f"{path}: not an ONNX model ({error})") from None
+    if not model.graph.node:
+        raise CorruptFileError(f"{path}: not an ONNX model, or one without a graph")
+    return model
+
+
+def _check_fields(path: Path, content: bytes) -> None:
+    """Walks the outermost fields: these alone tell a file that was cut off from one that is something else."""
+    at = 0
+    try:
+        while at < len(content):
+            start = at
+            tag, at = _varint(content, at)
+            at = _field_end(content, at, tag & 7)
+            if tag >> 3 == 0 or at < 0:
+                raise CorruptFileError(f"{path}: not an ONNX model (byte {start} begins no protobuf field)")
+    except IndexError:
+        at = len(content) + 1
+    if at > len(content) or not content:
+        raise TruncatedFileError(f"{path}: ends after {len(content)} bytes, expected at least {at}; download it again")
+
+
+def _field_end(content: bytes, at: int, wire_type: int) -> int:
+    """Where a field ends whose content begins at `at`; -1 where there is no such type of field."""
+    match wire_type:
+        case 0:
+            return _varint(content, at)[1]
+        case 1:
+            return at + 8
+        case 2:
+            length, at = _varint(content, at)
+            return at + length
+        case 5:
+            return at + 4
+    return -1
+
+
+def _varint(content: bytes, at: int) -> tuple[int, int]:
+    value = 0
+    for shift in range(0, 70, 7):
+        byte = content[at]
+        at += 1
+        value |= (byte & 0x7F) << shift
+        if byte < 0x80:
+            break
+    return value, at
+
+
+def _check_operators(path: Path, model: Any) -> None:  # noqa: ANN401
+    own = {(function.domain, function.name) for function in model.functions}
+    for node in _nodes(model):
+        operator = (node.domain, node.op_type)
+        if operator not in own and (node.domain not in DOMAINS or operator in OPERATORS_WITH_FILES):
+            raise UnsupportedFormatError(
+                f"{path}: operator {node.domain}::{node.op_type} needs a library or file of its own, expected "
+                "operators of ONNX and onnxruntime; export the model without it"
+            )
+
+
+def _nodes(model: Any) -> Iterator[Any]:  # noqa: ANN401
+    """Every node, those of functions and of the graphs in attributes too."""
+    yield from _with_subgraphs(model.graph.node)
+    for function in model.functions:
+        yield from _with_subgraphs(function.node)
+
+
+def _with_subgraphs(nodes: Iterable[Any]) -> Iterator[Any]:
+    for node in nodes:
+        yield node
+        for graph in _subgraphs(node):
+            yield from _with_subgraphs(graph.node)
+
+
+def _subgraphs(node: Any) -> Iterator[Any]:  # noqa: ANN401
+    for attribute in node.attribute:
+        if attribute.HasField("g"):
+            yield attribute.g
+        yield from attribute.graphs
+
+
+def _tensors(model: Any) -> Iterator[Any]:  # noqa: ANN401
+    """Every tensor of weights and constants, wherever it stands."""
+    yield from _initializers(model.graph)
+    for node in _nodes(model):
+        for graph in _subgraphs(node):
+            yield from _initializers(graph)
+        for attribute in node.attribute:
+            yield from _attribute_tensors(attribute)
+    for function in model.functions:
+        for attribute in function.attribute_proto:
+            yield from _attribute_tensors(attribute)
+
+
+def _initializers(graph: Any) -> Iterator[Any]:  # noqa: ANN401
+    yield from graph.initializer
+    yield from _dense(graph.sparse_initializer)
+
+
+def _attribute_tensors(attribute: Any) -> Iterator[Any]:  # noqa: ANN401
+    if attribute.HasField("t"):
+        yield attribute.t
+    yield from attribute.tensors
+    if attribute.HasField("sparse_tensor"):
+        yield from _dense([attribute.sparse_tensor])
+    yield from _dense(attribute.sparse_tensors)
+
+
+def _dense(sparse_tensors: Iterable[Any]) -> Iterator[Any]:
+    for sparse in sparse_tensors:
+        yield sparse.values
+        yield sparse.indices
+
+
+def _check_external(path: Path, tensor: Any) -> None:  # noqa: ANN401
+    entries = {entry.key: entry.value for entry in tensor.external_data}
+    weights = _contained(path, tensor.name, entries.get("location", ""))
+    offset = _whole_number(path, tensor.name, entries.get("offset", "0"))
+    length = _whole_number(path, tensor.name, entries.get("length", str(_bytes_needed(tensor))))
+    if not weights.is_file():
+        raise CorruptFileError(
+            f"{path}: tensor {tensor.name!r} lies in {weights.name!r}, which is not there; "
+            "keep the files of a model together"
+        )
+    size = weights.stat().st_size
+    if offset + length > size:
+        raise TruncatedFileError(
+            f"{weights}: tensor {tensor.name!r} ends at byte {offset + length}, the file after {size}; "
+            "download it again"
+        )
+
+
+def _contained(path: Path, name: str, location: str) -> Path:
+    """The file at `location`, which must lie in the model's folder when every link is followed."""
+    folder = path.resolve().parent
+    posix, windows = PurePosixPath(location), PureWindowsPath(location)
+    leads_out = posix.is_absolute() or windows.drive or windows.root or ".." in windows.parts or "\0" in location
+    if location and not leads_out:
+        weights = (folder / location).resolve()
+        if weights.is_relative_to(folder):
+            return weights
+    raise UnsafePathError(
+        f"{path}: tensor {name!r} lies at {location!r}, expected a file in the model's folder; "
+        "put it there and save the model again"
+    )
+
+
+def _whole_number(path: Path, name: str, text: str) -> int:
+    if not (text.isascii() and text.isdigit()):
+        raise CorruptFileError(f"{path}: tensor {name!r} has offset or length {text!r}, expected a whole number")
+    return int(text)
+
+
+def _bytes_needed(tensor: Any) -> int:  # noqa: ANN401
+    helper = require("onnx.helper", "onnx")
+    try:
+        item = helper.tensor_dtype_to_np_dtype(tensor.data_type).itemsize
+    except (KeyError, ValueError):  # onnxruntime refuses a type that ONNX does not have
+        return 0
+    return int(math.prod(tensor.dims) * item)

@@ -1,0 +1,58 @@
+"""Segmenters by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from difflib import get_close_matches
+from functools import partial
+from typing import Any
+
+from ldls.errors import ParameterError
+from ldls.segmenters.boxes import BoxSegmenter
+from ldls.segmenters.onnx import OnnxSegmenter
+from ldls.segmenters.segmenter import Segmenter
+from ldls.segmenters.torchvision import DEFAULT_MODEL, TorchvisionSegmenter
+
+
+def _torchvision(name: str, **options: Any) -> Segmenter:  # noqa: ANN401
+    return TorchvisionSegmenter(name or DEFAULT_MODEL, **options)
+
+
+SEGMENTERS: dict[str, Callable[..., Segmenter]] = {
+    "onnx": OnnxSegmenter,
+    "torchvision": _torchvision,
+    "boxes": BoxSegmenter.from_kitti,
+    "grabcut": partial(BoxSegmenter.from_kitti, grabcut=True),
+}
+"""What makes each segmenter, of what stands after the colon."""
+EXAMPLES = {
+    "onnx": "onnx:model.onnx",
+    "torchvision": "torchvision or torchvision:maskrcnn_resnet50_fpn_v2",
+    "boxes": "boxes:label_2/000001.txt",
+    "grabcut": "grabcut:label_2/000001.txt",
+}
+WITHOUT_ARGUMENT = frozenset({"torchvision"})
+
+
+def open_segmenter(spec: str, *, min_score: float | None = None, **options: Any) -> Segmenter:  # noqa: ANN401
+    """The segmenter that `spec` says: a name of `SEGMENTERS`, then after a colon its file or model.
+
+    Args:
+        spec: `onnx:model.onnx`, `torchvision`, `torchvision:maskrcnn_resnet50_fpn_v2`, `boxes:label_2/000001.txt` or
+            `grabcut:label_2/000001.txt`; only the first colon divides, so paths may have more.
+        min_score: Lowest score that is kept, 0 to 1; each segmenter has its own without it.
+        options: Further options of the segmenter.
+
+    Raises:
+        ParameterError: There is no such segmenter, or its file is missing from `spec`.
+    """
+    name, _, argument = spec.partition(":")
+    if name not in SEGMENTERS:
+        near = get_close_matches(name, SEGMENTERS, n=1)
+        hint = f"did you mean {EXAMPLES[near[0]]}? " if near else ""
+        raise ParameterError(f"segmenter: {spec!r} is unknown; {hint}expected {', '.join(EXAMPLES.values())}")
+    if not argument and name not in WITHOUT_ARGUMENT:
+        raise ParameterError(f"segmenter: {spec!r} names no file, expected {EXAMPLES[name]}")
+    if min_score is not None:
+        options["min_score"] = min_score
+    return SEGMENTERS[name](argument, **options)
