@@ -26,11 +26,9 @@ def padded_paste(grid: F32, box: F32, image_size: tuple[int, int]) -> tuple[F32,
         box: (4,) left, top, right, bottom in pixels.
         image_size: (height, width) in pixels.
     """
-    scale = np.float32((grid.shape[0] + 2) / grid.shape[0])
-    left, top, right, bottom = box
-    middle = np.array([right + left, bottom + top], np.float32) * np.float32(0.5)
-    half = np.array([right - left, bottom - top], np.float32) * np.float32(0.5) * scale
-    enlarged: F32 = np.concatenate([middle - half, middle + half], dtype=np.float32)
+    scale = (grid.shape[0] + 2) / grid.shape[0]
+    middle, half = (box[2:] + box[:2]) * np.float32(0.5), (box[2:] - box[:2]) * np.float32(0.5 * scale)
+    enlarged = np.concatenate([middle - half, middle + half]).astype(np.float32)
     return paste(np.pad(grid, 1), *_whole(enlarged), image_size)
 
 
@@ -46,7 +44,7 @@ def paste(grid: F32, left: int, top: int, right: int, bottom: int, image_size: t
     """`grid` stretched over the pixels from (left, top) to (right, bottom), both within, where the image has them."""
     rows, first_row = _axis(grid.shape[0], top, bottom, image_size[0])
     columns, first_column = _axis(grid.shape[1], left, right, image_size[1])
-    values: F32 = rows @ grid @ columns.T
+    values = np.asarray(rows @ grid @ columns.T, np.float32)
     return values, first_row, first_column
 
 
