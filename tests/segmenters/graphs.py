@@ -178,10 +178,13 @@ def yolo(colours, classes, scores, size, *, layout="yolov8", n_classes=80, notes
 def constant_detections(boxes, labels, scores, masks, *, batch=None):
     """A model that finds the same in every image: outputs as torchvision's, whatever is in the arrays."""
     g = Graph()
-    for name, array in zip(("boxes", "labels", "scores", "masks"), (boxes, labels, scores, masks), strict=True):
+    names = ("boxes", "labels", "scores", "masks")
+    for name, array in zip(names, (boxes, labels, scores, masks), strict=True):
         g("Identity", array, output=name)
     sides = (3, "height", "width") if batch is None else (batch, 3, "height", "width")
-    return g.model([("image", TensorProto.FLOAT, sides)], detection_values(("boxes", "labels", "scores", "masks"), None))
+    return g.model(
+        [("image", TensorProto.FLOAT, sides)], detection_values(("boxes", "labels", "scores", "masks"), None)
+    )
 
 
 def constant_yolo(rows, prototypes, *, size=(64, 64), notes=None, sides=None):

@@ -12,6 +12,8 @@ from ldls.segmenters.resampling import bilinear_weights, resize
 
 F32 = NDArray[np.float32]
 GREY = 114
+FARTHEST = 1e6
+"""Pixels at which boxes are cut, before anything overflows."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Letterbox:
         height, width = self.image_size
         scale = np.array([self.scaled_size[1] / width, self.scaled_size[0] / height], np.float32)
         offset = np.array([self.left, self.top], np.float32)
-        corners = (boxes.reshape(-1, 2, 2) - offset) / scale
+        corners = (np.clip(boxes, -FARTHEST, FARTHEST).reshape(-1, 2, 2) - offset) / scale
         clipped: F32 = np.clip(corners, 0, np.array([width, height], np.float32)).reshape(-1, 4)
         return clipped
 

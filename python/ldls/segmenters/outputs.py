@@ -35,7 +35,7 @@ def check_finite(what: str, values: NDArray[Any], instances: NDArray[np.int64]) 
     Raises:
         MaskError: It is not; the message names the instance and `what`.
     """
-    wrong = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+    wrong = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
     if wrong.size:
         raise MaskError(
             f"instance {instances[wrong[0]]}: {what} holds NaN or infinity; "

@@ -26,6 +26,7 @@ def padded_paste(grid: F32, box: F32, image_size: tuple[int, int]) -> tuple[F32,
         box: (4,) left, top, right, bottom in pixels.
         image_size: (height, width) in pixels.
     """
+    box = np.clip(box, -MAX_SIDE, MAX_SIDE)
     scale = (grid.shape[0] + 2) / grid.shape[0]
     middle, half = (box[2:] + box[:2]) * np.float32(0.5), (box[2:] - box[:2]) * np.float32(0.5 * scale)
     enlarged = np.concatenate([middle - half, middle + half]).astype(np.float32)

@@ -23,7 +23,7 @@ def suppress(
         max_iou: Largest overlap, as intersection over union, of two boxes that are both kept.
         max_kept: How many are kept at most.
     """
-    left, top, right, bottom = boxes.T
+    left, top, right, bottom = boxes.T.astype(np.float64)  # areas of huge boxes overflow in single precision
     areas = (right - left) * (bottom - top)
     waiting = np.argsort(-scores, kind="stable")
     kept: list[int] = []

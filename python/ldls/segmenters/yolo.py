@@ -203,14 +203,16 @@ def _drawn(
     rows, columns = letterbox.upsampling((prototypes.shape[1], prototypes.shape[2]))
     for i, box, grid in zip(kept.tolist(), np.ceil(boxes).astype(np.int64).tolist(), grids, strict=True):
         left, top, right, bottom = box
-        logits = rows[top : max(top, bottom)] @ grid @ columns[left : max(left, right)].T
+        with np.errstate(over="ignore", invalid="ignore"):  # finite, but too large to add: such pixels are left out
+            logits = rows[top : max(top, bottom)] @ grid @ columns[left : max(left, right)].T
         category = classes.id(i, int(found.classes[i]))
         yield Crop(logits > 0, top, left, category, float(found.scores[i]))
 
 
 def _corners(centred: F32) -> F32:
     middle, half = centred[:, :2], centred[:, 2:] / 2
-    return np.concatenate([middle - half, middle + half], axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is kept is held to be finite later
+        return np.concatenate([middle - half, middle + half], axis=1)
 
 
 def _as_classes(numbers: F32) -> I64:

@@ -1,0 +1,91 @@
+"""Letterboxes against their definitions, pixel by pixel, and against OpenCV."""
+
+import numpy as np
+import pytest
+
+from ldls.segmenters.letterbox import Letterbox
+from ldls.segmenters.resampling import resize
+from segmenters.test_pasting import slow_resize
+
+SIZES = [
+    pytest.param((37, 124), (64, 64), id="wide"),
+    pytest.param((124, 37), (64, 64), id="tall"),
+    pytest.param((30, 21), (64, 96), id="enlarged"),
+    pytest.param((64, 64), (64, 64), id="of the very size"),
+    pytest.param((33, 64), (64, 64), id="odd padding"),
+    pytest.param((1, 300), (64, 64), id="a line"),
+]
+GENERATOR = np.random.default_rng(2)
+
+
+def random_image(size):
+    return GENERATOR.integers(0, 256, (*size, 3), np.uint8)
+
+
+@pytest.mark.parametrize(("image_size", "input_size"), SIZES)
+def test_fill_is_its_definition(image_size, input_size):
+    image = random_image(image_size)
+    ratio = min(input_size[0] / image_size[0], input_size[1] / image_size[1])
+    height, width = (max(round(side * ratio), 1) for side in image_size)
+    top, left = round((input_size[0] - height) / 2 - 0.1), round((input_size[1] - width) / 2 - 0.1)
+    expected = np.full((*input_size, 3), 114, np.uint8)
+    for channel in range(3):
+        resized = np.round(slow_resize(image[:, :, channel].astype(float), height, width))
+        for row in range(height):
+            for column in range(width):
+                expected[top + row, left + column, channel] = resized[row, column]
+    filled = Letterbox.fit(image_size, input_size).fill(image)
+    assert filled.shape == (*input_size, 3)
+    differs = filled.astype(int) - expected
+    # single precision may round a half the other way
+    assert np.abs(differs).max() <= 1
+    assert np.count_nonzero(differs) < 0.001 * differs.size
+
+
+@pytest.mark.parametrize(("image_size", "input_size"), SIZES)
+def test_fill_is_that_of_opencv(image_size, input_size):
+    cv2 = pytest.importorskip("cv2")
+    image = random_image(image_size)
+    box = Letterbox.fit(image_size, input_size)
+    resized = cv2.resize(image, box.scaled_size[::-1], interpolation=cv2.INTER_LINEAR)
+    spare = np.subtract(input_size, box.scaled_size)
+    above, before = (round(s / 2 - 0.1) for s in spare.tolist())
+    below, after = (round(s / 2 + 0.1) for s in spare.tolist())
+    expected = cv2.copyMakeBorder(resized, above, below, before, after, cv2.BORDER_CONSTANT, value=(114, 114, 114))
+    assert np.abs(box.fill(image).astype(int) - expected).max() <= 1
+
+
+@pytest.mark.parametrize(("image_size", "input_size"), SIZES)
+def test_upsampling_is_its_definition(image_size, input_size):
+    cells = (input_size[0] // 4, input_size[1] // 4)
+    grid = GENERATOR.normal(size=cells).astype(np.float32)
+    rows, columns = Letterbox.fit(image_size, input_size).upsampling(cells)
+    np.testing.assert_allclose(rows @ grid @ columns.T, slow_upsampling(grid, image_size), atol=2e-5)
+
+
+def slow_upsampling(grid, image_size):
+    """The grid made finer until the grey ends between cells, the grey cut off, the rest resampled."""
+    ratio = min(4 * grid.shape[0] / image_size[0], 4 * grid.shape[1] / image_size[1])
+    spare = [4 * n - max(round(side * ratio), 1) for n, side in zip(grid.shape, image_size, strict=True)]
+    finer = next(f for f in (1, 2, 4) if all(s * f % 4 == 0 and s // 2 * f % 4 == 0 for s in spare))
+    fine = slow_resize(grid, finer * grid.shape[0], finer * grid.shape[1])
+    ratio = min(fine.shape[0] / image_size[0], fine.shape[1] / image_size[1])
+    height, width = (max(round(side * ratio), 1) for side in image_size)
+    top, left = round((fine.shape[0] - height) / 2 - 0.1), round((fine.shape[1] - width) / 2 - 0.1)
+    return slow_resize(fine[top : top + height, left : left + width], *image_size)
+
+
+def test_an_input_that_may_vary_is_as_small_as_the_stride_allows():
+    box = Letterbox.fit((375, 1242), (640, 640), stride=32)
+    assert (box.input_size, box.scaled_size, box.top, box.left) == ((224, 640), (193, 640), 15, 0)
+
+
+def test_boxes_come_back_to_the_image():
+    box = Letterbox.fit((375, 1242), (640, 640))
+    corners = np.array([[0, box.top, 640, box.top + 193], [320, 0, 700, 640]], np.float32)
+    np.testing.assert_allclose(box.boxes_in_image(corners), [[0, 0, 1242, 375], [621, 0, 1242, 375]], rtol=1e-6)
+
+
+def test_resize_keeps_an_image_of_the_size():
+    image = random_image((5, 6))
+    assert resize(image, 5, 6) is image
