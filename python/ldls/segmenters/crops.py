@@ -35,12 +35,17 @@ class Crop:
 def assemble(crops: Iterable[Crop], image_size: tuple[int, int], classes: Classes) -> InstanceMasks:
     """Masks of an image of (height, width) pixels; instances without a pixel are left out."""
     canvas = np.zeros(image_size, np.bool_)
-    kept = [crop for crop in crops if crop.pixels.any()]
+    rles, categories, scores = [], [], []
+    for crop in crops:  # one at a time: a crop may be as large as the image
+        if crop.pixels.any():
+            rles.append(_encode(crop, canvas))
+            categories.append(crop.category)
+            scores.append(crop.score)
     return InstanceMasks(
-        [_encode(crop, canvas) for crop in kept],
+        rles,
         image_size,
-        categories=np.array([crop.category for crop in kept], np.int32),
-        scores=np.array([crop.score for crop in kept], np.float32),
+        categories=np.array(categories, np.int32),
+        scores=np.array(scores, np.float32),
         names=classes.names,
     )
 

@@ -58,8 +58,7 @@ class MaskRcnn:
         found = _detections(outputs, self.classes, min_score)
         crops: Iterable[Crop]
         if outputs[3].shape[2:] == image_size:
-            grids = _grids(outputs[3], found)
-            crops = [Crop(grid >= 0.5, 0, 0, one.category, one.score) for one, grid in zip(found, grids, strict=True)]
+            crops = _whole(outputs[3], found)
         else:
             crops = _pasted(padded_paste, found, _small_grids(outputs[3], found, image_size), image_size, HALF)
         return assemble(crops, image_size, self.classes)
@@ -144,22 +143,25 @@ def _detections(outputs: list[NDArray[Any]], classes: Classes, min_score: float)
     ]
 
 
-def _grids(masks: NDArray[Any], found: list[_Detection]) -> F32:
-    """(n, h, w) probabilities of what was found."""
-    kept = np.array([one.index for one in found], np.int64)
-    grids: F32 = masks[kept, 0].astype(np.float32)
-    check_finite("mask", grids, kept)
-    return grids
+def _whole(masks: NDArray[Any], found: list[_Detection]) -> Iterator[Crop]:
+    for one in found:
+        probabilities = masks[one.index]
+        check_finite("mask", probabilities, np.array([one.index]))
+        yield Crop(probabilities[0] >= HALF, 0, 0, one.category, one.score)
 
 
 def _small_grids(masks: NDArray[Any], found: list[_Detection], image_size: tuple[int, int]) -> F32:
+    """(n, S, S) probabilities of what was found."""
     height, width = masks.shape[2:]
     if found and (height != width or not 0 < height <= MAX_CELLS):
         raise FileFormatError(
             f"output masks: {height} x {width} cells, expected those of the image, {image_size[0]} x {image_size[1]}, "
             f"or squares of at most {MAX_CELLS}"
         )
-    return _grids(masks, found)
+    kept = np.array([one.index for one in found], np.int64)
+    grids: F32 = masks[kept, 0].astype(np.float32)
+    check_finite("mask", grids, kept)
+    return grids
 
 
 def _pasted(

@@ -177,7 +177,7 @@ def _session(file: OnnxFile, providers: Sequence[str] | None, threads: int | Non
     # the bytes that were looked through, unless onnxruntime must find weights beside the file
     source = str(file.path) if file.has_external_data else file.content
     try:
-        return runtime.InferenceSession(source, options, providers=_providers(runtime, providers))
+        return runtime.InferenceSession(source, options, providers=_providers(runtime, providers), enable_fallback=0)
     except (MemoryError, ParameterError):
         raise
     except Exception as error:  # onnxruntime's errors have nothing else in common
