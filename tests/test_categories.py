@@ -17,11 +17,13 @@ from ldls.errors import ParameterError
     ],
 )
 def test_category_ids_of_classes(names, expected):
-    assert category_ids(names) == expected
+    ids, kept = category_ids(names)
+    assert ids == expected
+    assert kept == {ids[index]: COCO_NAMES.get(ids[index], name) for index, name in names.items()}
 
 
 def test_own_ids_never_meet_those_of_coco():
-    assert not set(category_ids({i: f"thing {i}" for i in range(200)}).values()) & set(COCO_NAMES)
+    assert not set(category_ids({i: f"thing {i}" for i in range(200)})[0].values()) & set(COCO_NAMES)
 
 
 def test_negative_class():

@@ -27,24 +27,16 @@ COCO_NAMES: dict[int, str] = {
 CONTIGUOUS_IDS: tuple[int, ...] = tuple(COCO_NAMES)
 """COCO id of the class at each position: networks number the 80 classes without gaps, Matterport's from 1."""
 
-OWN_IDS_FROM = 100
-"""Id of class 0 of a network whose classes are not COCO's."""
+FIRST_OTHER_ID = 100
+"""Category id of class 0 of another program where COCO has no class of its name."""
 _COCO_IDS = {name: category for category, name in COCO_NAMES.items()}
 
 
-def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> list[int]:
-    """Ids of the categories `wanted`, each an id or a name, among `names`.
+def category_ids(names: Mapping[int, str]) -> tuple[dict[int, int], dict[int, str]]:
+    """Category id of each class index of another program, and the name of each such id.
 
-    Raises:
-        ParameterError: There is no such category; the message has the nearest name.
-    """
-    return [category for one in wanted for category in _ids(one, names)]
-
-
-def category_ids(names: Mapping[int, str]) -> dict[int, int]:
-    """Category id of each class of a network: COCO's where COCO has the name, otherwise 100 + the class.
-
-    Capitals do not matter. Ids of a network's own classes thus never meet those of COCO, which end at 90.
+    A class with the name of one of COCO's, whatever its capitals, gets COCO's id and name; any other gets 100 + its
+    index. COCO's ids end at 90, so the two never meet.
 
     Args:
         names: Name of each class by its index, from 0.
@@ -55,7 +47,17 @@ def category_ids(names: Mapping[int, str]) -> dict[int, int]:
     wrong = [index for index in names if index < 0]
     if wrong:
         raise ParameterError(f"names: class {wrong[0]} is negative, expected 0 or more")
-    return {index: _COCO_IDS.get(name.strip().lower(), OWN_IDS_FROM + index) for index, name in names.items()}
+    ids = {index: _COCO_IDS.get(name.strip().lower(), FIRST_OTHER_ID + index) for index, name in names.items()}
+    return ids, {ids[index]: COCO_NAMES.get(ids[index], name) for index, name in names.items()}
+
+
+def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> list[int]:
+    """Ids of the categories `wanted`, each an id or a name, among `names`.
+
+    Raises:
+        ParameterError: There is no such category; the message has the nearest name.
+    """
+    return [category for one in wanted for category in _ids(one, names)]
 
 
 def _ids(wanted: int | str, names: Mapping[int, str]) -> list[int]:

@@ -52,6 +52,5 @@ def contiguous_coco_classes(first: int) -> Classes:
 def named_classes(names: Mapping[int, str] | Sequence[str]) -> Classes:
     """Classes by their names, with the ids of `ldls.categories.category_ids`."""
     by_class = dict(names) if isinstance(names, Mapping) else dict(enumerate(names))
-    ids = category_ids(by_class)
-    own = {ids[i]: name for i, name in by_class.items() if ids[i] not in COCO_NAMES}
+    ids, own = category_ids(by_class)
     return Classes(ids, COCO_NAMES | own)
