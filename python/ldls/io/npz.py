@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import lzma
 import zipfile
+import zlib
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.errors import CorruptFileError, LimitError, UnsafeFileError
+from ldls.errors import CorruptFileError, FileFormatError, LimitError
+from ldls.io.npy import read_array
+from ldls.io.regular_file import regular_file
 from ldls.io.whole_file import whole_file
 
 MAX_BYTES = 4 << 30
@@ -26,19 +30,23 @@ def read_npz(path: str | PathLike[str]) -> dict[str, NDArray[Any]]:
         UnsafeFileError: It holds Python objects.
         LimitError: It would unpack to more than `MAX_BYTES` or more than `MAX_MEMBERS` arrays.
     """
-    path = Path(path)
+    path = regular_file(path)
     try:
-        _check_size(path)
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (zipfile.BadZipFile, EOFError, KeyError, OSError) as error:
-        if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):
-            raise
+        with zipfile.ZipFile(path) as archive:
+            members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
+            _check_size(path, archive.infolist())
+            return {member.filename.removesuffix(".npy"): _read_member(archive, member) for member in members}
+    except FileFormatError as error:
+        raise type(error)(f"{path}: {error}") from None
+    except (FileNotFoundError, PermissionError):
+        raise
+    except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, ValueError) as error:
         raise CorruptFileError(f"{path}: not a whole .npz file ({error})") from None
-    except ValueError as error:
-        if "allow_pickle" in str(error):
-            raise UnsafeFileError(f"{path}: object arrays are not loaded") from None
-        raise CorruptFileError(f"{path}: not a whole .npz file ({error})") from None
+
+
+def _read_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    with archive.open(member) as file:
+        return read_array(file, member.file_size)
 
 
 def write_npz(path: str | PathLike[str], arrays: dict[str, NDArray[Any]]) -> None:
@@ -47,9 +55,7 @@ def write_npz(path: str | PathLike[str], arrays: dict[str, NDArray[Any]]) -> Non
         np.savez_compressed(file, allow_pickle=False, **arrays)
 
 
-def _check_size(path: Path) -> None:
-    with zipfile.ZipFile(path) as archive:
-        members = archive.infolist()
+def _check_size(path: Path, members: list[zipfile.ZipInfo]) -> None:
     unpacked = sum(member.file_size for member in members)
     if len(members) > MAX_MEMBERS or unpacked > MAX_BYTES:
         raise LimitError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import stat
 import warnings
 from os import PathLike
 from pathlib import Path
@@ -21,6 +20,7 @@ from ldls.errors import (
     UnsafeFileError,
     UnsupportedFormatError,
 )
+from ldls.io.regular_file import regular_file
 
 FLOAT_BYTES = 4
 
@@ -40,9 +40,7 @@ def read_points(path: str | PathLike[str], *, columns: int | None = None, recove
         UnsupportedFormatError: No format has this suffix.
         FileNotFoundError: There is no such file.
     """
-    path = Path(path)
-    if not stat.S_ISREG(path.stat().st_mode):
-        raise FileFormatError(f"{path}: expected a regular file")
+    path = regular_file(path)
     if path.suffix == ".npy":
         return _read_npy(path)
     if path.suffix == ".bin":

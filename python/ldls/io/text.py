@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ldls.errors import CorruptFileError
+from ldls.io.regular_file import regular_file
 
 
 def read_lines(path: Path) -> list[str]:
@@ -12,9 +13,10 @@ def read_lines(path: Path) -> list[str]:
 
     Raises:
         CorruptFileError: It is not text.
+        FileFormatError: It is a folder, a pipe or a device.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = regular_file(path).read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise CorruptFileError(f"{path}: not a text file ({error.reason} at byte {error.start})") from None
     return text.rstrip().splitlines()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Literal, Self
 
@@ -12,47 +11,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls import _ldls
 from ldls.categories import COCO_NAMES, find_categories
-from ldls.errors import MaskError, ParameterError
-from ldls.io.masks import coco, npz
+from ldls.errors import LimitError, MaskError, ParameterError
+from ldls.io.masks import coco, formats, npz
+from ldls.io.masks.numpy_stack import instances_first
 from ldls.io.masks.records import MaskRecords
+from ldls.masks import instance_image
+from ldls.masks.adapters import sam, supervision, torchvision, ultralytics
+from ldls.masks.adapters.arrays import to_numpy
+from ldls.masks.image_size import checked_size
+from ldls.masks.instance_mask import InstanceMask
+from ldls.masks.pixels import encode
+from ldls.masks.rectangles import rectangles
 
 MAX_RADIUS = 10_000
 """Farthest that masks grow or shrink, in pixels."""
-
-
-@dataclass(frozen=True, eq=False)
-class InstanceMask:
-    """One instance of an image.
-
-    Attributes:
-        category: Category id.
-        name: Category name.
-        score: Score of the 2D segmenter, 0 to 1.
-        rle: Its pixels as column-major run lengths.
-    """
-
-    category: int
-    name: str
-    score: float
-    rle: _ldls.Rle
-
-    @property
-    def area(self) -> int:
-        """Number of pixels."""
-        return self.rle.area
-
-    @property
-    def bounding_box(self) -> tuple[int, int, int, int]:
-        """(top, left, height, width) in pixels of the smallest box around it; zeros if it is empty."""
-        return self.rle.bounding_box
-
-    def crop(self) -> NDArray[np.bool_]:
-        """(height, width) pixels within the bounding box."""
-        return self.rle.crop(*self.bounding_box)
-
-    def to_array(self) -> NDArray[np.bool_]:
-        """(H, W) pixels of the whole image."""
-        return self.rle.crop(0, 0, self.rle.height, self.rle.width)
 
 
 class InstanceMasks:
@@ -76,8 +48,8 @@ class InstanceMasks:
         scores: ArrayLike | None = None,
         names: Mapping[int, str] | None = None,
     ) -> None:
-        """Masks from run lengths; see `from_array`, `from_coco` and `from_npz` for files and arrays."""
-        height, width = image_size
+        """Masks from run lengths; the `from_...` methods make them from files, arrays and other programs."""
+        height, width = checked_size(image_size)
         self.core = _ldls.Masks(height, width, list(rles))
         if categories is None:
             categories, names = np.ones(len(rles), np.int32), names or {1: "object"}
@@ -95,6 +67,7 @@ class InstanceMasks:
         scores: ArrayLike | None = None,
         names: Mapping[int, str] | None = None,
         image_size: tuple[int, int] | None = None,
+        instance_axis: int = 0,
     ) -> Self:
         """Masks from pixels.
 
@@ -105,11 +78,14 @@ class InstanceMasks:
             scores: (M,) scores from 0 to 1; all 1 without them.
             names: Name of each category id; COCO's 91-entry list without them.
             image_size: (H, W) of the image; only needed where M may be 0.
+            instance_axis: The axis of an array that counts the masks: 0, or -1 for (H, W, M).
 
         Raises:
             MaskError: Masks of different sizes, values that are no mask, an unknown category or a bad score.
         """
-        rles = [_encode(i, mask) for i, mask in enumerate(masks)]  # type: ignore[arg-type]
+        if instance_axis != 0:
+            masks = instances_first(np.asarray(masks), instance_axis)
+        rles = [encode(i, mask) for i, mask in enumerate(masks)]  # type: ignore[arg-type]
         if image_size is None:
             image_size = _image_size(masks, rles)
         return cls(rles, image_size, categories=categories, scores=scores, names=names)
@@ -139,8 +115,7 @@ class InstanceMasks:
             CorruptFileError: The file is not JSON.
             FileNotFoundError: There is no such file.
         """
-        records = coco.read(source, image_id=image_id, image_size=image_size)
-        return cls._of(records if names is None else replace(records, names=names))
+        return cls._of(coco.read(source, image_id=image_id, image_size=image_size, names=names))
 
     @classmethod
     def from_npz(cls, path: str | PathLike[str]) -> Self:
@@ -153,9 +128,139 @@ class InstanceMasks:
         """
         return cls._of(npz.read(path))
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write an `.npz` that `from_npz` reads."""
-        npz.write(path, self)
+    @classmethod
+    def from_file(
+        cls,
+        path: str | PathLike[str],
+        *,
+        image_id: int | str | None = None,
+        image_size: tuple[int, int] | None = None,
+        instance_axis: int | None = None,
+        class_divisor: int | None = None,
+        categories: ArrayLike | None = None,
+        scores: ArrayLike | None = None,
+        names: Mapping[int, str] | None = None,
+    ) -> Self:
+        """Masks of a file; its suffix tells the format.
+
+        Args:
+            path: `.json` (COCO), `.png` (instance numbers), `.npz` (see `from_npz`), `.npy` (stack of masks) or `.txt`
+                (KITTI label_2, whose boxes become masks).
+            image_id: Which image of a `.json` with several.
+            image_size: (height, width) in pixels; `.txt` needs it, and others must agree with it.
+            instance_axis: Axis of a `.npy` that counts the masks, 0 or -1, where sizes do not tell.
+            class_divisor: For a `.png` whose numbers hold the class as well; 256 for KITTI's. See
+                `from_instance_image`.
+            categories: Category ids for a `.png` or `.npy`, which are all 1, "object", without them.
+            scores: Scores for a `.png` or `.npy`, which are all 1 without them.
+            names: Name of each category id, for all but `.npz`, where the file does not say.
+
+        Raises:
+            MaskError: Masks that cannot be used, or of another size than the image.
+            UnsupportedFormatError: No format has this suffix, or this variant is not supported.
+            ParameterError: The format has no such option.
+            FileFormatError: The file is broken.
+            LimitError: The file is too large.
+            FileNotFoundError: There is no such file.
+        """
+        records = formats.read(
+            path,
+            image_size=image_size,
+            image_id=image_id,
+            instance_axis=instance_axis,
+            class_divisor=class_divisor,
+            categories=categories,
+            scores=scores,
+            names=names,
+        )
+        return cls._of(records)
+
+    @classmethod
+    def from_instance_image(
+        cls,
+        image: ArrayLike,
+        *,
+        categories: ArrayLike | None = None,
+        scores: ArrayLike | None = None,
+        names: Mapping[int, str] | None = None,
+        class_divisor: int | None = None,
+    ) -> Self:
+        """Masks from (H, W) whole numbers, in ascending order of the numbers; see `instance_image.read`."""
+        records = instance_image.read(
+            image, categories=categories, scores=scores, names=names, class_divisor=class_divisor
+        )
+        return cls._of(records)
+
+    @classmethod
+    def from_boxes(
+        cls,
+        boxes: ArrayLike,
+        image_size: tuple[int, int],
+        *,
+        categories: ArrayLike | None = None,
+        scores: ArrayLike | None = None,
+        names: Mapping[int, str] | None = None,
+    ) -> Self:
+        """Rectangular masks from (M, 4) left, top, right, bottom in pixels.
+
+        A mask has the pixels whose centres, at whole numbers, lie within the box; outside the image there are none.
+
+        Raises:
+            MaskError: A box that is none, an unknown category or a bad score.
+        """
+        rles = rectangles(to_numpy(boxes), image_size)
+        return cls(rles, image_size, categories=categories, scores=scores, names=names)
+
+    @classmethod
+    def from_torchvision(
+        cls, output: Mapping[str, Any], *, threshold: float = 0.5, names: Mapping[int, str] | None = None
+    ) -> Self:
+        """Masks from what a torchvision network returns for one image; see `adapters.torchvision.read`."""
+        return cls._of(torchvision.read(output, threshold=threshold, names=names))
+
+    @classmethod
+    def from_supervision(
+        cls,
+        detections: Any,  # noqa: ANN401
+        *,
+        names: Mapping[int, str] | None = None,
+        image_size: tuple[int, int] | None = None,
+    ) -> Self:
+        """Masks from `supervision.Detections`; see `adapters.supervision.read`."""
+        return cls._of(supervision.read(detections, names=names, image_size=image_size))
+
+    @classmethod
+    def from_ultralytics(cls, result: Any) -> Self:  # noqa: ANN401
+        """Masks from Ultralytics' `Results` of one image; see `adapters.ultralytics.read`."""
+        return cls._of(ultralytics.read(result))
+
+    @classmethod
+    def from_sam(
+        cls,
+        records: Sequence[Mapping[str, Any]],
+        *,
+        categories: ArrayLike | None = None,
+        names: Mapping[int, str] | None = None,
+        image_size: tuple[int, int] | None = None,
+    ) -> Self:
+        """Masks from the list that a mask generator of Segment Anything returns; see `adapters.sam.read`."""
+        return cls._of(sam.read(records, categories=categories, names=names, image_size=image_size))
+
+    def save(self, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
+        """Write a file that `from_file` reads; the suffix chooses the format.
+
+        Args:
+            path: `.json` (COCO), `.png` (instance numbers, for masks that do not overlap), `.npz` (run lengths) or
+                `.npy` (pixels only).
+            options: `image_id`, `file_name` and `results` of `.json`, `layout` of `.npz`, and `pixels_only` of `.npy`;
+                see the `write` of `ldls.io.masks.coco`, `npz` and `numpy_stack`.
+
+        Raises:
+            MaskError: The format cannot keep these masks.
+            UnsupportedFormatError: No format has this suffix.
+            ParameterError: The format has no such option.
+        """
+        formats.write(path, self, **options)
 
     @property
     def height(self) -> int:
@@ -191,6 +296,18 @@ class InstanceMasks:
         pixels = np.zeros((len(self), self.height, self.width), np.bool_)
         self.core.paint(pixels, None)
         return pixels
+
+    def to_instance_image(self) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """(H, W) numbers, m + 1 on the pixels of mask m and 0 elsewhere: uint8 up to 255 masks, else uint16.
+
+        Raises:
+            MaskError: Two masks share a pixel; `resolve_overlaps` leaves it to one.
+        """
+        return instance_image.join([mask.rle for mask in self], self.image_size)
+
+    def to_coco(self, *, image_id: int = 1, file_name: str | None = None) -> dict[str, Any]:
+        """COCO's data set of this one image, with compressed run lengths; its `annotations` are results as well."""
+        return coco.data_set(self, image_id, file_name)
 
     def select(self, indices: ArrayLike) -> Self:
         """The masks at `indices`, whole numbers or one bool a mask, in that order."""
@@ -266,16 +383,24 @@ class InstanceMasks:
 
     @classmethod
     def _of(cls, records: MaskRecords) -> Self:
-        return cls(
-            records.rles,
-            records.size,
-            categories=records.categories,
-            scores=records.scores,
-            names=records.names,
-        )
+        try:
+            return cls(
+                records.rles,
+                records.size,
+                categories=records.categories,
+                scores=records.scores,
+                names=records.names,
+            )
+        except (LimitError, MaskError) as error:
+            raise type(error)(f"{records.source}: {error}") from None
 
     def _check(self) -> None:
         for i, (category, score) in enumerate(zip(self.categories, self.scores, strict=True)):
+            if category < 1:
+                raise MaskError(
+                    f"mask {i}: category is {category}, expected 1 or more, for 0 stands for background in results; "
+                    "number categories from 1"
+                )
             if int(category) not in self.names:
                 raise MaskError(
                     f"mask {i}: category {category} is unknown; expected one of "
@@ -283,35 +408,6 @@ class InstanceMasks:
                 )
             if not 0 <= score <= 1:
                 raise MaskError(f"mask {i}: score is {score}, expected 0 to 1")
-
-
-def _encode(index: int, mask: ArrayLike) -> _ldls.Rle:
-    pixels = np.asarray(mask)
-    if pixels.ndim != 2:
-        raise MaskError(
-            f"mask {index}: expected (height, width), got shape {pixels.shape}; pass masks as (M, height, width)"
-        )
-    try:
-        return _ldls.Rle.from_pixels(np.ascontiguousarray(_as_bool(pixels)))
-    except MaskError as error:
-        raise MaskError(f"mask {index}: {error}") from None
-
-
-def _as_bool(pixels: NDArray[Any]) -> NDArray[np.bool_]:
-    if pixels.dtype == np.bool_:
-        return pixels
-    if pixels.dtype.kind not in "iuf":
-        raise MaskError(f"expected bool, 0 and 1, or 0 and 255, got dtype {pixels.dtype}")
-    probabilities = pixels.dtype.kind == "f" and bool(((pixels >= 0) & (pixels <= 1)).all())
-    if not probabilities:
-        wrong = ~np.isin(pixels, (0, 1, 255))
-        if wrong.any():
-            row, column = np.argwhere(wrong)[0]
-            raise MaskError(
-                f"pixel ({row}, {column}) is {pixels[row, column]}, expected bool, 0 and 1, 0 and 255, "
-                "or probabilities; split an image of instance numbers into one mask each"
-            )
-    return pixels >= 0.5
 
 
 def _image_size(masks: object, rles: Sequence[_ldls.Rle]) -> tuple[int, int]:
@@ -325,14 +421,15 @@ def _image_size(masks: object, rles: Sequence[_ldls.Rle]) -> tuple[int, int]:
 
 def _per_mask(name: str, values: ArrayLike, count: int, dtype: type) -> NDArray[Any]:
     array = np.asarray(values)
-    whole = dtype is not np.int32 or array.dtype.kind in "iu" or array.size == 0
-    if array.dtype.kind not in "iuf" or not whole:
-        kind = "whole numbers" if dtype is np.int32 else "numbers"
-        raise MaskError(f"{name}: expected {kind}, got {array.dtype}")
+    whole_numbers = dtype is np.int32
+    if array.dtype.kind not in ("iu" if whole_numbers and array.size else "iuf"):
+        raise MaskError(f"{name}: expected {'whole numbers' if whole_numbers else 'numbers'}, got {array.dtype}")
     if array.ndim == 0:
         array = np.full(count, array)
     if array.shape != (count,):
         raise MaskError(f"{name}: expected one for each of {count} masks, got shape {array.shape}")
+    if whole_numbers and array.size and not (array.min() >= -(2**31) and array.max() < 2**31):
+        raise MaskError(f"{name}: found {array.min()} to {array.max()}, expected at most {2**31 - 1}")
     array = array.astype(dtype)
     array.flags.writeable = False
     return array

@@ -1,4 +1,8 @@
-"""COCO JSON: data set files, and bare lists of results."""
+"""COCO JSON: data set files, and bare lists of results.
+
+Ids of annotations only serve messages, so they may repeat; those of images and categories may not. A region of a crowd
+(iscrowd 1) is an instance like any other.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import json
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +18,12 @@ from ldls import _ldls
 from ldls.categories import COCO_NAMES
 from ldls.errors import CorruptFileError, LimitError, MaskError
 from ldls.io.masks.records import MaskRecords
+from ldls.io.regular_file import regular_file
+from ldls.io.whole_file import whole_file
+from ldls.masks.image_size import checked_size
+
+if TYPE_CHECKING:
+    from ldls.masks import InstanceMasks
 
 MAX_FILE_BYTES = 1 << 30
 """Larger files hold whole data sets; parsed, they take many times their size in memory."""
@@ -24,30 +34,92 @@ def read(
     *,
     image_id: int | str | None = None,
     image_size: tuple[int, int] | None = None,
+    names: Mapping[int, str] | None = None,
 ) -> MaskRecords:
     """The instances of one image of a COCO file or of its parsed content.
+
+    Args:
+        source: File or parsed JSON.
+        image_id: Which image, where there are several.
+        image_size: (height, width) in pixels, where the source does not say.
+        names: Name of each category id, where the source does not say; COCO's own list without them.
 
     Raises:
         MaskError: An annotation cannot be used.
         CorruptFileError: The file is not JSON, or not COCO's.
     """
     if isinstance(source, str | PathLike):
-        place, document = fspath(source), _load(Path(source))
+        place, document = fspath(source), _load(regular_file(source))
     else:
         place, document = "masks", source
-    annotations, images, names = _parts(place, document)
+    annotations, images, found_names = _parts(place, document)
+    names = found_names or names or COCO_NAMES
     image_id = _choose_image(place, annotations, images, image_id)
     chosen = [a for a in annotations if image_id is None or a.get("image_id", image_id) == image_id]
-    size = image_size or _size_of(place, images, image_id, chosen)
+    try:
+        size = checked_size(image_size or _size_of(images, image_id, chosen))
+    except MaskError as error:
+        raise MaskError(f"{place}: {error}") from None
     labels = [f"{place}: annotation {a.get('id', i)}" for i, a in enumerate(chosen)]
     scores = _scores(labels, chosen)
     return MaskRecords(
+        source=place,
         size=size,
         rles=[_rle(label, a, size) for label, a in zip(labels, chosen, strict=True)],
         categories=[_category(label, a, names) for label, a in zip(labels, chosen, strict=True)],
         scores=scores,
         names=names,
     )
+
+
+def write(
+    path: str | PathLike[str],
+    masks: InstanceMasks,
+    *,
+    image_id: int = 1,
+    file_name: str | None = None,
+    results: bool = False,
+) -> None:
+    """Write a data set of one image, or a bare list of results.
+
+    Args:
+        path: `.json` file.
+        masks: Masks.
+        image_id: Id of the image.
+        file_name: Name of the image's file; without one there is none in the data set.
+        results: Whether to write the bare list of results, which has no names and, without masks, no image size.
+    """
+    content = result_list(masks, image_id=image_id) if results else data_set(masks, image_id, file_name)
+    with whole_file(path) as file:
+        file.write(json.dumps(content, separators=(",", ":")).encode())
+
+
+def data_set(masks: InstanceMasks, image_id: int = 1, file_name: str | None = None) -> dict[str, Any]:
+    """COCO's object with the image, all categories that have a name, and an annotation for each mask."""
+    image: dict[str, Any] = {"id": image_id, "height": masks.height, "width": masks.width}
+    if file_name is not None:
+        image["file_name"] = file_name
+    own = ({"id": i, "iscrowd": 0} for i in range(1, len(masks) + 1))
+    return {
+        "images": [image],
+        "categories": [{"id": category, "name": name} for category, name in masks.names.items()],
+        "annotations": [ids | result for ids, result in zip(own, result_list(masks, image_id=image_id), strict=True)],
+    }
+
+
+def result_list(masks: InstanceMasks, *, image_id: int = 1) -> list[dict[str, Any]]:
+    """One of COCO's results for each mask, as compressed run lengths; boxes are left, top, width, height."""
+    return [
+        {
+            "image_id": image_id,
+            "category_id": mask.category,
+            "segmentation": {"size": list(masks.image_size), "counts": mask.rle.to_compressed().decode("ascii")},
+            "bbox": [mask.bounding_box[i] for i in (1, 0, 3, 2)],
+            "area": mask.area,
+            "score": mask.score,
+        }
+        for mask in masks
+    ]
 
 
 def _load(path: Path) -> object:
@@ -63,19 +135,31 @@ def _refuse_constant(name: str) -> None:
     raise ValueError(f"{name} is no JSON number")
 
 
-def _parts(place: str, document: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, Any]], Mapping[int, str]]:
+def _parts(place: str, document: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, Any]], dict[Any, str]]:
     """Annotations, images by id, and category names of a data set or a bare list of results."""
     if isinstance(document, list):
-        return _records(place, "results", document), {}, COCO_NAMES
+        return _records(place, "results", document), {}, {}
     if not isinstance(document, Mapping) or "annotations" not in document:
         raise CorruptFileError(
             f"{place}: expected COCO's object with images, annotations and categories, or a list of results"
         )
     annotations = _records(place, "annotations", document["annotations"])
-    images = {i.get("id"): i for i in _records(place, "images", document.get("images", []))}
-    categories = _records(place, "categories", document.get("categories", []))
-    names: dict[Any, str] = {c.get("id"): str(c.get("name", c.get("id"))) for c in categories}
-    return annotations, images, names or COCO_NAMES
+    images = _by_id(place, "images", document.get("images", []), (int, str))
+    categories = _by_id(place, "categories", document.get("categories", []), (int,))
+    return annotations, images, {i: str(c.get("name", i)) for i, c in categories.items()}
+
+
+def _by_id(place: str, name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[str, Any]]:
+    records = _records(place, name, values)
+    found: dict[Any, dict[str, Any]] = {}
+    for i, record in enumerate(records):
+        key = record.get("id")
+        if type(key) not in types:
+            expected = " or ".join(t.__name__ for t in types)
+            raise CorruptFileError(f"{place}: {name}[{i}] has id {key!r}, expected {expected}")
+        if found.setdefault(key, record) != record:
+            raise CorruptFileError(f"{place}: {name}[{i}] has id {key!r}, which another of {name} has already")
+    return found
 
 
 def _records(place: str, name: str, values: object) -> list[dict[str, Any]]:
@@ -90,6 +174,11 @@ def _choose_image(
     images: Mapping[Any, dict[str, Any]],
     image_id: int | str | None,
 ) -> int | str | None:
+    for i, annotation in enumerate(annotations):
+        if type(annotation.get("image_id")) not in (int, str, type(None)):
+            raise CorruptFileError(
+                f"{place}: annotation {i}: image_id is {annotation['image_id']!r}, expected int or str"
+            )
     known = list(images) or sorted({a["image_id"] for a in annotations if "image_id" in a}, key=str)
     if image_id is not None and known and image_id not in known:
         raise MaskError(f"{place}: no image with id {image_id!r}; found {known[:10]}")
@@ -99,43 +188,41 @@ def _choose_image(
 
 
 def _size_of(
-    place: str,
-    images: Mapping[Any, dict[str, Any]],
-    image_id: int | str | None,
-    annotations: list[dict[str, Any]],
-) -> tuple[int, int]:
+    images: Mapping[Any, dict[str, Any]], image_id: int | str | None, annotations: list[dict[str, Any]]
+) -> object:
     image = images.get(image_id, {})
-    found = [image.get("height"), image.get("width")]
-    if None in found:
-        sizes = (a["segmentation"] for a in annotations if isinstance(a.get("segmentation"), dict))
-        found = next((s["size"] for s in sizes if "size" in s), found)
-    if None in found:
-        raise MaskError(f"{place}: the image's size is not given; pass image_size=(height, width)")
-    return _checked_size(place, found)
-
-
-def _checked_size(place: str, size: object) -> tuple[int, int]:
-    whole = isinstance(size, list | tuple) and len(size) == 2 and all(type(s) is int for s in size)
-    if not whole or not all(0 < s < 2**31 for s in size):  # type: ignore[attr-defined]
-        raise MaskError(f"{place}: size is {size!r}, expected [height, width] in whole pixels")
-    return size[0], size[1]  # type: ignore[index]
+    if image.get("height") is not None and image.get("width") is not None:
+        return image["height"], image["width"]
+    segmentations = (a.get("segmentation") for a in annotations)
+    sizes = [s["size"] for s in segmentations if isinstance(s, dict) and "size" in s]
+    if not sizes:
+        raise MaskError("the image's size is not given; pass image_size=(height, width)")
+    return sizes[0]
 
 
 def _rle(place: str, annotation: dict[str, Any], size: tuple[int, int]) -> _ldls.Rle:
     segmentation = annotation.get("segmentation")
     try:
         if isinstance(segmentation, dict):
-            return _from_rle(segmentation, size)
+            return from_rle(segmentation, size)
         if isinstance(segmentation, list):
             return _from_polygons(segmentation, size)
-    except MaskError as error:
-        raise MaskError(f"{place}: {error}") from None
+    except (MaskError, LimitError) as error:
+        raise type(error)(f"{place}: {error}") from None
     raise MaskError(f"{place}: no segmentation, expected polygons or RLE; a box alone is no mask")
 
 
-def _from_rle(rle: dict[str, Any], image_size: tuple[int, int]) -> _ldls.Rle:
-    size = _checked_size("RLE", rle.get("size"))
-    if size != image_size:
+def from_rle(rle: Mapping[str, Any], image_size: tuple[int, int] | None = None) -> _ldls.Rle:
+    """The pixels of COCO's run lengths: `size`, and `counts` as a list or compressed.
+
+    Raises:
+        MaskError: Runs that do not sum to height * width, or another size than `image_size`.
+    """
+    try:
+        size = checked_size(rle.get("size"))
+    except MaskError as error:
+        raise MaskError(f"RLE: {error}") from None
+    if image_size is not None and size != image_size:
         hint = "; swapped?" if size == image_size[::-1] else ""
         raise MaskError(f"RLE of size {size}, image is {image_size}{hint}")
     counts = rle.get("counts")
@@ -160,6 +247,8 @@ def _from_polygons(polygons: list[Any], image_size: tuple[int, int]) -> _ldls.Rl
 
 def _category(place: str, annotation: dict[str, Any], names: Mapping[int, str]) -> int:
     category = annotation.get("category_id")
+    if category == 0 and type(category) is int:
+        raise MaskError(f"{place}: category_id is 0, which stands for background in results; number categories from 1")
     if type(category) is not int or category not in names:
         some = ", ".join(f"{i} {name}" for i, name in list(names.items())[:5])
         raise MaskError(f"{place}: category_id is {category!r}, which is not among the categories ({some}, ...)")

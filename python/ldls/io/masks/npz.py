@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from os import PathLike
-from typing import TYPE_CHECKING, Any
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls import _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
-from ldls.errors import MaskError, UnsupportedFormatError
+from ldls.errors import LimitError, MaskError, ParameterError, UnsupportedFormatError
 from ldls.io.masks.records import MaskRecords
 from ldls.io.npz import read_npz, write_npz
+from ldls.masks.image_size import checked_size
+from ldls.masks.pixels import encode
 
 if TYPE_CHECKING:
     from ldls.masks import InstanceMasks
+
+
+OWN_ARRAYS = {"size", "runs", "run_counts", "categories", "scores", "category_ids", "category_names"}
+"""What files of this package hold."""
 
 
 def read(path: str | PathLike[str]) -> MaskRecords:
@@ -24,14 +30,17 @@ def read(path: str | PathLike[str]) -> MaskRecords:
     Raises:
         UnsupportedFormatError: The arrays are of neither kind.
         MaskError: They do not fit one another.
+        FileFormatError: It is not a whole `.npz` file, or holds Python objects.
     """
     arrays = read_npz(path)
     try:
-        if {"size", "runs", "run_counts", "categories", "scores"} <= arrays.keys():
-            return _from_runs(arrays)
-        if {"masks", "class_ids", "scores"} <= arrays.keys():
-            return _from_research_code(arrays)
-    except (MaskError, IndexError, ValueError) as error:
+        if arrays.keys() >= OWN_ARRAYS:
+            return _from_runs(fspath(path), arrays)
+        if arrays.keys() >= {"masks", "class_ids", "scores"}:
+            return _from_research_code(fspath(path), arrays)
+    except LimitError as error:
+        raise LimitError(f"{path}: {error}") from None
+    except (MaskError, IndexError, ValueError, TypeError) as error:
         raise MaskError(f"{path}: {error}") from None
     raise UnsupportedFormatError(
         f"{path}: found arrays {sorted(arrays)}, expected those of InstanceMasks.save, "
@@ -39,51 +48,94 @@ def read(path: str | PathLike[str]) -> MaskRecords:
     )
 
 
-def write(path: str | PathLike[str], masks: InstanceMasks) -> None:
-    """Write run lengths, categories, scores and names."""
+def write(path: str | PathLike[str], masks: InstanceMasks, *, layout: Literal["runs", "research"] = "runs") -> None:
+    """Write categories, scores, names and run lengths.
+
+    Args:
+        path: `.npz` file.
+        masks: Masks.
+        layout: "runs", or "research" for the dense arrays that the LDLS research code reads; it knows COCO's
+            categories and no others.
+
+    Raises:
+        MaskError: The research code does not know a category.
+    """
+    layouts = {"runs": _runs, "research": _research_arrays}
+    if layout not in layouts:
+        raise ParameterError(f"layout: got {layout!r}, expected {' or '.join(layouts)}")
+    write_npz(path, layouts[layout](masks))
+
+
+def _runs(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
     runs = [mask.rle.runs() for mask in masks]
-    write_npz(
-        path,
-        {
-            "size": np.array(masks.image_size, np.int64),
-            "runs": np.concatenate([np.zeros(0, np.uint32), *runs]),
-            "run_counts": np.array([len(r) for r in runs], np.int64),
-            "categories": masks.categories,
-            "scores": masks.scores,
-            "category_ids": np.array(list(masks.names), np.int64),
-            "category_names": np.array(list(masks.names.values()), np.str_),
-        },
-    )
+    return {
+        "size": np.array(masks.image_size, np.int64),
+        "runs": np.concatenate([np.zeros(0, np.uint32), *runs]),
+        "run_counts": np.array([len(r) for r in runs], np.int64),
+        "categories": masks.categories,
+        "scores": masks.scores,
+        "category_ids": np.array(list(masks.names), np.int64),
+        "category_names": np.array(list(masks.names.values()), np.str_),
+    }
 
 
-def _from_runs(arrays: dict[str, NDArray[Any]]) -> MaskRecords:
-    height, width = (int(s) for s in arrays["size"])
-    ends = np.cumsum(arrays["run_counts"])
-    if ends.size and (arrays["run_counts"].min() < 0 or ends[-1] != arrays["runs"].size):
-        raise MaskError(f"run_counts sum to {ends[-1]}, runs holds {arrays['runs'].size}")
-    split = np.split(arrays["runs"].astype(np.uint32), ends[:-1]) if ends.size else []
+def _from_runs(source: str, arrays: dict[str, NDArray[Any]]) -> MaskRecords:
+    height, width = checked_size(arrays["size"].tolist())
+    runs, counts = arrays["runs"], arrays["run_counts"]
+    if runs.dtype != np.uint32 or runs.ndim != 1 or counts.dtype.kind not in "iu" or counts.ndim != 1:
+        raise MaskError(
+            f"runs and run_counts: expected (R,) uint32 and (M,) whole numbers, "
+            f"got {runs.shape} {runs.dtype} and {counts.shape} {counts.dtype}"
+        )
+    ends = np.cumsum(counts)
+    if ends.size and (counts.min() < 0 or ends[-1] != runs.size):
+        raise MaskError(f"run_counts sum to {ends[-1]}, runs holds {runs.size}")
+    split = np.split(runs, ends[:-1]) if ends.size else []
     names = zip(arrays["category_ids"].tolist(), arrays["category_names"].tolist(), strict=True)
     return MaskRecords(
+        source=source,
         size=(height, width),
         rles=[_ldls.Rle.from_runs(height, width, np.ascontiguousarray(runs)) for runs in split],
         categories=arrays["categories"],
         scores=arrays["scores"],
-        names=dict(names),
+        names={int(category): str(name) for category, name in names},
     )
 
 
-def _from_research_code(arrays: dict[str, NDArray[Any]]) -> MaskRecords:
+def _research_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
+    for i, mask in enumerate(masks):
+        if COCO_NAMES.get(mask.category) != mask.name:
+            raise MaskError(
+                f"mask {i}: category {mask.category} {mask.name!r} is not COCO's, and the research code knows no "
+                "others; filter it out or write the other layout"
+            )
+    height, width = masks.image_size
+    pixels = np.zeros((height, width, len(masks)), np.bool_)
+    for i, mask in enumerate(masks):
+        pixels[:, :, i] = mask.to_array()
+    boxes = np.array([mask.bounding_box for mask in masks], np.int32).reshape(-1, 4)
+    boxes[:, 2:] += boxes[:, :2]  # top, left, bottom, right
+    return {
+        "shape": np.array(masks.image_size, np.int64),
+        "rois": boxes,
+        "masks": pixels,
+        "class_ids": np.array([CONTIGUOUS_IDS.index(c) + 1 for c in masks.categories.tolist()], np.int32),
+        "scores": masks.scores,
+    }
+
+
+def _from_research_code(source: str, arrays: dict[str, NDArray[Any]]) -> MaskRecords:
     masks, classes = arrays["masks"], arrays["class_ids"]
-    if masks.ndim != 3 or masks.shape[2] != classes.size:
+    if masks.ndim != 3 or classes.shape != masks.shape[2:]:
         raise MaskError(f"masks: expected (height, width, {classes.size}), got {masks.shape}; one mask a class id")
-    wrong = (classes < 1) | (classes > len(CONTIGUOUS_IDS))
+    wrong = ~((classes >= 1) & (classes <= len(CONTIGUOUS_IDS)))
     if wrong.any():
         raise MaskError(f"class_ids: {classes[wrong][0]} at {wrong.argmax()}, expected 1 to 80")
-    pixels = (np.ascontiguousarray(masks[:, :, m] != 0) for m in range(classes.size))
     return MaskRecords(
-        size=(masks.shape[0], masks.shape[1]),
-        rles=[_ldls.Rle.from_pixels(mask) for mask in pixels],
+        source=source,
+        size=checked_size(masks.shape[:2]),
+        rles=[encode(m, masks[:, :, m]) for m in range(classes.size)],
         categories=np.array(CONTIGUOUS_IDS, np.int32)[classes - 1],
-        scores=arrays["scores"].astype(np.float32),
+        scores=arrays["scores"],
         names=COCO_NAMES,
     )

@@ -1,0 +1,143 @@
+"""PNG images of instance numbers: value m + 1 on the pixels of mask m, 0 on the background.
+
+A text chunk, `ldls:instances`, keeps what pixels cannot: categories, scores, names, and instances without a pixel.
+Files of other programs do without it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+from PIL.PngImagePlugin import PngImageFile, PngInfo
+
+from ldls import _ldls
+from ldls.errors import CorruptFileError, FileFormatError, LimitError, ParameterError, UnsupportedFormatError
+from ldls.io.masks.records import MaskRecords
+from ldls.io.regular_file import regular_file
+from ldls.io.whole_file import whole_file
+from ldls.masks import instance_image
+
+if TYPE_CHECKING:
+    from ldls.masks import InstanceMasks
+
+CHUNK = "ldls:instances"
+"""Keyword of the text chunk."""
+VERSION = 1
+"""Version of its content."""
+MODES = {"1", "L", "P", "I", "I;16"}
+"""Pillow's names of images with one number a pixel."""
+MAX_PIXELS = 178_956_970
+"""Most pixels that are unpacked, as in Pillow."""
+
+
+def read(
+    path: str | PathLike[str],
+    *,
+    categories: ArrayLike | None = None,
+    scores: ArrayLike | None = None,
+    names: Mapping[int, str] | None = None,
+    class_divisor: int | None = None,
+) -> MaskRecords:
+    """The instances of a PNG of 8 or 16 bits; of a palette image the indices count, not the colours.
+
+    Args:
+        path: Image file.
+        categories: As in `instance_image.read`, for files without our chunk.
+        scores: As `categories`.
+        names: As `categories`.
+        class_divisor: As `categories`; 256 for KITTI's files.
+
+    Raises:
+        UnsupportedFormatError: The image has colours or transparency, or is of a later version.
+        LimitError: It has more than `MAX_PIXELS`.
+        CorruptFileError: It is no PNG, or not a whole one.
+        ParameterError: Categories, scores or a divisor for a file that has its own.
+    """
+    path = regular_file(path)
+    values, texts = _open(path)
+    given = {"categories": categories, "scores": scores, "names": names, "class_divisor": class_divisor}
+    if CHUNK not in texts:
+        return instance_image.read(values, source=str(path), **given)  # type: ignore[arg-type]
+    idle = [name for name, value in given.items() if value is not None]
+    if idle:
+        raise ParameterError(f"{idle[0]}: {path} holds its own; leave it out")
+    try:
+        return _from_chunk(str(path), values, json.loads(texts[CHUNK]))
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        if isinstance(error, FileFormatError):
+            raise
+        raise CorruptFileError(f"{path}: text chunk {CHUNK} cannot be used ({error})") from None
+
+
+def write(path: str | PathLike[str], masks: InstanceMasks) -> None:
+    """Write masks that do not overlap: 8 bits up to 255 masks, else 16.
+
+    Raises:
+        MaskError: Two masks share a pixel.
+    """
+    content = {
+        "version": VERSION,
+        "categories": masks.categories.tolist(),
+        "scores": masks.scores.tolist(),
+        "names": {str(category): name for category, name in masks.names.items()},
+    }
+    info = PngInfo()
+    info.add_text(CHUNK, json.dumps(content, separators=(",", ":")))
+    image = Image.fromarray(masks.to_instance_image())
+    with whole_file(path) as file:
+        image.save(file, "PNG", pnginfo=info)
+
+
+def _open(path: Path) -> tuple[NDArray[Any], Mapping[str, str]]:
+    """(H, W) values and the text chunks."""
+    try:
+        # opened as PNG and nothing else, and without Image.open, which warns of large images
+        with PngImageFile(path) as image:
+            _check_kind(path, image)
+            image.verify()  # the sums of all chunks, which loading does not look at
+        with PngImageFile(path) as image:
+            image.load()
+            return np.asarray(image), image.text
+    except (FileNotFoundError, PermissionError):
+        raise
+    except (OSError, SyntaxError, ValueError, EOFError) as error:
+        if isinstance(error, FileFormatError):
+            raise
+        raise CorruptFileError(f"{path}: not a whole PNG image ({error})") from None
+
+
+def _check_kind(path: Path, image: PngImageFile) -> None:
+    if image.width * image.height > MAX_PIXELS:
+        raise LimitError(f"{path}: {image.width} x {image.height} pixels, expected at most {MAX_PIXELS}")
+    if image.mode not in MODES:
+        raise UnsupportedFormatError(
+            f"{path}: {image.mode} pixels, expected one number a pixel, grey of 8 or 16 bits or a palette; "
+            "colours do not tell which instance a pixel belongs to"
+        )
+
+
+def _from_chunk(source: str, values: NDArray[Any], content: dict[str, Any]) -> MaskRecords:
+    if content["version"] != VERSION:
+        raise UnsupportedFormatError(f"{source}: version {content['version']}, this ldls reads {VERSION}; update ldls")
+    height, width = values.shape
+    numbers, found = instance_image.split(values)
+    count = len(content["categories"])
+    if numbers.size and numbers[-1] > count:
+        raise CorruptFileError(f"{source}: value {numbers[-1]}, but text chunk {CHUNK} describes {count} instances")
+    empty = _ldls.Rle.from_runs(height, width, np.array([height * width], np.uint32))
+    rles = dict(zip(numbers.tolist(), found, strict=True))
+    return MaskRecords(
+        source=source,
+        size=(height, width),
+        rles=[rles.get(m + 1, empty) for m in range(count)],
+        categories=np.array(content["categories"], np.int64),
+        scores=np.array(content["scores"], np.float32),
+        names={int(category): str(name) for category, name in content["names"].items()},
+    )

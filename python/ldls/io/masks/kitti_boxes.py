@@ -1,0 +1,63 @@
+"""The 2D boxes of KITTI label_2 files as rectangular masks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+
+from ldls.categories import COCO_NAMES
+from ldls.errors import MaskError
+from ldls.io.kitti_objects import KittiObject, read_kitti_objects
+from ldls.io.masks.records import MaskRecords
+from ldls.masks.rectangles import rectangles
+
+KITTI_CATEGORIES: dict[str, int] = {
+    "Pedestrian": 1, "Person_sitting": 1, "Car": 3, "Tram": 7, "Truck": 8, "Van": 101, "Cyclist": 102, "Misc": 103,
+}  # fmt: skip
+"""Category id of each of KITTI's classes: COCO's where COCO has it."""
+
+KITTI_NAMES: dict[int, str] = COCO_NAMES | {101: "Van", 102: "Cyclist", 103: "Misc"}
+"""Name of each category id: COCO's, and KITTI's for the rest."""
+
+
+def read(
+    path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
+) -> MaskRecords:
+    """One rectangle for each object of a label_2 file; DontCare rows are left out.
+
+    Objects without a score get 1.
+
+    Args:
+        path: Label file, or a detector's results in its layout.
+        image_size: (height, width) of the image in pixels, which the file does not say.
+        names: Names of further category ids, for classes that are not KITTI's.
+
+    Raises:
+        MaskError: No image size, a class without category id, or a box that is none.
+        FileFormatError: The file is broken; see `read_kitti_objects`.
+    """
+    objects = [found for found in read_kitti_objects(path) if not found.is_region]
+    if image_size is None:
+        raise MaskError(f"{path}: says nothing of the image's size; pass image_size=(height, width)")
+    all_names = KITTI_NAMES | dict(names or {})
+    ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
+    try:
+        return MaskRecords(
+            source=str(path),
+            size=image_size,
+            rles=rectangles([found.bbox for found in objects], image_size),
+            categories=[_category(i, found, ids) for i, found in enumerate(objects)],
+            scores=[1.0 if found.score is None else found.score for found in objects],
+            names=all_names,
+        )
+    except MaskError as error:
+        raise MaskError(f"{path}: {error}") from None
+
+
+def _category(index: int, found: KittiObject, ids: Mapping[str, int]) -> int:
+    if found.type not in ids:
+        known = ", ".join(KITTI_CATEGORIES)
+        raise MaskError(
+            f"box {index}: class {found.type!r} is none of {known}; pass names={{104: {found.type!r}}} to give it an id"
+        )
+    return ids[found.type]

@@ -1,0 +1,128 @@
+"""Images of instance numbers: the value of a pixel says whose it is, 0 is background."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls import _ldls
+from ldls.errors import MaskError, ParameterError
+from ldls.io.masks.records import MaskRecords
+
+
+def read(
+    image: ArrayLike,
+    *,
+    source: str = "instance image",
+    categories: ArrayLike | None = None,
+    scores: ArrayLike | None = None,
+    names: Mapping[int, str] | None = None,
+    class_divisor: int | None = None,
+) -> MaskRecords:
+    """The instances of an image of instance numbers, in ascending order of their numbers.
+
+    Args:
+        image: (H, W) whole numbers, 0 where there is no instance.
+        source: Where it comes from, for messages.
+        categories: One for all, or one for each number found; without them all are category 1, "object".
+        scores: As `categories`; all 1 without them.
+        names: Name of each category id.
+        class_divisor: Where numbers hold the class as well, what to divide them by: the quotient is the category, and
+            a remainder of 0 is background. KITTI's images have 256, Cityscapes' 1000.
+
+    Raises:
+        MaskError: Another shape, or values that are no instance numbers.
+        ParameterError: Both `categories` and `class_divisor`, or a divisor below 2.
+    """
+    numbers, rles = split(image)
+    if class_divisor is not None:
+        if categories is not None or class_divisor < 2:
+            raise ParameterError(
+                f"class_divisor: got {class_divisor}, expected 2 or more, and no categories beside it; "
+                "the quotient is the category"
+            )
+        pairs = [divmod(int(number), class_divisor) for number in numbers]
+        rles = [rle for rle, (_, instance) in zip(rles, pairs, strict=True) if instance]
+        categories = [category for category, instance in pairs if instance]
+        names = {category: f"class {category}" for category in categories} | dict(names or {})
+    height, width = np.shape(image)
+    return MaskRecords(
+        source=source, size=(height, width), rles=rles, categories=categories, scores=scores, names=names
+    )
+
+
+def split(image: ArrayLike) -> tuple[NDArray[Any], list[_ldls.Rle]]:
+    """The values of `image` that are not 0, in ascending order, and the pixels of each.
+
+    Args:
+        image: (H, W) whole numbers, 0 where there is no instance.
+
+    Raises:
+        MaskError: Another shape, or values that are no instance numbers.
+    """
+    values = np.asarray(image)
+    if values.dtype.kind not in "biu":
+        raise MaskError(f"instance image: expected whole numbers, got {values.dtype}")
+    if values.ndim != 2 or values.size == 0:
+        raise MaskError(f"instance image: expected (height, width), got shape {values.shape}")
+    if values.min() < 0:
+        row, column = np.argwhere(values < 0)[0]
+        raise MaskError(f"instance image: pixel ({row}, {column}) is {values[row, column]}, expected 0 or more")
+    height, width = values.shape
+    columns = values.ravel(order="F")
+    starts = np.concatenate([[0], np.flatnonzero(columns[1:] != columns[:-1]) + 1])
+    ends = np.append(starts[1:], columns.size)
+    order = np.argsort(columns[starts], kind="stable")
+    found, first = np.unique(columns[starts][order], return_index=True)
+    spans = np.split(np.column_stack([starts, ends])[order], first[1:])
+    rles = [_from_spans(s, height, width) for value, s in zip(found, spans, strict=True) if value]
+    return found[found != 0], rles
+
+
+def join(rles: Sequence[_ldls.Rle], image_size: tuple[int, int]) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """(H, W) numbers, m + 1 on the pixels of mask m and 0 elsewhere: uint8 up to 255 masks, else uint16.
+
+    There are never more masks than 16 bits count.
+
+    Raises:
+        MaskError: Two masks share a pixel.
+    """
+    height, width = image_size
+    spans = [_spans(rle) for rle in rles]
+    owners = np.repeat(np.arange(len(rles)), [len(s) for s in spans])
+    joined = np.concatenate([np.zeros((0, 2), np.int64), *spans])
+    order = np.argsort(joined[:, 0], kind="stable")
+    joined, owners = joined[order], owners[order]
+    _refuse_overlaps(joined, owners, height)
+    edges = np.concatenate([[0], joined.ravel(), [height * width]])
+    values = np.zeros(len(edges) - 1, np.uint8 if len(rles) < 256 else np.uint16)
+    values[1::2] = owners + 1
+    return np.ascontiguousarray(np.repeat(values, np.diff(edges)).reshape(width, height).T)
+
+
+def _spans(rle: _ldls.Rle) -> NDArray[np.int64]:
+    """(S, 2) first pixel and end of each run of ones, counted column by column."""
+    edges = np.cumsum(rle.runs(), dtype=np.int64)
+    spans = edges[: len(edges) // 2 * 2].reshape(-1, 2)
+    return spans[spans[:, 0] < spans[:, 1]]
+
+
+def _from_spans(spans: NDArray[np.int64], height: int, width: int) -> _ldls.Rle:
+    edges = np.concatenate([[0], spans.ravel(), [height * width]])
+    runs = np.diff(edges).astype(np.uint32)
+    return _ldls.Rle.from_runs(height, width, runs if runs[-1] else runs[:-1])
+
+
+def _refuse_overlaps(spans: NDArray[np.int64], owners: NDArray[np.int64], height: int) -> None:
+    overlap = spans[1:, 0] < spans[:-1, 1]
+    if overlap.any():
+        at = int(overlap.argmax())
+        column, row = divmod(int(spans[at + 1, 0]), height)
+        first, second = sorted(owners[at : at + 2].tolist())
+        raise MaskError(
+            f"masks {first} and {second} share pixel ({row}, {column}), and an instance image gives each pixel to one; "
+            "call resolve_overlaps() first"
+        )

@@ -1,0 +1,113 @@
+import zipfile
+
+import numpy as np
+import pytest
+
+import ldls
+from mask_samples import of_coco, random_masks
+
+
+def test_the_research_layout_is_the_research_codes(tmp_path):
+    masks = of_coco(random_masks(1))
+    masks.save(tmp_path / "masks.npz", layout="research")
+    with np.load(tmp_path / "masks.npz") as arrays:
+        assert set(arrays) == {"shape", "rois", "masks", "class_ids", "scores"}
+        assert tuple(arrays["shape"]) == masks.image_size
+        assert arrays["masks"].shape == (*masks.image_size, len(masks))
+        for pixels, (top, left, bottom, right) in zip(np.moveaxis(arrays["masks"], 2, 0), arrays["rois"], strict=True):
+            assert pixels.sum() == pixels[top:bottom, left:right].sum()
+        assert arrays["class_ids"].min() >= 1
+        assert arrays["class_ids"].max() <= 80
+
+
+def test_the_research_layout_knows_only_cocos_categories(tmp_path):
+    with pytest.raises(ldls.MaskError, match=r"mask \d: category 10\d '.*' is not COCO's"):
+        random_masks(1).save(tmp_path / "masks.npz", layout="research")
+    with pytest.raises(ldls.ParameterError, match="layout: got 'dense', expected runs or research"):
+        random_masks(1).save(tmp_path / "masks.npz", layout="dense")
+    assert list(tmp_path.iterdir()) == []
+
+
+def own_arrays(**changes):
+    arrays = {
+        "size": np.array([4, 5]),
+        "runs": np.array([3, 2, 15], np.uint32),
+        "run_counts": np.array([3]),
+        "categories": np.array([1]),
+        "scores": np.array([0.5], np.float32),
+        "category_ids": np.array([1]),
+        "category_names": np.array(["object"]),
+    } | changes
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        pytest.param({"size": np.array([4.0, 5.0])}, ldls.MaskError, "size is", id="size in floats"),
+        pytest.param({"size": np.array(4)}, ldls.MaskError, "size is 4", id="one side"),
+        pytest.param({"size": np.array([2**20, 2**20])}, ldls.LimitError, "pixels", id="huge image"),
+        pytest.param({"runs": np.array([3, -1, 18])}, ldls.MaskError, "runs and run_counts", id="signed runs"),
+        pytest.param({"runs": np.array([3, 2], np.uint32)}, ldls.MaskError, "run_counts sum to 3", id="run missing"),
+        pytest.param({"runs": np.array([3, 2, 5], np.uint32)}, ldls.MaskError, "runs sum to 10", id="runs too short"),
+        pytest.param({"run_counts": np.array([[3]])}, ldls.MaskError, "runs and run_counts", id="counts in a table"),
+        pytest.param({"run_counts": np.array([4, -1])}, ldls.MaskError, "run_counts sum", id="negative count"),
+        pytest.param({"categories": np.array([0])}, ldls.MaskError, "mask 0: category is 0", id="category 0"),
+        pytest.param({"categories": np.array([2])}, ldls.MaskError, "mask 0: category 2 is unknown", id="unknown"),
+        pytest.param({"categories": np.array([2**32 + 1])}, ldls.MaskError, "found 4294967297", id="64-bit category"),
+        pytest.param({"scores": np.array([np.nan])}, ldls.MaskError, "mask 0: score is nan", id="NaN score"),
+        pytest.param({"scores": np.array([1.0, 1])}, ldls.MaskError, "scores: expected one", id="two scores"),
+        pytest.param({"category_names": np.array([])}, ldls.MaskError, "shorter", id="no names"),
+        pytest.param({"category_ids": np.array(["x"])}, ldls.MaskError, "invalid literal", id="letters as ids"),
+        pytest.param({"category_ids": None}, ldls.UnsupportedFormatError, "found arrays", id="an array missing"),
+        pytest.param({"scores": np.array([{}])}, ldls.UnsafeFileError, "object arrays", id="pickle"),
+    ],
+)
+def test_faults_of_own_files_are_named(tmp_path, changes, error, message):
+    np.savez(tmp_path / "masks.npz", **own_arrays(**changes))
+    with pytest.raises(error, match=message) as caught:
+        ldls.InstanceMasks.from_npz(tmp_path / "masks.npz")
+    assert "masks.npz" in str(caught.value)
+
+
+def test_research_masks_with_nan_are_refused(tmp_path):
+    arrays = {"masks": np.full((4, 5, 1), np.nan), "class_ids": np.array([1]), "scores": np.array([1.0])}
+    np.savez(tmp_path / "masks.npz", **arrays)
+    with pytest.raises(ldls.MaskError, match=r"masks\.npz: mask 0: pixel \(0, 0\) is nan"):
+        ldls.InstanceMasks.from_npz(tmp_path / "masks.npz")
+
+
+def header(shape, dtype="|b1"):
+    text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text.encode()
+
+
+@pytest.mark.parametrize(
+    ("members", "error", "message"),
+    [
+        pytest.param({"masks.npy": header((10**6, 10**6, 10**6))}, ldls.TruncatedFileError, "needs", id="lying header"),
+        pytest.param(
+            {"masks.npy": header((10**12,), "<U0")}, ldls.TruncatedFileError, "needs", id="entries of no bytes"
+        ),
+        pytest.param({"masks.npy": b"\x93NUMPY\x01\x00\x05\x00((((("}, ldls.CorruptFileError, "npy", id="no header"),
+        pytest.param({"../masks.npy": header((0,))}, ldls.UnsupportedFormatError, "found arrays", id="name with ../"),
+        pytest.param({f"{i}.npy": b"" for i in range(1001)}, ldls.LimitError, "1001 arrays", id="many members"),
+        pytest.param({"masks.txt": b"no array"}, ldls.UnsupportedFormatError, r"found arrays \[\]", id="no arrays"),
+    ],
+)
+def test_archives_that_lie_are_refused(tmp_path, members, error, message):
+    with zipfile.ZipFile(tmp_path / "masks.npz", "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    with pytest.raises(error, match=message):
+        ldls.InstanceMasks.from_npz(tmp_path / "masks.npz")
+
+
+def test_a_zip_bomb_is_refused_before_it_is_unpacked(tmp_path):
+    path = tmp_path / "masks.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("masks.npy", bytes(1 << 20))
+    size, content = (1 << 20).to_bytes(4, "little"), path.read_bytes()
+    path.write_bytes(content.replace(size, (0xFFFFFFF0).to_bytes(4, "little")) + b"")
+    with pytest.raises((ldls.LimitError, ldls.CorruptFileError)):
+        ldls.InstanceMasks.from_npz(path)
