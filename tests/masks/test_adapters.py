@@ -279,6 +279,10 @@ def test_real_detections_are_understood():
     np.testing.assert_array_equal(masks.to_array(), PIXELS)
     assert [mask.name for mask in masks] == ["person", "forklift", "car"]
     assert len(ldls.InstanceMasks.from_supervision(sv.Detections.empty(), image_size=(4, 5))) == 0
+    if hasattr(sv, "CompactMask"):
+        whole = np.tile([0.0, 0, 16, 10], (3, 1))
+        found.mask = sv.CompactMask.from_dense(PIXELS, whole, image_shape=(11, 17))
+        np.testing.assert_array_equal(ldls.InstanceMasks.from_supervision(found).to_array(), PIXELS)
     with pytest.raises(ldls.MaskError, match="from_boxes"):
         ldls.InstanceMasks.from_supervision(sv.Detections(xyxy=BOXES))
 

@@ -51,6 +51,13 @@ def test_another_size_than_the_images_is_refused(tmp_path, name):
         ldls.InstanceMasks.from_file(tmp_path / name, image_size=MASKS.image_size[::-1])
 
 
+@pytest.mark.parametrize("size", [5, (4, 5, 3), (4.0, 5), (-4, 5), "45"])
+def test_a_size_that_is_none_is_refused(tmp_path, size):
+    MASKS.save(tmp_path / "masks.npz")
+    with pytest.raises(ldls.MaskError, match=r"size is .*expected \(height, width\)"):
+        ldls.InstanceMasks.from_file(tmp_path / "masks.npz", image_size=size)
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is forbidden to root")
 def test_a_folder_that_may_not_be_written_stays_empty(tmp_path):
     tmp_path.chmod(0o500)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ldls.errors import MaskError, ParameterError, UnsupportedFormatError
 from ldls.io.masks import coco, instance_png, kitti_boxes, npz, numpy_stack
 from ldls.io.masks.records import MaskRecords
+from ldls.masks.image_size import checked_size
 
 if TYPE_CHECKING:
     from ldls.masks import InstanceMasks
@@ -57,12 +58,13 @@ def read(
     reader = _of_suffix(path, READERS, "read")
     given = {name: value for name, value in options.items() if value is not None}
     known = _check_options(path, reader, given)
-    if image_size is not None and "image_size" in known:
-        given["image_size"] = image_size
-    records = reader(path, **given)
-    if image_size is not None and tuple(image_size) != records.size:
-        hint = "; swapped?" if tuple(image_size) == records.size[::-1] else ""
-        raise MaskError(f"{path}: masks of {records.size} (height, width), the image is {tuple(image_size)}{hint}")
+    if image_size is None:
+        return reader(path, **given)
+    size = checked_size(image_size)
+    records = reader(path, **given, **({"image_size": size} if "image_size" in known else {}))
+    if size != records.size:
+        hint = "; swapped?" if size == records.size[::-1] else ""
+        raise MaskError(f"{path}: masks of {records.size} (height, width), the image is {size}{hint}")
     return records
 
 
