@@ -21,7 +21,7 @@ from ldls.errors import (
     UnsafePathError,
     UnsupportedFormatError,
 )
-from ldls.io import read_points
+from ldls.io import read_image, read_points
 from ldls.masks import InstanceMasks
 from ldls.objects import OrientedBox, SegmentedObject
 from ldls.params import Params
@@ -54,6 +54,7 @@ __all__ = [
     "UnsafePathError",
     "UnsupportedFormatError",
     "__version__",
+    "read_image",
     "read_points",
     "segment",
     "stages",

@@ -145,7 +145,7 @@ def test_supervision_may_find_nothing():
         pytest.param({"mask": None}, "boxes without masks; InstanceMasks.from_boxes .*BoxSegmenter", id="boxes only"),
         pytest.param({"class_id": np.array([0, 1])}, "3 masks, 2 class ids, 3 class names", id="too few classes"),
         pytest.param({"class_id": np.array([0, 0, 2])}, "mask 0: class 0 is 'person', elsewhere", id="two names"),
-        pytest.param({"class_id": np.array([0, -200, 2])}, "mask 1: category is -100", id="class -200"),
+        pytest.param({"class_id": np.array([0, -200, 2])}, "mask 1: class -200", id="class -200"),
         pytest.param({"confidence": np.array([1, 1])}, "scores: expected one for each of 3", id="too few scores"),
         pytest.param({"confidence": np.array([1, 1, 1.5])}, "mask 2: score is 1.5", id="score above 1"),
         pytest.param({"mask": NAN_MASKS[:, 0]}, r"mask 1: pixel \(2, 3\) is nan", id="NaN mask"),

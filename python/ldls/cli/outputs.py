@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ldls.errors import CorruptFileError, LimitError, MaskError
 from ldls.io.whole_file import whole_file
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
@@ -45,37 +44,22 @@ def write_outputs(
     return paths
 
 
-def read_image(path: Path, masks: InstanceMasks) -> NDArray[np.uint8]:
-    """(H, W, 3) pixels of an image file, which must have the size of `masks`.
-
-    Raises:
-        CorruptFileError: It is no image, or not a whole one.
-        MaskError: Its size is not that of the masks.
-    """
-    try:
-        with Image.open(path) as image:
-            size = (image.height, image.width)
-            if size != masks.image_size:
-                hint = "; swapped?" if size == masks.image_size[::-1] else ""
-                raise MaskError(f"masks: {masks.image_size} (height, width), image {path.name} is {size}{hint}")
-            return np.asarray(image.convert("RGB"))
-    except Image.DecompressionBombError as error:
-        raise LimitError(f"{path}: {error}") from None
-    except (FileNotFoundError, PermissionError, IsADirectoryError):
-        raise
-    except (OSError, SyntaxError, ValueError) as error:
-        if isinstance(error, MaskError):
-            raise
-        raise CorruptFileError(f"{path}: not a whole image ({error})") from None
-
-
 def _write_picture(path: Path, result: Segmentation, image: NDArray[np.uint8] | None) -> None:
+    picture = picture_of(result.masks, image, result.pixels, result.labels[result.in_view])
+    with whole_file(path) as file:
+        picture.save(file, "PNG")
+
+
+def picture_of(
+    masks: InstanceMasks,
+    image: NDArray[np.uint8] | None,
+    uv_px: NDArray[np.floating],
+    labels: NDArray[np.int32],
+) -> Image.Image:
+    """The image, or a dark canvas, with masks and labelled points on it."""
     from ldls.viewing import overlay
 
     if image is None:
-        image = np.full((*result.masks.image_size, 3), CANVAS, np.uint8)
-    masks = ((*mask.bounding_box[:2], mask.crop()) for mask in result.masks)
-    names = [f"{mask.name} {mask.score:.2f}" for mask in result.masks]
-    picture = overlay(image, masks, result.pixels, result.labels[result.in_view], names)
-    with whole_file(path) as file:
-        picture.save(file, "PNG")
+        image = np.full((*masks.image_size, 3), CANVAS, np.uint8)
+    crops = ((*mask.bounding_box[:2], mask.crop()) for mask in masks)
+    return overlay(image, crops, uv_px, labels, [f"{mask.name} {mask.score:.2f}" for mask in masks])

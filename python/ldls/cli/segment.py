@@ -8,11 +8,15 @@ from typing import Annotated
 import typer
 
 from ldls.camera import Camera
+from ldls.cli.mask_options import (
+    CategoriesOption,
+    MinScoreOption,
+    SegmenterOption,
+    masks_of,
+)
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
-from ldls.cli.outputs import Output, read_image, write_outputs
-from ldls.errors import UnsupportedFormatError
-from ldls.io import read_points
-from ldls.masks import InstanceMasks
+from ldls.cli.outputs import Output, write_outputs
+from ldls.io import read_image, read_points
 from ldls.params import Params
 from ldls.segmentation import segment as segment_cloud
 
@@ -23,15 +27,27 @@ EXISTING = {"exists": True, "dir_okay": False, "readable": True}
 def segment(
     points: Annotated[Path, typer.Option(help="Lidar sweep: KITTI .bin, nuScenes .pcd.bin or .npy.", **EXISTING)],
     calib: Annotated[Path, typer.Option(help="KITTI calibration of the frame.", **EXISTING)],
+    out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
     masks: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            help="Instance masks: COCO .json, or .npz of ldls or the LDLS research code.",
+            help="Instance masks: COCO .json, .npz of ldls or the LDLS research code, instance .png, .npy stack, or "
+            "KITTI label_2 .txt.",
+            show_default=False,
             **EXISTING,
         ),
-    ],
-    out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
-    image: Annotated[Path | None, typer.Option(help="Image to draw the picture on.", **EXISTING)] = None,
+    ] = None,
+    segmenter: SegmenterOption = None,
+    image: Annotated[
+        Path | None,
+        typer.Option(help="Image for the segmenter, and to draw the picture on.", show_default=False, **EXISTING),
+    ] = None,
+    min_score: MinScoreOption = None,
+    categories: CategoriesOption = None,
+    save_masks: Annotated[
+        Path | None,
+        typer.Option(help="File for the masks, for --masks of another run: .json, .npz or .png.", dir_okay=False),
+    ] = None,
     camera: Annotated[
         int,
         typer.Option(min=0, max=3, help="Which camera of the calibration; 2 is the left colour one."),
@@ -61,8 +77,15 @@ def segment(
     Prints the objects found and the time of each stage, and writes to the folder --out, named after the sweep:
     .npz (all fields), .label (SemanticKITTI), .ply (coloured cloud) and .png (picture).
 
-    Example: ldls segment --points velodyne/000571.bin --calib calib/000571.txt --masks masks/000571.json
-    --image image_2/000571.png --out results
+    Masks come from a file (--masks) or from a segmenter that runs on the image (--segmenter); KITTI's 2D boxes are
+    enough to begin with.
+
+    Examples:
+    ldls segment --points velodyne/000571.bin --calib calib/000571.txt --image image_2/000571.png
+    --masks masks/000571.json --out results
+
+    ldls segment --points velodyne/000001.bin --calib calib/000001.txt --image image_2/000001.png
+    --segmenter boxes:label_2/000001.txt --out results
     """
     params = Params(
         neighbors=neighbors,
@@ -73,9 +96,18 @@ def segment(
         remove_outliers=not outliers,
         threads=threads,
     )
-    instance_masks = read_masks(masks, image_id)
-    pixels = None if image is None else read_image(image, instance_masks)
-    result = segment_cloud(read_points(points), instance_masks, Camera.from_kitti(calib, camera=camera), params=params)
+    pixels = None if image is None else read_image(image)
+    chosen = masks_of(
+        pixels,
+        masks=masks,
+        segmenter=segmenter,
+        image_id=image_id,
+        min_score=min_score,
+        categories=categories,
+    )
+    if save_masks is not None:
+        chosen.save(save_masks)
+    result = segment_cloud(read_points(points), chosen, Camera.from_kitti(calib, camera=camera), params=params)
     name = points.name.removesuffix(".bin").removesuffix(".pcd").removesuffix(".npy")
     written = write_outputs(out, name, result, pixels, formats or list(Output))
     screen = console()
@@ -86,12 +118,3 @@ def segment(
     if report.n_nonfinite:
         screen.print(f"{report.n_nonfinite:,} points are not finite and were left out", highlight=False)
     screen.print("wrote " + " ".join(map(str, written)), highlight=False, soft_wrap=True)
-
-
-def read_masks(path: Path, image_id: int | None) -> InstanceMasks:
-    """Instance masks of a file, by its suffix."""
-    if path.suffix == ".json":
-        return InstanceMasks.from_coco(path, image_id=image_id)
-    if path.suffix == ".npz":
-        return InstanceMasks.from_npz(path)
-    raise UnsupportedFormatError(f"{path}: cannot read {path.suffix!r} masks, expected .json or .npz")

@@ -2,37 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from os import PathLike
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ldls.categories import COCO_NAMES, category_ids
-from ldls.errors import MaskError, NonFiniteError, ShapeError
-from ldls.io.kitti_objects import KittiObject, read_kitti_objects
+from ldls.errors import MaskError
+from ldls.io.masks import kitti_boxes
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes
 from ldls.segmenters.crops import Crop, assemble
 from ldls.segmenters.grabcut import cut
 from ldls.segmenters.image import check_image
 from ldls.segmenters.segmenter import check_min_score
-
-KITTI_IDS = {
-    "Car": 3,
-    "Pedestrian": 1,
-    "Person_sitting": 1,
-    "Truck": 8,
-    "Tram": 7,
-    "Van": 101,
-    "Cyclist": 102,
-    "Misc": 103,
-}
-"""Category ids of KITTI's classes; those over 100 are not COCO's, and keep KITTI's names."""
-FIRST_OTHER = 4
-"""Where classes that are neither KITTI's nor COCO's begin to count, so that their ids follow 103."""
 
 
 class BoxSegmenter:
@@ -57,7 +41,7 @@ class BoxSegmenter:
         """Segmenter of the image that `boxes` were drawn in.
 
         Args:
-            boxes: (n, 4) left, top, right, bottom in pixels; those without area or off the image give no mask.
+            boxes: (n, 4) left, top, right, bottom in pixels; those off the image give no mask.
             categories: (n,) category ids; all 1, "object", without them.
             scores: (n,) scores from 0 to 1; all 1 without them.
             names: Name of each category id; COCO's without them.
@@ -65,50 +49,52 @@ class BoxSegmenter:
             min_score: Lowest score that is kept, 0 to 1.
 
         Raises:
-            ShapeError: `boxes` are not (n, 4).
-            NonFiniteError: A box has NaN or infinity.
-            MaskError: Categories or scores that do not fit, or an unknown category.
+            MaskError: Boxes that are none, categories or scores that do not fit, or an unknown category.
             ParameterError: `min_score` is out of range.
         """
-        self.boxes = _check_boxes(boxes)
-        if categories is None:
-            categories, names = np.ones(len(self.boxes), np.int32), names or {1: "object"}
-        self._names = dict(COCO_NAMES if names is None else names)
-        self._categories = _per_box("categories", categories, len(self.boxes), np.int32)
-        self._scores = _per_box("scores", 1.0 if scores is None else scores, len(self.boxes), np.float64)
-        for i, category in enumerate(self._categories.tolist()):
-            if category not in self._names:
-                raise MaskError(f"box {i}: category {category} is unknown; pass names={{{category}: '...'}}")
-        for i, score in enumerate(self._scores.tolist()):
-            if not 0 <= score <= 1:
-                raise MaskError(f"box {i}: score is {score}, expected 0 to 1")
+        self.boxes = np.array(boxes, np.float64)
         self.min_score = check_min_score(min_score)
         self.grabcut = grabcut
+        self._categories, self._scores, self._names = categories, scores, names
+        self._rectangles((1, 1))  # refuses what cannot be before an image is there
+        self.boxes.flags.writeable = False
 
     @classmethod
-    def from_kitti(cls, path: str | PathLike[str], *, grabcut: bool = False, min_score: float = 0.0) -> Self:
-        """The boxes of a KITTI label_2 file, DontCare left out; categories as `KITTI_IDS` has them.
+    def from_kitti(
+        cls,
+        path: str | PathLike[str],
+        *,
+        names: Mapping[int, str] | None = None,
+        grabcut: bool = False,
+        min_score: float = 0.0,
+    ) -> Self:
+        """The boxes of a KITTI label_2 file, DontCare left out; categories as `kitti_boxes.KITTI_CATEGORIES` has them.
 
-        Other classes have COCO's id where COCO knows the name, otherwise ids from 104 on in their order in the file.
         A 16th column is the score.
+
+        Args:
+            path: Label file, or a detector's results in its layout.
+            names: Names of further category ids, for classes that are neither KITTI's nor COCO's.
+            grabcut: Find the outlines by OpenCV's GrabCut (extra `grabcut`) in place of the rectangles.
+            min_score: Lowest score that is kept, 0 to 1.
 
         Raises:
             FileFormatError: A line is not KITTI's.
-            MaskError: A score outside 0 to 1, which KITTI allows.
+            MaskError: A class without category id, or a score outside 0 to 1, which KITTI allows.
             FileNotFoundError: There is no such file.
         """
-        objects = [one for one in read_kitti_objects(path) if not one.is_region]
-        for number, one in enumerate(objects, start=1):
-            _check_kitti_score(f"{path}, object {number}", one)
-        ids = _kitti_ids([one.type for one in objects])
-        return cls(
-            np.array([one.bbox for one in objects]).reshape(-1, 4),
-            categories=[ids[one.type] for one in objects],
-            scores=[1.0 if one.score is None else one.score for one in objects],
-            names=COCO_NAMES | {i: name for name, i in ids.items() if i not in COCO_NAMES},
-            grabcut=grabcut,
-            min_score=min_score,
-        )
+        try:
+            found = kitti_boxes.read_boxes(path, names=names)
+            return cls(
+                found.boxes,
+                categories=found.categories,
+                scores=found.scores,
+                names=found.names,
+                grabcut=grabcut,
+                min_score=min_score,
+            )
+        except MaskError as error:
+            raise MaskError(f"{path}: {error}") from None
 
     def __call__(self, image: ArrayLike) -> InstanceMasks:
         """The instances of the image (H, W, 3), uint8 RGB.
@@ -119,61 +105,18 @@ class BoxSegmenter:
             ImportError: GrabCut is wanted and `ldls[grabcut]` not installed.
         """
         pixels = check_image(image)
-        classes = Classes({}, self._names)
-        return assemble(self._crops(pixels), (pixels.shape[0], pixels.shape[1]), classes)
+        masks = self._rectangles((pixels.shape[0], pixels.shape[1])).filter(min_score=self.min_score, min_area=1)
+        if not self.grabcut:
+            return masks
+        crops = (
+            Crop(cut(pixels, *mask.bounding_box), *mask.bounding_box[:2], mask.category, mask.score) for mask in masks
+        )
+        return assemble(crops, masks.image_size, Classes({}, masks.names))
 
     def __repr__(self) -> str:
         return f"BoxSegmenter({len(self.boxes)} boxes, grabcut={self.grabcut}, min_score={self.min_score})"
 
-    def _crops(self, image: NDArray[np.uint8]) -> Iterator[Crop]:
-        for box, category, score in zip(self.boxes, self._categories.tolist(), self._scores.tolist(), strict=True):
-            left, top, right, bottom = box.tolist()
-            rows, columns = _within(top, bottom, image.shape[0]), _within(left, right, image.shape[1])
-            if score >= self.min_score and rows and columns:
-                yield Crop(self._pixels(image, rows, columns), rows.start, columns.start, category, score)
-
-    def _pixels(self, image: NDArray[np.uint8], rows: range, columns: range) -> NDArray[np.bool_]:
-        if self.grabcut:
-            return cut(image, rows.start, columns.start, len(rows), len(columns))
-        return np.ones((len(rows), len(columns)), np.bool_)
-
-
-def _within(first: float, last: float, length: int) -> range:
-    """Pixels whose centres lie from `first` to `last`, of those from 0 to `length` - 1."""
-    start, stop = max(first, 0), min(last, length - 1)
-    return range(math.ceil(start), math.floor(stop) + 1) if first < last else range(0)
-
-
-def _kitti_ids(types: Sequence[str]) -> dict[str, int]:
-    others = [name for name in dict.fromkeys(types) if name not in KITTI_IDS]
-    ids = category_ids(dict(enumerate(others, start=FIRST_OTHER)))
-    return KITTI_IDS | {name: ids[i] for i, name in enumerate(others, start=FIRST_OTHER)}
-
-
-def _check_kitti_score(place: str, one: KittiObject) -> None:
-    if one.score is not None and not 0 <= one.score <= 1:
-        raise MaskError(
-            f"{place}: score is {one.score}, expected 0 to 1; KITTI allows any number as a score, ldls does not: "
-            "map the scores of the detector to 0 to 1 first"
+    def _rectangles(self, image_size: tuple[int, int]) -> InstanceMasks:
+        return InstanceMasks.from_boxes(
+            self.boxes, image_size, categories=self._categories, scores=self._scores, names=self._names
         )
-
-
-def _check_boxes(boxes: ArrayLike) -> NDArray[np.float64]:
-    array = np.array(boxes, np.float64)
-    if array.size == 0:
-        array = array.reshape(0, 4)
-    if array.ndim != 2 or array.shape[1] != 4:
-        raise ShapeError(f"boxes: expected (n, 4) left, top, right, bottom, got {array.shape}")
-    wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if wrong.size:
-        raise NonFiniteError(f"boxes: box {wrong[0]} is {array[wrong[0]].tolist()}, expected finite pixels")
-    array.flags.writeable = False
-    return array
-
-
-def _per_box(name: str, values: ArrayLike, count: int, dtype: type) -> NDArray[np.generic]:
-    array = np.asarray(values)
-    array = np.full(count, array) if array.ndim == 0 else array
-    if array.shape != (count,):
-        raise MaskError(f"{name}: expected one for each of {count} boxes, got shape {array.shape}")
-    return array.astype(dtype)

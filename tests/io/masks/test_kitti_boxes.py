@@ -67,7 +67,7 @@ def test_an_empty_file_has_no_masks(tmp_path):
             f"Car 0 0 0 5 0 0 5 {REST}", {"image_size": (6, 10)}, ldls.MaskError, "box 0: .*left <= right", id="turned"
         ),
         pytest.param(
-            f"Car 0 0 0 0 0 5 5 {REST} 7", {"image_size": (6, 10)}, ldls.MaskError, "mask 0: score is 7", id="score 7"
+            f"Car 0 0 0 0 0 5 5 {REST} 7", {"image_size": (6, 10)}, ldls.MaskError, "box 0: score is 7", id="score 7"
         ),
         pytest.param("Car 0 0", {"image_size": (6, 10)}, ldls.TruncatedFileError, "line 1: exp", id="short line"),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from os import PathLike
 
 from ldls.categories import COCO_NAMES
@@ -20,12 +21,49 @@ KITTI_NAMES: dict[int, str] = COCO_NAMES | {101: "Van", 102: "Cyclist", 103: "Mi
 """Name of each category id: COCO's, and KITTI's for the rest."""
 
 
+@dataclass(frozen=True)
+class KittiBoxes:
+    """The objects of a label_2 file as a segmenter of boxes takes them.
+
+    Attributes:
+        boxes: Left, top, right, bottom of each in pixels.
+        categories: Category id of each.
+        scores: Score of each; 1 where there is none.
+        names: Name of each category id.
+    """
+
+    boxes: list[tuple[float, float, float, float]]
+    categories: list[int]
+    scores: list[float]
+    names: Mapping[int, str]
+
+
+def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = None) -> KittiBoxes:
+    """The boxes of a label_2 file; DontCare rows are left out, objects without a score get 1.
+
+    Args:
+        path: Label file, or a detector's results in its layout.
+        names: Names of further category ids, for classes that are not KITTI's.
+
+    Raises:
+        MaskError: A class without category id, or a score outside 0 to 1.
+        FileFormatError: The file is broken; see `read_kitti_objects`.
+    """
+    objects = [found for found in read_kitti_objects(path) if not found.is_region]
+    all_names = KITTI_NAMES | dict(names or {})
+    ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
+    return KittiBoxes(
+        boxes=[found.bbox for found in objects],
+        categories=[_category(i, found, ids) for i, found in enumerate(objects)],
+        scores=[_score(i, found) for i, found in enumerate(objects)],
+        names=all_names,
+    )
+
+
 def read(
     path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
 ) -> MaskRecords:
-    """One rectangle for each object of a label_2 file; DontCare rows are left out.
-
-    Objects without a score get 1.
+    """One rectangle for each object of a label_2 file, as `read_boxes` finds them.
 
     Args:
         path: Label file, or a detector's results in its layout.
@@ -36,19 +74,17 @@ def read(
         MaskError: No image size, a class without category id, or a box that is none.
         FileFormatError: The file is broken; see `read_kitti_objects`.
     """
-    objects = [found for found in read_kitti_objects(path) if not found.is_region]
     if image_size is None:
         raise MaskError(f"{path}: says nothing of the image's size; pass image_size=(height, width)")
-    all_names = KITTI_NAMES | dict(names or {})
-    ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
     try:
+        found = read_boxes(path, names=names)
         return MaskRecords(
             source=str(path),
             size=image_size,
-            rles=rectangles([found.bbox for found in objects], image_size),
-            categories=[_category(i, found, ids) for i, found in enumerate(objects)],
-            scores=[1.0 if found.score is None else found.score for found in objects],
-            names=all_names,
+            rles=rectangles(found.boxes, image_size),
+            categories=found.categories,
+            scores=found.scores,
+            names=found.names,
         )
     except MaskError as error:
         raise MaskError(f"{path}: {error}") from None
@@ -61,3 +97,13 @@ def _category(index: int, found: KittiObject, ids: Mapping[str, int]) -> int:
             f"box {index}: class {found.type!r} is none of {known}; pass names={{104: {found.type!r}}} to give it an id"
         )
     return ids[found.type]
+
+
+def _score(index: int, found: KittiObject) -> float:
+    score = 1.0 if found.score is None else found.score
+    if not 0 <= score <= 1:
+        raise MaskError(
+            f"box {index}: score is {score}, expected 0 to 1; KITTI allows any number: map the detector's scores "
+            "to 0 to 1 first"
+        )
+    return score

@@ -58,6 +58,8 @@ def _classes(detections: Any, count: int, names: Mapping[int, str] | None) -> di
         raise MaskError(f"detections: {count} masks, {len(indices)} class ids, {len(found)} class names")
     by_index = dict(zip(indices, found, strict=True))
     for i, (index, name) in enumerate(zip(indices, found, strict=True)):
+        if index < 0:
+            raise MaskError(f"mask {i}: class {index}, expected 0 or more")
         if by_index[index] != name:
             raise MaskError(f"mask {i}: class {index} is {name!r}, elsewhere {by_index[index]!r}; one name a class")
     ids, by_category = category_ids(by_index)

@@ -1,0 +1,73 @@
+"""Where commands get instance masks from: files, or a segmenter that runs on the images."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from ldls.cli.options import words
+from ldls.errors import InputError
+from ldls.masks import InstanceMasks
+from ldls.segmenters import open_segmenter
+
+SegmenterOption = Annotated[
+    str | None,
+    typer.Option(
+        help="What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or "
+        "grabcut:LABEL_2.txt.",
+        show_default=False,
+    ),
+]
+MinScoreOption = Annotated[
+    float | None,
+    typer.Option(help="Lowest score of a mask that counts.", show_default="0.5 of a network, 0 of a file"),
+]
+CategoriesOption = Annotated[
+    str | None,
+    typer.Option(help="Categories that count, by name or id: car,person.", show_default="all"),
+]
+
+
+def masks_of(
+    image: NDArray[np.uint8] | None,
+    *,
+    masks: Path | None,
+    segmenter: str | None,
+    image_id: int | None = None,
+    min_score: float | None = None,
+    categories: str | None = None,
+) -> InstanceMasks:
+    """The wanted masks of an image, from a file or from a segmenter.
+
+    Raises:
+        InputError: Neither or both are given, or a segmenter and no image.
+        MaskError: The masks are of an image of another size.
+    """
+    if (masks is None) == (segmenter is None):
+        given = "neither" if masks is None else "both"
+        raise InputError(f"give --masks FILE or --segmenter NAME, got {given}; see --help for the segmenters")
+    if masks is not None:
+        size = None if image is None else (image.shape[0], image.shape[1])
+        found = InstanceMasks.from_file(masks, image_id=image_id, image_size=size)
+        return wanted(found, min_score=min_score, categories=categories)
+    assert segmenter is not None
+    opened = open_segmenter(segmenter, min_score=min_score)
+    if image is None:
+        raise InputError("--segmenter: needs --image, the image that it makes masks of")
+    return wanted(opened(image), min_score=min_score, categories=categories)
+
+
+def wanted(masks: InstanceMasks, *, min_score: float | None, categories: str | None) -> InstanceMasks:
+    """The masks that score at least `min_score` and are of one of the categories of a list separated by commas."""
+    chosen = None if categories is None else names_or_ids(words(categories))
+    return masks.filter(min_score=min_score or 0.0, categories=chosen)
+
+
+def names_or_ids(texts: Iterable[str]) -> list[int | str]:
+    """Numbers as category ids, the rest as names."""
+    return [int(text) if text.isdecimal() else text for text in texts]

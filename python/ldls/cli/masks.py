@@ -1,0 +1,219 @@
+"""`ldls masks`: instance masks made, shown and changed from one format to another."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from ldls.cli.mask_options import CategoriesOption, MinScoreOption, masks_of, wanted
+from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.outputs import picture_of
+from ldls.errors import ParameterError
+from ldls.io import read_image
+from ldls.io.whole_file import whole_file
+from ldls.masks import InstanceMasks
+
+app = typer.Typer(help="Make, show and convert instance masks.", no_args_is_help=True)
+EXISTING = {"exists": True, "dir_okay": False, "readable": True}
+SUFFIXES = "COCO .json, .npz, instance .png, .npy stack"
+
+MasksArgument = Annotated[Path, typer.Argument(metavar="MASKS", help=f"{SUFFIXES}, or KITTI label_2 .txt.", **EXISTING)]
+OutArgument = Annotated[Path, typer.Argument(metavar="OUT", help=f"{SUFFIXES}: the suffix chooses.", dir_okay=False)]
+ImageIdOption = Annotated[int | None, typer.Option(help="Which image of a COCO file that holds several.")]
+
+
+class Priority(StrEnum):
+    """Which of several masks keeps a pixel."""
+
+    SCORE = "score"
+    AREA = "area"
+    ORDER = "order"
+
+
+class Variant(StrEnum):
+    """What else a format may hold."""
+
+    RESULTS = "results"
+    RESEARCH = "research"
+    PIXELS = "pixels"
+
+
+VARIANTS: dict[Variant, dict[str, Any]] = {
+    Variant.RESULTS: {"results": True},
+    Variant.RESEARCH: {"layout": "research"},
+    Variant.PIXELS: {"pixels_only": True},
+}
+"""What writers of masks call the variants."""
+
+
+class Axis(StrEnum):
+    """Where a stack has its instances."""
+
+    FIRST = "first"
+    LAST = "last"
+
+
+AXES = {None: None, Axis.FIRST: 0, Axis.LAST: -1}
+
+
+@app.command()
+@speaks_plainly
+def convert(
+    masks: MasksArgument,
+    out: OutArgument,
+    image_id: ImageIdOption = None,
+    image_size: Annotated[
+        str | None,
+        typer.Option(metavar="HEIGHTxWIDTH", help="Size of the image, where the file does not say: 375x1242."),
+    ] = None,
+    instance_axis: Annotated[
+        Axis | None,
+        typer.Option(help="Axis of the instances in a .npy stack.", show_default="the one that is not the image's"),
+    ] = None,
+    class_divisor: Annotated[
+        int | None,
+        typer.Option(
+            help="Of a .png with class * DIVISOR + instance: 256 of KITTI, 1000 of Cityscapes.", show_default=False
+        ),
+    ] = None,
+    min_score: MinScoreOption = None,
+    categories: CategoriesOption = None,
+    min_area: Annotated[int, typer.Option(help="Fewest pixels of a mask that is kept.", min=0)] = 0,
+    shrink: Annotated[int, typer.Option(help="Take this many pixels off the edges of masks.", min=0)] = 0,
+    grow: Annotated[int, typer.Option(help="Add this many pixels to the edges of masks.", min=0)] = 0,
+    resolve: Annotated[
+        Priority | None,
+        typer.Option(
+            help="Leave each pixel to one mask: of the highest score, the smallest area, or the first in order.",
+            show_default="masks may overlap",
+        ),
+    ] = None,
+    variant: Annotated[
+        Variant | None,
+        typer.Option(
+            help="Write a bare list of results (.json), the arrays of the LDLS research code (.npz), or pixels without "
+            "categories and scores (.npy).",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Change masks from one format to another, keeping pixels, categories, scores and names.
+
+    A .png holds one instance a pixel: masks that overlap need --resolve.
+
+    Example: ldls masks convert masks/000571.json masks/000571.png --resolve score --min-score 0.7
+    """
+    found = InstanceMasks.from_file(
+        masks,
+        image_id=image_id,
+        image_size=parsed_size(image_size),
+        instance_axis=AXES[instance_axis],
+        class_divisor=class_divisor,
+    )
+    kept = wanted(found, min_score=min_score, categories=categories).filter(min_area=min_area)
+    if shrink:
+        kept = kept.shrink(shrink)
+    if grow:
+        kept = kept.grow(grow)
+    if resolve is not None:
+        kept = kept.resolve_overlaps(resolve.value)
+    kept.save(out, **(VARIANTS[variant] if variant else {}))
+    console().print(f"wrote {len(kept)} of {len(found)} masks to {out}", highlight=False, soft_wrap=True)
+
+
+@app.command()
+@speaks_plainly
+def make(
+    image: Annotated[Path, typer.Argument(metavar="IMAGE", help="Camera image.", **EXISTING)],
+    out: OutArgument,
+    segmenter: Annotated[
+        str,
+        typer.Option(
+            help="onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt.", show_default=False
+        ),
+    ],
+    min_score: MinScoreOption = None,
+    categories: CategoriesOption = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="File for a picture of the masks on the image (.png).", dir_okay=False)
+    ] = None,
+) -> None:
+    """Make masks of an image with a segmenter.
+
+    Example: ldls masks make image_2/000571.png masks/000571.json --segmenter onnx:yolo11n-seg.onnx
+    """
+    pixels = read_image(image)
+    made = masks_of(pixels, masks=None, segmenter=segmenter, min_score=min_score, categories=categories)
+    made.save(out)
+    _show(made, pixels, picture)
+    console().print(f"wrote {out}", highlight=False, soft_wrap=True)
+
+
+@app.command()
+@speaks_plainly
+def show(
+    masks: MasksArgument,
+    image: Annotated[Path | None, typer.Option(help="The image they are of.", show_default=False, **EXISTING)] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="File for a picture of the masks on the image (.png).", dir_okay=False)
+    ] = None,
+    image_id: ImageIdOption = None,
+    min_score: MinScoreOption = None,
+    categories: CategoriesOption = None,
+) -> None:
+    """Print the masks of a file, and draw them.
+
+    Example: ldls masks show masks/000571.json --image image_2/000571.png --picture masks.png
+    """
+    pixels = None if image is None else read_image(image)
+    found = masks_of(pixels, masks=masks, segmenter=None, image_id=image_id, min_score=min_score, categories=categories)
+    _show(found, pixels, picture)
+
+
+def _show(masks: InstanceMasks, pixels: np.ndarray | None, picture: Path | None) -> None:
+    console().print(mask_table(masks))
+    if picture is not None:
+        drawn = picture_of(masks, pixels, np.zeros((0, 2)), np.zeros(0, np.int32))
+        with whole_file(picture) as file:
+            drawn.save(file, "PNG")
+        console().print(f"wrote {picture}", highlight=False, soft_wrap=True)
+
+
+def mask_table(masks: InstanceMasks) -> Table:
+    """Label, name, category, score, pixels and box of each mask."""
+    table = Table(title=f"{len(masks)} masks of {masks.width} x {masks.height} pixels")
+    table.add_column("label", justify="right")
+    table.add_column("object")
+    for heading in ("category", "score", "pixels", "left, top", "width x height"):
+        table.add_column(heading, justify="right")
+    for label, mask in enumerate(masks, start=1):
+        top, left, height, width = mask.bounding_box
+        table.add_row(
+            str(label),
+            mask.name,
+            str(mask.category),
+            f"{mask.score:.2f}",
+            f"{mask.area:,}",
+            f"{left}, {top}" if mask.area else "-",
+            f"{width} x {height}" if mask.area else "-",
+        )
+    return table
+
+
+def parsed_size(text: str | None) -> tuple[int, int] | None:
+    """(height, width) of `HEIGHTxWIDTH`.
+
+    Raises:
+        ParameterError: The text is nothing of the kind.
+    """
+    if text is None:
+        return None
+    height, _, width = text.lower().partition("x")
+    if not (height.strip().isdecimal() and width.strip().isdecimal()):
+        raise ParameterError(f"--image-size: got {text!r}, expected HEIGHTxWIDTH such as 375x1242")
+    return int(height), int(width)
