@@ -30,16 +30,37 @@ def test_fill_is_its_definition(image_size, input_size):
     top, left = round((input_size[0] - height) / 2 - 0.1), round((input_size[1] - width) / 2 - 0.1)
     expected = np.full((*input_size, 3), 114, np.uint8)
     for channel in range(3):
-        resized = np.round(slow_resize(image[:, :, channel].astype(float), height, width))
-        for row in range(height):
-            for column in range(width):
-                expected[top + row, left + column, channel] = resized[row, column]
-    filled = Letterbox.fit(image_size, input_size).fill(image)
-    assert filled.shape == (*input_size, 3)
-    differs = filled.astype(int) - expected
-    # single precision may round a half the other way
-    assert np.abs(differs).max() <= 1
-    assert np.count_nonzero(differs) < 0.001 * differs.size
+        expected[top : top + height, left : left + width, channel] = (
+            image[:, :, channel]
+            if (height, width) == image_size
+            else slow_whole_resize(image[:, :, channel].tolist(), height, width)
+        )
+    np.testing.assert_array_equal(Letterbox.fit(image_size, input_size).fill(image), expected)
+    exact = slow_resize(image[:, :, 0].astype(float), height, width)
+    assert np.abs(resize(image, height, width)[:, :, 0] - exact).max() < 1.1
+
+
+def slow_whole_resize(levels, height, width):
+    """Bilinear in whole numbers, cell by cell."""
+    rows, columns = len(levels), len(levels[0])
+    resized = np.zeros((height, width), np.uint8)
+    for v in range(height):
+        y, down = whole_place(v, rows, height)
+        for u in range(width):
+            x, across = whole_place(u, columns, width)
+            if x < 0 or x >= columns - 1:
+                x, across = min(max(x, 0), columns - 1), 0
+            sums = []
+            for row in (min(max(y, 0), rows - 1), min(max(y + 1, 0), rows - 1)):
+                right = levels[row][min(x + 1, columns - 1)]
+                sums.append((levels[row][x] * (2048 - across) + right * across) >> 4)
+            resized[v, u] = (((2048 - down) * sums[0] >> 16) + (down * sums[1] >> 16) + 2) >> 2
+    return resized
+
+
+def whole_place(cell, source, target):
+    place = np.float32((cell + 0.5) * (source / target) - 0.5)
+    return int(np.floor(place)), int(np.rint((place - np.floor(place)) * np.float32(2048)))
 
 
 @pytest.mark.parametrize(("image_size", "input_size"), SIZES)
@@ -52,7 +73,13 @@ def test_fill_is_that_of_opencv(image_size, input_size):
     above, before = (round(s / 2 - 0.1) for s in spare.tolist())
     below, after = (round(s / 2 + 0.1) for s in spare.tolist())
     expected = cv2.copyMakeBorder(resized, above, below, before, after, cv2.BORDER_CONSTANT, value=(114, 114, 114))
-    assert np.abs(box.fill(image).astype(int) - expected).max() <= 1
+    same_as_opencv(box.fill(image), expected)
+
+
+def same_as_opencv(image, expected):
+    # builds of OpenCV for other processors may round otherwise
+    assert np.abs(image.astype(int) - expected).max() <= 1
+    assert np.mean(image != expected) < 0.2
 
 
 @pytest.mark.parametrize(("image_size", "input_size"), SIZES)
@@ -84,6 +111,14 @@ def test_boxes_come_back_to_the_image():
     box = Letterbox.fit((375, 1242), (640, 640))
     corners = np.array([[0, box.top, 640, box.top + 193], [320, 0, 700, 640]], np.float32)
     np.testing.assert_allclose(box.boxes_in_image(corners), [[0, 0, 1242, 375], [621, 0, 1242, 375]], rtol=1e-6)
+
+
+@pytest.mark.parametrize("size", [(193, 640), (377, 1248), (600, 1987), (100, 100), (375, 640), (188, 621), (1, 1)])
+def test_resize_is_that_of_opencv(size):
+    cv2 = pytest.importorskip("cv2")
+    image = random_image((375, 1242))
+    expected = cv2.resize(image, size[::-1], interpolation=cv2.INTER_LINEAR)
+    same_as_opencv(resize(image, *size), expected)
 
 
 def test_resize_keeps_an_image_of_the_size():
