@@ -57,7 +57,7 @@ def resize(image: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint
 
 
 def _fixed_point_taps(source: int, target: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
-    """The cells before and after each of `target` cells, within `source`, and their (2, target) weights out of `ONE`."""
+    """The cells before and after each of `target` cells, within `source`, and their weights (2, target)."""
     place = ((np.arange(target) + 0.5) * (source / target) - 0.5).astype(np.float32)
     before = np.floor(place)
     share = place - before
