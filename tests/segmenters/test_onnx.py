@@ -6,7 +6,15 @@ from onnx import TensorProto
 
 import ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
-from ldls.errors import DtypeError, FileFormatError, MaskError, ParameterError, ShapeError, UnsupportedFormatError
+from ldls.errors import (
+    DtypeError,
+    FileFormatError,
+    LimitError,
+    MaskError,
+    ParameterError,
+    ShapeError,
+    UnsupportedFormatError,
+)
 from ldls.segmenters import OnnxSegmenter
 from ldls.simulation.demo.layout import street
 from ldls.simulation.demo.street import PROJECTION, T_CAMERA_LIDAR, photograph, scan
@@ -264,3 +272,9 @@ def test_a_model_that_fails(tmp_path):
 def test_images_are_checked(image, error, tmp_path):
     with pytest.raises(error):
         opened(tmp_path, graphs.constant_detections(BOX, LABEL, SCORE, FULL))(image)
+
+
+def test_an_image_too_long_for_the_zoo(tmp_path):
+    model = graphs.zoo_mask_rcnn(np.ones((1, 3), np.float32), [1], [0.9], (800, 32))
+    with pytest.raises(LimitError, match="1 x 3000 pixels make an input of 800 x 2400000"):
+        opened(tmp_path, model)(np.zeros((1, 3000, 3), np.uint8))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ldls.errors import FileFormatError
+from ldls.errors import FileFormatError, LimitError
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes
 from ldls.segmenters.crops import Crop, assemble
@@ -24,6 +24,7 @@ ROLES = ("boxes", "labels", "scores", "masks")
 ZOO_CELLS = 28
 ZOO_SHORT_SIDE = 800.0
 ZOO_STRIDE = 32
+ZOO_MAX_PIXELS = 1 << 25
 ZOO_MEAN_BGR = np.array([102.9801, 115.9465, 122.7717], np.float32)
 MAX_CELLS = 112
 """Masks up to this side are grids to be pasted; larger ones must be of the image's size."""
@@ -72,10 +73,19 @@ class ZooMaskRcnn:
     classes: Classes
 
     def tensor(self, image: NDArray[np.uint8]) -> F32:
-        """(3, h, w) input for an image (H, W, 3)."""
+        """(3, h, w) input for an image (H, W, 3).
+
+        Raises:
+            LimitError: The image is so long and narrow that the input would have more than `ZOO_MAX_PIXELS`.
+        """
         height, width = image.shape[:2]
         ratio = _zoo_ratio((height, width))
         size = (int(ratio * width), int(ratio * height))
+        if size[0] * size[1] > ZOO_MAX_PIXELS:
+            raise LimitError(
+                f"image: {height} x {width} pixels make an input of {size[1]} x {size[0]}, "
+                f"expected at most {ZOO_MAX_PIXELS} pixels; cut it into pieces"
+            )
         resized = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BILINEAR))
         padded = np.zeros((3, *(math.ceil(side / ZOO_STRIDE) * ZOO_STRIDE for side in size[::-1])), np.float32)
         padded[:, : size[1], : size[0]] = (resized[:, :, ::-1] - ZOO_MEAN_BGR).transpose(2, 0, 1)
