@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 from onnx import TensorProto
+from PIL import Image
+from typer.testing import CliRunner
 
 import ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
+from ldls.cli import app
 from ldls.errors import (
     DtypeError,
     FileFormatError,
@@ -111,6 +114,33 @@ def test_colours_become_labels_of_points(build, kind, least_iou, scene, tmp_path
     compared = [iou for iou, count in zip(of_points, counts, strict=True) if count >= MIN_POINTS]
     assert len(compared) >= 3
     assert min(compared) > 0.7
+
+
+@pytest.mark.parametrize(("build", "kind", "least_iou"), FAMILIES)
+def test_the_command_reaches_the_same_labels(build, kind, least_iou, scene, tmp_path):
+    model = graphs.save(build(scene), tmp_path / "model.onnx")
+    files = frame_files(scene, tmp_path)
+    words = [word for name, path in files.items() for word in (f"--{name}", str(path))]
+    outcome = CliRunner().invoke(app, ["segment", *words, "--segmenter", f"onnx:{model}", "--out", str(tmp_path)])
+    assert outcome.exit_code == 0, outcome.output
+    masks = OnnxSegmenter(model, kind=kind)(scene.image)
+    expected = ldls.segment(scene.points, masks, ldls.Camera.from_kitti(files["calib"])).labels
+    with np.load(tmp_path / "points.npz") as written:
+        np.testing.assert_array_equal(written["labels"], expected)
+
+
+def frame_files(scene, folder):
+    """The frame as files that `ldls segment` reads."""
+    matrices = {
+        "P2": scene.camera.projection,
+        "R0_rect": np.eye(3),
+        "Tr_velo_to_cam": scene.camera.T_camera_lidar[:3],
+    }
+    lines = (f"{key}: {' '.join(map(repr, matrix.ravel().tolist()))}\n" for key, matrix in matrices.items())
+    (folder / "calib.txt").write_text("".join(lines))
+    scene.points.astype("<f4").tofile(folder / "points.bin")
+    Image.fromarray(scene.image).save(folder / "image.png")
+    return {"points": folder / "points.bin", "calib": folder / "calib.txt", "image": folder / "image.png"}
 
 
 def _iou(one, other):
