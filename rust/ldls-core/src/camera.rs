@@ -1,5 +1,6 @@
 //! Points to pixels: a general pinhole camera and what it sees.
 
+use crate::distortion::{Distortion, Lens};
 use crate::{Cloud, Error, Memory, Result};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use rayon::prelude::*;
@@ -11,12 +12,15 @@ const ROTATION_LIMIT: f64 = 1e-3;
 /// Points handled by one task of the thread pool.
 const BLOCK: usize = 8192;
 
-/// A pinhole camera: a rigid transform to the camera frame (x right, y down, z forward), then a 3 x 4 projection to
-/// pixels. Pixel centres lie at integer coordinates.
+/// A camera: a rigid transform to the camera frame (x right, y down, z forward), then a 3 x 4 projection to pixels, with
+/// the distortion of the lens between them. Pixel centres lie at integer coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// projection * T_camera_lidar
+    /// projection * T_camera_lidar; of a distorted camera, of the plane z = 1 before the lens.
     matrix: Matrix3x4<f64>,
+    lens: Lens,
+    /// From the plane z = 1 behind the lens to pixels; unused without distortion.
+    intrinsic: Matrix3<f64>,
     /// Points at this depth or nearer are not seen, in metres.
     min_depth_m: f64,
 }
@@ -49,6 +53,17 @@ pub struct ViewCounts {
     pub min: [f64; 3],
     /// Largest finite x, y, z, in metres; minus infinite where there is none.
     pub max: [f64; 3],
+}
+
+/// What a camera has of a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Sight {
+    /// At or behind the smallest depth.
+    Behind,
+    /// In front of the camera, beside the image.
+    Outside,
+    /// At these pixels, u and v.
+    Seen([f64; 2]),
 }
 
 impl Default for ViewCounts {
@@ -93,6 +108,42 @@ impl Camera {
         let projection = projection / projection.fixed_view::<1, 3>(2, 0).norm();
         Ok(Self {
             matrix: projection * transform,
+            lens: Lens::new(Distortion::None)?,
+            intrinsic: Matrix3::identity(),
+            min_depth_m,
+        })
+    }
+
+    /// A camera whose lens departs from a pinhole, from its 3 x 3 intrinsic matrix K, given row by row; else as
+    /// [`Camera::new`].
+    ///
+    /// # Errors
+    /// As [`Camera::new`]; [`Error::CameraIntrinsic`] where the last row of K is not 0 0 1, and [`Error::Distortion`].
+    pub fn with_distortion(
+        intrinsic: &[f64; 9],
+        distortion: Distortion,
+        t_camera_lidar: &[f64; 16],
+        min_depth_m: f64,
+    ) -> Result<Self> {
+        let k = Matrix3::from_row_slice(intrinsic);
+        let last = [k[(2, 0)], k[(2, 1)], k[(2, 2)]];
+        if last != [0.0, 0.0, 1.0] {
+            return Err(Error::CameraIntrinsic { found: last });
+        }
+        let mut projection = [0.0; 12];
+        for row in 0..3 {
+            projection[4 * row..4 * row + 3].copy_from_slice(&intrinsic[3 * row..3 * row + 3]);
+        }
+        let pinhole = Self::new(&projection, t_camera_lidar, min_depth_m)?;
+        let lens = Lens::new(distortion)?;
+        if lens.is_none() {
+            return Ok(pinhole);
+        }
+        let transform = Matrix4::from_row_slice(t_camera_lidar);
+        Ok(Self {
+            matrix: transform.fixed_rows::<3>(0).into(),
+            lens,
+            intrinsic: k,
             min_depth_m,
         })
     }
@@ -112,14 +163,7 @@ impl Camera {
         memory: &mut Memory,
     ) -> Result<View> {
         let n = cloud.len();
-        if n > i32::MAX as usize {
-            return Err(Error::TooManyPoints {
-                points: n,
-                neighbors: 0,
-                limit: i32::MAX as u64,
-                of: "points",
-            });
-        }
+        check_points(n)?;
         let count = n.div_ceil(BLOCK);
         let mut blocks: Vec<View> = memory.as_left(count);
         let rows = |block: usize| block * BLOCK..n.min((block + 1) * BLOCK);
@@ -148,45 +192,69 @@ impl Camera {
     ) -> Result<()> {
         view.clear();
         for row in rows {
-            let xyz = cloud.xyz(row);
-            if !xyz.iter().all(|c| c.is_finite()) {
-                view.counts.nonfinite += 1;
+            let Some(xyz) = view.counts.usable(cloud, row, keep_origin)? else {
                 continue;
-            }
-            if let Some(&value) = xyz.iter().find(|c| c.abs() > COORDINATE_LIMIT_M) {
-                return Err(Error::CoordinateOutOfRange {
-                    row,
-                    value,
-                    limit: COORDINATE_LIMIT_M,
-                });
-            }
-            view.counts.extend(&xyz);
-            if xyz == [0.0; 3] && !keep_origin {
-                view.counts.origin += 1;
-                continue;
-            }
-            let [u, v, depth] = self.project(&xyz);
-            if !(depth > self.min_depth_m) {
-                view.counts.behind += 1;
-            } else if nearest_pixel([u, v], height, width).is_some() {
-                view.indices.push(row as u32);
-                view.points.push(xyz);
-                view.uv.push([u, v]);
-            } else {
-                view.counts.outside += 1;
+            };
+            match self.sight(&xyz, height, width) {
+                Sight::Behind => view.counts.behind += 1,
+                Sight::Outside => view.counts.outside += 1,
+                Sight::Seen(uv) => {
+                    view.indices.push(row as u32);
+                    view.points.push(xyz);
+                    view.uv.push(uv);
+                }
             }
         }
         Ok(())
     }
 
-    /// u and v in pixels, and the depth in metres, of a point in the lidar frame.
+    /// Where a point of the lidar frame falls on an image of `height` x `width` pixels.
+    #[inline]
+    pub(crate) fn sight(&self, xyz: &[f64; 3], height: usize, width: usize) -> Sight {
+        let [u, v, depth] = self.project(xyz);
+        if !(depth > self.min_depth_m) {
+            Sight::Behind
+        } else if nearest_pixel([u, v], height, width).is_some() {
+            Sight::Seen([u, v])
+        } else {
+            Sight::Outside
+        }
+    }
+
+    /// u and v in pixels, and the depth in metres, of a point in the lidar frame. Points beyond the reach of the lens
+    /// have no pixel: u and v are NaN.
     #[inline]
     pub fn project(&self, [x, y, z]: &[f64; 3]) -> [f64; 3] {
         let m = &self.matrix;
         let row = |i: usize| m[(i, 0)] * x + m[(i, 1)] * y + m[(i, 2)] * z + m[(i, 3)];
         let w = row(2);
-        [row(0) / w, row(1) / w, w]
+        let [x, y] = [row(0) / w, row(1) / w];
+        if self.lens.is_none() {
+            return [x, y, w];
+        }
+        let k = &self.intrinsic;
+        match self.lens.bend([x, y]) {
+            Some([x, y]) => [
+                k[(0, 0)] * x + k[(0, 1)] * y + k[(0, 2)],
+                k[(1, 0)] * x + k[(1, 1)] * y + k[(1, 2)],
+                w,
+            ],
+            None => [f64::NAN, f64::NAN, w],
+        }
     }
+}
+
+/// Refuses clouds with more points than labels have rows for.
+pub(crate) fn check_points(points: usize) -> Result<()> {
+    if i32::try_from(points).is_ok() {
+        return Ok(());
+    }
+    Err(Error::TooManyPoints {
+        points,
+        neighbors: 0,
+        limit: i32::MAX as u64,
+        of: "points",
+    })
 }
 
 /// The pixel nearest to `uv`, as column and row, if it lies in an image of `height` x `width` pixels.
@@ -208,6 +276,33 @@ impl View {
 }
 
 impl ViewCounts {
+    /// The point of a row, if it has one; counts it otherwise.
+    pub(crate) fn usable(
+        &mut self,
+        cloud: Cloud,
+        row: usize,
+        keep_origin: bool,
+    ) -> Result<Option<[f64; 3]>> {
+        let xyz = cloud.xyz(row);
+        if !xyz.iter().all(|c| c.is_finite()) {
+            self.nonfinite += 1;
+            return Ok(None);
+        }
+        if let Some(&value) = xyz.iter().find(|c| c.abs() > COORDINATE_LIMIT_M) {
+            return Err(Error::CoordinateOutOfRange {
+                row,
+                value,
+                limit: COORDINATE_LIMIT_M,
+            });
+        }
+        self.extend(&xyz);
+        if xyz == [0.0; 3] && !keep_origin {
+            self.origin += 1;
+            return Ok(None);
+        }
+        Ok(Some(xyz))
+    }
+
     fn extend(&mut self, xyz: &[f64; 3]) {
         for (axis, &c) in xyz.iter().enumerate() {
             self.min[axis] = self.min[axis].min(c);
@@ -215,7 +310,7 @@ impl ViewCounts {
         }
     }
 
-    fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         self.nonfinite += other.nonfinite;
         self.origin += other.origin;
         self.behind += other.behind;

@@ -85,6 +85,23 @@ pub enum Error {
         found: [f64; 4],
     },
 
+    /// The intrinsic matrix of a distorted camera is of another form.
+    #[error(
+        "camera: the last row of K is {found:?}, expected [0, 0, 1]; a distorted camera needs the 3 x 3 intrinsic matrix \
+         of the raw image, not a projection of the rectified one"
+    )]
+    CameraIntrinsic {
+        /// The row found.
+        found: [f64; 3],
+    },
+
+    /// A distortion coefficient that is not finite.
+    #[error("camera: a distortion coefficient is {value}, expected finite numbers")]
+    Distortion {
+        /// The coefficient found.
+        value: f64,
+    },
+
     /// An image without pixels, or too large to hold.
     #[error("masks: image of {height} x {width} pixels, expected 1 to {limit} pixels in all")]
     ImageSize {

@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn the_smallest_vector_with_room_is_used_again() {
         let mut memory = Memory::of_stream();
-        let (small, large) = (vec![1_u8; 10], vec![2_u8; 1000]);
+        let (small, large) = (vec![1_u8; 10], vec![2_u8; 4096]);
         let places = [small.as_ptr(), large.as_ptr()];
         memory.keep(small);
         memory.keep(large);

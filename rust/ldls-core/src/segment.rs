@@ -80,9 +80,64 @@ pub fn segment(
 ) -> Result<Segmentation> {
     params.check()?;
     check_edges(cloud.len(), params.neighbors)?;
-    let mut clock = Stopwatch::start();
-
+    let clock = Stopwatch::start();
     let mut view = camera.view(cloud, masks.height(), masks.width(), keep_origin, memory)?;
+    let uv = std::mem::take(&mut view.uv);
+    let seeds = OneImage { masks, uv: &uv };
+    let mut segmentation = label_points(cloud.len(), view, &seeds, params, clock, memory)?;
+    segmentation.view.uv = uv;
+    Ok(segmentation)
+}
+
+/// The pixel edges of the points in view, from which labels spread.
+pub(crate) trait Seeds: Sync {
+    /// Number of labels, the background counted.
+    fn labels(&self) -> usize;
+
+    /// The pixel edges of the points in `order`.
+    fn pixel_labels<T: Real>(
+        &self,
+        order: &[u32],
+        params: &Params,
+        memory: &mut Memory,
+    ) -> Result<PixelLabels<T>>;
+}
+
+/// The pixels of one image, and where each point in view falls on it.
+struct OneImage<'a> {
+    masks: &'a InstanceMasks,
+    uv: &'a [[f64; 2]],
+}
+
+impl Seeds for OneImage<'_> {
+    fn labels(&self) -> usize {
+        self.masks.len() + 1
+    }
+
+    fn pixel_labels<T: Real>(
+        &self,
+        order: &[u32],
+        params: &Params,
+        memory: &mut Memory,
+    ) -> Result<PixelLabels<T>> {
+        let uv = arrange(order, self.uv, memory);
+        let labels = self
+            .masks
+            .pixel_labels(&uv, params.window, params.pixel_weight, memory)?;
+        memory.keep(uv);
+        Ok(labels)
+    }
+}
+
+/// Labels the points of `view`, of a cloud of `n` points; `clock` has run since the call began.
+pub(crate) fn label_points(
+    n: usize,
+    mut view: View,
+    seeds: &impl Seeds,
+    params: &Params,
+    mut clock: Stopwatch,
+    memory: &mut Memory,
+) -> Result<Segmentation> {
     let project = clock.lap();
     // from here on, rows are in the order of the tree: near points are near in memory
     let tree = KdTree::new(&view.points, memory);
@@ -91,19 +146,15 @@ pub fn segment(
     let adjacency = Adjacency::search(&tree, &points, params.neighbors, memory);
     let order = tree.into_order(memory);
     let neighbors = clock.lap();
-    let uv = arrange(&order, &view.uv, memory);
-    let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight, memory)?;
-    memory.keep(uv);
+    let pixels = seeds.pixel_labels(&order, params, memory)?;
     let pixel_labels = clock.lap();
     let (a, b) = normalized_graph::<f32>(&points, &adjacency, pixels, params, memory)?;
     let graph = clock.lap();
     let exact = |memory: &mut Memory| {
-        let uv = arrange(&order, &view.uv, memory);
-        let pixels = masks.pixel_labels(&uv, params.window, params.pixel_weight, memory)?;
-        memory.keep(uv);
+        let pixels = seeds.pixel_labels(&order, params, memory)?;
         normalized_graph::<f64>(&points, &adjacency, pixels, params, memory)
     };
-    let diffused = diffuse(&a, &b, masks.len() + 1, params.iterations, exact, memory)?;
+    let diffused = diffuse(&a, &b, seeds.labels(), params.iterations, exact, memory)?;
     let diffusion = clock.lap();
     let kept = if params.remove_outliers {
         Some(keep_largest_by_index(&a, &diffused.labels, &order, memory)?)
@@ -113,18 +164,12 @@ pub fn segment(
     let components = clock.lap();
 
     let rows = arrange(&order, &view.indices, memory);
-    let whole_cloud = |labels: &[u32]| {
-        scatter(
-            cloud.len(),
-            &rows,
-            OUT_OF_VIEW,
-            labels.iter().map(|&m| m as i32),
-        )
-    };
+    let whole_cloud =
+        |labels: &[u32]| scatter(n, &rows, OUT_OF_VIEW, labels.iter().map(|&m| m as i32));
     let segmentation = Segmentation {
         labels: whole_cloud(kept.as_ref().unwrap_or(&diffused.labels)),
         diffused_labels: whole_cloud(&diffused.labels),
-        confidence: scatter(cloud.len(), &rows, 0.0, diffused.confidence.iter().copied()),
+        confidence: scatter(n, &rows, 0.0, diffused.confidence.iter().copied()),
         report: Report {
             counts: view.counts,
             duplicates: adjacency.duplicates(&points),
@@ -167,7 +212,7 @@ fn normalized_graph<T: Real>(
     Ok((graph, pixels))
 }
 
-fn check_edges(points: usize, neighbors: usize) -> Result<()> {
+pub(crate) fn check_edges(points: usize, neighbors: usize) -> Result<()> {
     if (points as u64).saturating_mul(neighbors as u64 + 1) <= MAX_EDGES {
         return Ok(());
     }
@@ -193,10 +238,11 @@ fn scatter<T: Copy>(
     all
 }
 
-struct Stopwatch(Instant);
+/// Measures one step after the other.
+pub(crate) struct Stopwatch(Instant);
 
 impl Stopwatch {
-    fn start() -> Self {
+    pub(crate) fn start() -> Self {
         Self(Instant::now())
     }
 

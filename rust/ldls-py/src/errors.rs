@@ -26,7 +26,9 @@ fn class_name(error: &Error) -> &'static str {
         Error::CameraNotFinite { .. }
         | Error::CameraSingular { .. }
         | Error::CameraNotRigid { .. }
-        | Error::CameraLastRow { .. } => "CalibrationError",
+        | Error::CameraLastRow { .. }
+        | Error::CameraIntrinsic { .. }
+        | Error::Distortion { .. } => "CalibrationError",
         Error::MaskSize { .. }
         | Error::RunSum { .. }
         | Error::RleString { .. }
