@@ -3,6 +3,7 @@
 from ldls import stages
 from ldls._ldls import __version__
 from ldls.camera import Camera
+from ldls.distortion import Distortion
 from ldls.errors import (
     CalibrationError,
     CorruptFileError,
@@ -22,19 +23,23 @@ from ldls.errors import (
     UnsupportedFormatError,
 )
 from ldls.io import read_image, read_points
+from ldls.label_diffusion import LabelDiffusion, segment
 from ldls.masks import InstanceMasks
 from ldls.objects import OrientedBox, SegmentedObject
 from ldls.params import Params
 from ldls.report import Report
-from ldls.segmentation import LabelDiffusion, Segmentation, segment
+from ldls.segmentation import Instance, Segmentation
+from ldls.view import SeenView, View
 
 __all__ = [
     "CalibrationError",
     "Camera",
     "CorruptFileError",
+    "Distortion",
     "DtypeError",
     "FileFormatError",
     "InputError",
+    "Instance",
     "InstanceMasks",
     "InternalError",
     "LabelDiffusion",
@@ -46,6 +51,7 @@ __all__ = [
     "ParameterError",
     "Params",
     "Report",
+    "SeenView",
     "Segmentation",
     "SegmentedObject",
     "ShapeError",
@@ -53,6 +59,7 @@ __all__ = [
     "UnsafeFileError",
     "UnsafePathError",
     "UnsupportedFormatError",
+    "View",
     "__version__",
     "read_image",
     "read_points",

@@ -10,12 +10,12 @@ _Csr: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32
 _Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 __all__ = [
+    "Camera",
     "Masks",
     "Rle",
     "SegmentationArrays",
     "StreamMemory",
     "__version__",
-    "check_camera",
     "check_params",
     "default_threads",
     "diffuse",
@@ -28,6 +28,7 @@ __all__ = [
     "point_graph",
     "project",
     "segment",
+    "segment_ring",
 ]
 
 __version__: str
@@ -70,6 +71,17 @@ class Masks:
     def rle(self, index: int) -> Rle: ...
 
 @final
+class Camera:
+    def __new__(
+        cls,
+        projection: NDArray[np.float64],
+        t_camera_lidar: NDArray[np.float64],
+        min_depth_m: float,
+        model: str,
+        coefficients: NDArray[np.float64],
+    ) -> Camera: ...
+
+@final
 class StreamMemory:
     def __new__(cls) -> StreamMemory: ...
 
@@ -93,23 +105,29 @@ class SegmentationArrays:
 def segment(
     points: _Points,
     masks: Masks,
-    projection: NDArray[np.float64],
-    t_camera_lidar: NDArray[np.float64],
-    min_depth_m: float,
+    camera: Camera,
     params: _Params,
     keep_origin: bool,
     threads: int | None,
     memory: StreamMemory | None,
 ) -> SegmentationArrays: ...
+def segment_ring(
+    points: _Points,
+    masks: list[Masks],
+    categories: list[list[int]],
+    cameras: list[Camera],
+    same_object: float,
+    params: _Params,
+    keep_origin: bool,
+    threads: int | None,
+    memory: StreamMemory | None,
+) -> tuple[SegmentationArrays, list[tuple[NDArray[np.int64], NDArray[np.float64]]], list[list[tuple[int, int]]]]: ...
 def check_params(params: _Params, threads: int | None) -> None: ...
-def check_camera(projection: NDArray[np.float64], t_camera_lidar: NDArray[np.float64], min_depth_m: float) -> None: ...
 def default_threads() -> int: ...
 def panic_in_worker() -> None: ...
 def project(
     points: _Points,
-    projection: NDArray[np.float64],
-    t_camera_lidar: NDArray[np.float64],
-    min_depth_m: float,
+    camera: Camera,
     height: int,
     width: int,
     keep_origin: bool,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls import _ldls
+from ldls.distortion import Distortion
 from ldls.errors import CalibrationError
 from ldls.io import kitti
 
@@ -20,13 +21,15 @@ def _identity() -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Camera:
-    """A pinhole camera: a rigid transform from the lidar, then a projection to pixels.
+    """A camera: a rigid transform from the lidar, the distortion of the lens if any, then a projection to pixels.
 
     Attributes:
         projection: (3, 4) from homogeneous points in the camera frame (metres; x right, y down, z forward) to
             homogeneous pixels; pixel centres lie at integer coordinates. A (3, 3) intrinsic matrix K is taken as
             [K | 0].
         T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates, column vectors.
+        distortion: How the lens departs from a pinhole; nothing by default, as in rectified images. With one,
+            `projection` is the intrinsic matrix K of the raw image.
         image_size: (height, width) of the image in pixels, if known; masks are then held against it.
         min_depth_m: Points at this depth or nearer are not in view, in metres.
 
@@ -34,10 +37,12 @@ class Camera:
         CalibrationError: A matrix has the wrong shape, is not finite, or cannot be a camera's.
     """
 
+    core: _ldls.Camera = field(init=False, repr=False)
     projection: NDArray[np.float64]
     T_camera_lidar: NDArray[np.float64] = field(default_factory=_identity)
     image_size: tuple[int, int] | None = None
     min_depth_m: float = 0.1
+    distortion: Distortion = field(default_factory=Distortion)
 
     def __post_init__(self) -> None:
         projection = _matrix("projection", self.projection, ((3, 4), (3, 3)))
@@ -47,7 +52,27 @@ class Camera:
         for name, matrix in (("projection", projection), ("T_camera_lidar", transform)):
             matrix.flags.writeable = False
             object.__setattr__(self, name, matrix)
-        _ldls.check_camera(projection, transform, float(self.min_depth_m))
+        if not self.distortion.is_none and projection[:, 3].any():
+            raise CalibrationError(
+                f"projection: the last column is {projection[:, 3].tolist()}, expected zeros beside a distortion; pass "
+                "the intrinsic matrix K of the raw image, or leave the distortion out for a rectified one"
+            )
+        object.__setattr__(self, "core", self._core())
+
+    def _core(self) -> _ldls.Camera:
+        return _ldls.Camera(
+            self.projection,
+            self.T_camera_lidar,
+            float(self.min_depth_m),
+            *self.distortion.as_core(),
+        )
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in self.__dict__.items() if name != "core"}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        object.__setattr__(self, "core", self._core())
 
     @classmethod
     def from_kitti(

@@ -65,9 +65,7 @@ def project(
     """
     return _ldls.project(
         as_points(points),
-        camera.projection,
-        camera.T_camera_lidar,
-        camera.min_depth_m,
+        camera.core,
         *image_size,
         keep_origin,
         threads,

@@ -17,8 +17,8 @@ from ldls.cli.mask_options import (
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.outputs import Output, write_outputs
 from ldls.io import read_image, read_points
+from ldls.label_diffusion import segment as segment_cloud
 from ldls.params import Params
-from ldls.segmentation import segment as segment_cloud
 
 EXISTING = {"exists": True, "dir_okay": False, "readable": True}
 

@@ -15,9 +15,9 @@ from ldls import stages
 from ldls._optional import require
 from ldls.camera import Camera
 from ldls.cloud import as_points
+from ldls.label_diffusion import segment
 from ldls.masks import InstanceMasks
 from ldls.params import Params
-from ldls.segmentation import segment
 
 OUT_OF_VIEW = -1
 DBSCAN_RADIUS_M = 0.5

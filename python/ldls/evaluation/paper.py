@@ -21,8 +21,8 @@ from ldls.evaluation.methods import FULL, OUT_OF_VIEW, compare
 from ldls.evaluation.object_scores import ObjectScore, object_scores
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.results import from_instance_labels
+from ldls.label_diffusion import segment
 from ldls.params import Params
-from ldls.segmentation import segment
 
 ITERATIONS: tuple[int, ...] = (1, 5, 10, 20, 50, 100, 200, 500)
 RANGES_M: tuple[float, ...] = (10, 15, 20, 25, 30, 40, 50, 60, 70)

@@ -48,7 +48,7 @@ def write_labeling(path: str | PathLike[str], labeling: Labeling) -> None:
 
 def from_segmentation(result: Segmentation) -> Labeling:
     """Labels of a segmentation, its instances by their masks; points out of view are ignored."""
-    return from_instance_labels(result.labels, np.array([mask.name for mask in result.masks], np.str_))
+    return from_instance_labels(result.labels, np.array([instance.name for instance in result.instances], np.str_))
 
 
 def from_instance_labels(labels: NDArray[Any], class_names: NDArray[np.str_]) -> Labeling:

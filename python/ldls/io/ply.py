@@ -30,7 +30,7 @@ def write(path: Path, result: Segmentation) -> None:
     for column, name in enumerate(position):
         vertices[name] = result.points[:, column]
     # label -1, out of view, picks the last entry
-    colors = np.vstack([[BACKGROUND], palette(len(result.masks)), [BACKGROUND]])[result.labels]
+    colors = np.vstack([[BACKGROUND], palette(len(result.instances)), [BACKGROUND]])[result.labels]
     for channel, name in enumerate(("red", "green", "blue")):
         vertices[name] = colors[:, channel]
     vertices["label"] = result.categories

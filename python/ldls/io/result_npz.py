@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 def write(path: Path, result: Segmentation) -> None:
     """Write the arrays of `result` under their names, its objects as `object_*`, the rest as JSON text.
 
+    With one camera, `pixels` belongs to `in_view`; with several, `view_names` names them, and `view0_in_view`,
+    `view0_pixels`, `view0_labels` and so on are what each sees.
     `object_box` has a row for each object: x y z of the middle, length, width, height in metres, yaw in radians; NaN
     where the object has no point.
     """
@@ -32,7 +34,7 @@ def write(path: Path, result: Segmentation) -> None:
             "categories": result.categories,
             "confidence": result.confidence,
             "in_view": result.in_view,
-            "pixels": result.pixels,
+            **_views(result),
             "object_category": np.array([o.category for o in objects], np.int32),
             "object_name": np.array([o.name for o in objects], np.str_),
             "object_score": np.array([o.score for o in objects], np.float32),
@@ -44,6 +46,17 @@ def write(path: Path, result: Segmentation) -> None:
             "timings": np.array(json.dumps(dict(result.timings))),
         },
     )
+
+
+def _views(result: Segmentation) -> dict[str, NDArray[Any]]:
+    if len(result.views) == 1:
+        return {"pixels": result.pixels}
+    arrays: dict[str, NDArray[Any]] = {
+        "view_names": np.array([seen.view.name or f"camera {i}" for i, seen in enumerate(result.views)], np.str_)
+    }
+    for i, seen in enumerate(result.views):
+        arrays |= {f"view{i}_in_view": seen.in_view, f"view{i}_pixels": seen.pixels, f"view{i}_labels": seen.labels}
+    return arrays
 
 
 def _centroid(found: SegmentedObject) -> NDArray[np.float64]:

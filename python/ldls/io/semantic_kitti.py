@@ -20,7 +20,7 @@ vegetation; anything else is `OTHER_OBJECT`. Background and points out of view a
 
 def write(path: Path, result: Segmentation) -> None:
     """Write the labels of `result`, one a point in the order of the cloud."""
-    classes = [CLASSES.get(int(category), OTHER_OBJECT) for category in result.masks.categories]
+    classes = [CLASSES.get(instance.category, OTHER_OBJECT) for instance in result.instances]
     # label -1, out of view, picks the last entry
     by_label = np.array([0, *classes, 0], np.uint32)
     by_label[1:-1] |= np.arange(1, len(classes) + 1, dtype=np.uint32) << 16

@@ -8,6 +8,7 @@
 
 mod arrays;
 mod call;
+mod camera;
 mod errors;
 mod masks;
 mod memory;
@@ -20,11 +21,13 @@ mod _ldls {
     #[pymodule_export]
     use crate::call::{default_threads, panic_in_worker};
     #[pymodule_export]
+    use crate::camera::Camera;
+    #[pymodule_export]
     use crate::masks::{Masks, Rle};
     #[pymodule_export]
     use crate::memory::StreamMemory;
     #[pymodule_export]
-    use crate::segment::{SegmentationArrays, check_camera, check_params, segment};
+    use crate::segment::{SegmentationArrays, check_params, segment, segment_ring};
     #[pymodule_export]
     use crate::stages::{
         diffuse, direct_labels, largest_components, neighbors, normalize_rows, pixel_labels,

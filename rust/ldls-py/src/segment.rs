@@ -1,11 +1,12 @@
 //! The whole method for Python.
 
-use crate::arrays::{Points, matrix, slice};
+use crate::arrays::{Points, matrix};
 use crate::call::run;
+use crate::camera::Camera;
 use crate::masks::Masks;
 use crate::memory::StreamMemory;
-use ldls_core::{Memory, Params, Timings};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
+use ldls_core::{Memory, Params, RingView, Timings};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -40,7 +41,7 @@ pub struct SegmentationArrays {
 
 /// Segments points by the masks of the image that the camera took.
 #[pyfunction]
-#[pyo3(signature = (points, masks, projection, t_camera_lidar, min_depth_m, params, keep_origin, threads, memory))]
+#[pyo3(signature = (points, masks, camera, params, keep_origin, threads, memory))]
 #[expect(
     clippy::too_many_arguments,
     reason = "the face in Python has few; here each is one extraction"
@@ -49,27 +50,94 @@ pub fn segment(
     py: Python<'_>,
     points: Points<'_>,
     masks: &Masks,
-    projection: PyReadonlyArray2<'_, f64>,
-    t_camera_lidar: PyReadonlyArray2<'_, f64>,
-    min_depth_m: f64,
+    camera: &Camera,
     params: ParamsTuple,
     keep_origin: bool,
     threads: Option<usize>,
     memory: Option<&StreamMemory>,
 ) -> PyResult<SegmentationArrays> {
-    let camera = camera(py, &projection, &t_camera_lidar, min_depth_m)?;
     let cloud = points.cloud(py)?;
     let params = params.params();
-    let found = run(py, threads, || {
+    let mut found = run(py, threads, || {
         let segment = |memory: &mut Memory| {
-            ldls_core::segment(cloud, &masks.0, &camera, &params, keep_origin, memory)
+            ldls_core::segment(cloud, &masks.0, &camera.0, &params, keep_origin, memory)
         };
         match memory {
             Some(stream) => stream.lend(segment),
             None => segment(&mut Memory::of_one_frame()),
         }
     })?;
-    let report = report(py, &found.report)?;
+    let pixels = matrix(py, std::mem::take(&mut found.view.uv).into_flattened(), 2)?;
+    arrays(py, found, pixels)
+}
+
+/// What each camera of a ring sees: positions among the points in view, and pixels.
+type SightingArrays = Vec<(Py<PyArray1<i64>>, Py<PyArray2<f64>>)>;
+/// Camera and instance of each part of each object.
+type ObjectParts = Vec<Vec<(usize, u32)>>;
+
+/// Segments points by the masks of the images that several cameras took.
+#[pyfunction]
+#[pyo3(signature = (points, masks, categories, cameras, same_object, params, keep_origin, threads, memory))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "the face in Python has few; here each is one extraction"
+)]
+pub fn segment_ring(
+    py: Python<'_>,
+    points: Points<'_>,
+    masks: Vec<PyRef<'_, Masks>>,
+    categories: Vec<Vec<i32>>,
+    cameras: Vec<PyRef<'_, Camera>>,
+    same_object: f64,
+    params: ParamsTuple,
+    keep_origin: bool,
+    threads: Option<usize>,
+    memory: Option<&StreamMemory>,
+) -> PyResult<(SegmentationArrays, SightingArrays, ObjectParts)> {
+    let cloud = points.cloud(py)?;
+    let params = params.params();
+    let views: Vec<RingView> = masks
+        .iter()
+        .zip(&categories)
+        .zip(&cameras)
+        .map(|((masks, categories), camera)| RingView {
+            masks: &masks.0,
+            categories,
+            camera: &camera.0,
+        })
+        .collect();
+    let found = run(py, threads, || {
+        let segment = |memory: &mut Memory| {
+            ldls_core::segment_ring(cloud, &views, same_object, &params, keep_origin, memory)
+        };
+        match memory {
+            Some(stream) => stream.lend(segment),
+            None => segment(&mut Memory::of_one_frame()),
+        }
+    })?;
+    let sightings = found
+        .sightings
+        .into_iter()
+        .map(|sighting| {
+            let seen: Vec<i64> = sighting.seen.iter().map(|&at| i64::from(at)).collect();
+            let pixels = matrix(py, sighting.uv.into_flattened(), 2)?;
+            Ok((seen.into_pyarray(py).unbind(), pixels))
+        })
+        .collect::<PyResult<SightingArrays>>()?;
+    let pixels = PyArray2::zeros(py, [0, 2], false).unbind();
+    Ok((
+        arrays(py, found.segmentation, pixels)?,
+        sightings,
+        found.objects,
+    ))
+}
+
+fn arrays(
+    py: Python<'_>,
+    found: ldls_core::Segmentation,
+    pixels: Py<PyArray2<f64>>,
+) -> PyResult<SegmentationArrays> {
     let in_view: Vec<i64> = found
         .view
         .indices
@@ -77,13 +145,13 @@ pub fn segment(
         .map(|&index| i64::from(index))
         .collect();
     Ok(SegmentationArrays {
+        report: report(py, &found.report)?,
+        timings: timings(py, &found.timings)?,
         labels: found.labels.into_pyarray(py).unbind(),
         diffused_labels: found.diffused_labels.into_pyarray(py).unbind(),
         confidence: found.confidence.into_pyarray(py).unbind(),
         in_view: in_view.into_pyarray(py).unbind(),
-        pixels: matrix(py, found.view.uv.into_flattened(), 2)?,
-        report,
-        timings: timings(py, &found.timings)?,
+        pixels,
     })
 }
 
@@ -91,42 +159,6 @@ pub fn segment(
 #[pyfunction]
 pub fn check_params(py: Python<'_>, params: ParamsTuple, threads: Option<usize>) -> PyResult<()> {
     run(py, threads, || params.params().check())
-}
-
-/// Refuses matrices that cannot be a camera's.
-#[pyfunction]
-pub fn check_camera(
-    py: Python<'_>,
-    projection: PyReadonlyArray2<'_, f64>,
-    t_camera_lidar: PyReadonlyArray2<'_, f64>,
-    min_depth_m: f64,
-) -> PyResult<()> {
-    camera(py, &projection, &t_camera_lidar, min_depth_m).map(drop)
-}
-
-/// The camera of two matrices from Python.
-pub fn camera(
-    py: Python<'_>,
-    projection: &PyReadonlyArray2<'_, f64>,
-    t_camera_lidar: &PyReadonlyArray2<'_, f64>,
-    min_depth_m: f64,
-) -> PyResult<ldls_core::Camera> {
-    let projection = fixed(py, "projection", projection)?;
-    let t_camera_lidar = fixed(py, "T_camera_lidar", t_camera_lidar)?;
-    ldls_core::Camera::new(&projection, &t_camera_lidar, min_depth_m)
-        .map_err(|error| crate::errors::to_python(py, &error))
-}
-
-fn fixed<const N: usize>(
-    py: Python<'_>,
-    name: &str,
-    array: &PyReadonlyArray2<'_, f64>,
-) -> PyResult<[f64; N]> {
-    let values = slice(py, name, array)?;
-    let message = || format!("{name}: expected {N} numbers, got {}", values.len());
-    values
-        .try_into()
-        .map_err(|_| crate::errors::raise(py, "CalibrationError", &message()))
 }
 
 fn report(py: Python<'_>, report: &ldls_core::Report) -> PyResult<Py<PyDict>> {

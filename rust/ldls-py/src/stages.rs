@@ -5,8 +5,8 @@ use crate::arrays::{
     slice,
 };
 use crate::call::run;
+use crate::camera::Camera;
 use crate::masks::Masks;
-use crate::segment::camera;
 use ldls_core::{Memory, PointGraph};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -22,25 +22,18 @@ type PixelLabelArrays = (CsrArrays, Py<PyArray1<f32>>);
 
 /// Rows in view and their pixels.
 #[pyfunction]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the face in Python has few; here each is one extraction"
-)]
 pub fn project(
     py: Python<'_>,
     points: Points<'_>,
-    projection: PyReadonlyArray2<'_, f64>,
-    t_camera_lidar: PyReadonlyArray2<'_, f64>,
-    min_depth_m: f64,
+    camera: &Camera,
     height: usize,
     width: usize,
     keep_origin: bool,
     threads: Option<usize>,
 ) -> PyResult<ViewArrays> {
-    let camera = camera(py, &projection, &t_camera_lidar, min_depth_m)?;
     let cloud = points.cloud(py)?;
     let view = run(py, threads, || {
-        camera.view(
+        camera.0.view(
             cloud,
             height,
             width,

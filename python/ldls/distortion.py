@@ -1,0 +1,94 @@
+"""How a lens departs from a pinhole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls.errors import CalibrationError
+
+MODELS: dict[str, tuple[int, ...]] = {
+    "none": (0,),
+    "plumb_bob": (4, 5),
+    "rational_polynomial": (8,),
+    "equidistant": (4,),
+}
+"""Coefficients that each model may have: k1 k2 p1 p2 (k3) (k4 k5 k6), and k1 k2 k3 k4 of the fisheye."""
+
+SPELLINGS = {
+    "": "none", "pinhole": "none", "radtan": "plumb_bob", "brown": "plumb_bob", "rational": "rational_polynomial",
+    "fisheye": "equidistant", "kannala_brandt": "equidistant", "kb4": "equidistant", "equi": "equidistant",
+}  # fmt: skip
+"""What Kalibr, OpenCV and others call the models of ROS."""
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """Lens distortion by the models of ROS and OpenCV.
+
+    Beyond the angle from the axis at which a model folds back on itself, points are not in view.
+
+    Attributes:
+        model: "none" (a pinhole, or a rectified image), "plumb_bob", "rational_polynomial" or "equidistant" (fisheye).
+        coefficients: k1 k2 p1 p2 k3, or k1 k2 p1 p2 k3 k4 k5 k6, or k1 k2 k3 k4 of the fisheye.
+
+    Raises:
+        CalibrationError: The model is unknown, or has another number of coefficients, or one is not finite.
+    """
+
+    model: str = "none"
+    coefficients: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        model = SPELLINGS.get(self.model.strip().lower(), self.model.strip().lower())
+        values = _numbers(self.coefficients)
+        if model not in MODELS:
+            raise CalibrationError(
+                f"distortion: model {self.model!r} is unknown, expected one of {', '.join(MODELS)}; undistort the "
+                "images and leave it out if your camera has another"
+            )
+        # an empty D means that there is none, whatever the model is called
+        if len(values) == 0:
+            model = "none"
+        if len(values) in (12, 14) and not any(values[8:]):
+            values = values[:8]  # thin prisms and tilted sensors of OpenCV, both absent
+        if model == "plumb_bob" and len(values) == MODELS["rational_polynomial"][0]:
+            model = "rational_polynomial"
+        if model != "none" and len(values) not in MODELS[model]:
+            expected = " or ".join(map(str, MODELS[model]))
+            raise CalibrationError(f"distortion: {model} has {expected} coefficients, got {len(values)}")
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "coefficients", values if model != "none" else ())
+
+    @classmethod
+    def from_opencv(cls, coefficients: ArrayLike, *, fisheye: bool = False) -> Self:
+        """Distortion from OpenCV's `distCoeffs` of 4, 5 or 8 numbers, or the 4 of `cv2.fisheye`."""
+        values = tuple(np.asarray(coefficients, np.float64).ravel().tolist())
+        rational = len(values) >= MODELS["rational_polynomial"][0]
+        return cls("equidistant" if fisheye else "rational_polynomial" if rational else "plumb_bob", values)
+
+    @property
+    def is_none(self) -> bool:
+        """Whether the image is that of a pinhole."""
+        return self.model == "none" or (not any(self.coefficients) and self.model != "equidistant")
+
+    def as_core(self) -> tuple[str, NDArray[np.float64]]:
+        """The model and coefficients as the core takes them: `plumb_bob` is a rational one without denominator."""
+        if self.is_none:
+            return "none", np.zeros(0)
+        if self.model == "equidistant":
+            return "equidistant", np.array(self.coefficients)
+        return "rational", np.concatenate([self.coefficients, np.zeros(8 - len(self.coefficients))])
+
+
+def _numbers(values: tuple[float, ...]) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        raise CalibrationError(f"distortion: expected numbers, got {values!r}") from None
+    if not np.isfinite(numbers).all():
+        raise CalibrationError(f"distortion: expected finite coefficients, got {numbers}")
+    return numbers

@@ -1,0 +1,277 @@
+"""Segment a cloud, or the clouds of a stream."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls import _ldls
+from ldls.camera import Camera
+from ldls.cloud import Points, as_points
+from ldls.errors import (
+    DuplicateWarning,
+    InputError,
+    NonFiniteError,
+    NoUsablePoints,
+    ParameterError,
+    PrecisionWarning,
+    ScaleWarning,
+)
+from ldls.masks import InstanceMasks
+from ldls.params import Params
+from ldls.report import Report
+from ldls.segmentation import Instance, Segmentation
+from ldls.view import SeenView, View, check_camera
+
+COARSEST_STEP_M = 0.01
+"""Step between single-precision coordinates from which on distances between neighbours suffer."""
+WIDEST_CLOUD_M = 10_000.0
+"""Extent beyond which the unit is probably not the metre."""
+SAME_OBJECT = 0.5
+"""Share of common points from which on instances of two images are one object."""
+
+
+def segment(
+    points: ArrayLike,
+    masks: InstanceMasks | Sequence[View],
+    camera: Camera | None = None,
+    *,
+    params: Params | None = None,
+    nonfinite: Literal["drop", "raise"] = "drop",
+    keep_origin: bool = False,
+    same_object: float = SAME_OBJECT,
+) -> Segmentation:
+    """Instance labels of lidar points by label diffusion (Wang et al., RA-L 2019).
+
+    With several cameras, `segment(points, [View(masks, camera), ...])`, there is one graph over all points that any
+    of them sees; where images overlap, the pixels of both take part.
+
+    Args:
+        points: (N, >= 3) float32 or float64, x y z first, in metres in the lidar frame. Never modified. Another
+            thread must not write to it meanwhile.
+        masks: Instance masks of the image; or one `View` for each of several cameras.
+        camera: The camera that took the image; None beside views, which have their own.
+        params: Parameters of the method; the paper's by default.
+        nonfinite: Points with NaN or infinite coordinates are left out and counted ("drop") or refused ("raise").
+        keep_origin: Points at exactly (0, 0, 0) are missing returns to most sensors and left out; keep them if yours
+            means them.
+        same_object: Two instances of one category in two images become one label if, of the points that both
+            cameras see and that fall on either mask, at least this share falls on both; 0 to 1.
+
+    Returns:
+        Labels, confidences and objects, in the order of `points`. Equal bit for bit for any number of threads.
+
+    Raises:
+        InputError: `points`, `masks` or `camera` cannot be used; see its subclasses.
+        LimitError: The cloud has more points than the graph can index.
+    """
+    return _segment(points, _views(masks, camera), params or Params(), nonfinite, keep_origin, same_object)
+
+
+class LabelDiffusion:
+    """Segments the frames of a stream: what one camera, or a ring of them, and one lidar yield, frame after frame.
+
+    Does what `segment` does, but keeps the memory that a frame needs for the next one: after the first frame of a size
+    only the result is allocated. Several threads may call at a time; each then has memory of its own.
+
+    Attributes:
+        camera: The camera that takes the images, or several.
+        params: Parameters of the method.
+
+    Example:
+        >>> diffusion = ldls.LabelDiffusion(camera)  # doctest: +SKIP
+        >>> for points, masks in stream:  # doctest: +SKIP
+        ...     labels = diffusion.segment(points, masks).labels
+    """
+
+    def __init__(self, camera: Camera | Sequence[Camera], params: Params | None = None) -> None:
+        """Prepare for the images of a camera or of several; the parameters are the paper's by default.
+
+        Raises:
+            InputError: `camera` or `params` is of another type.
+        """
+        cameras = tuple(camera) if isinstance(camera, Sequence) else (camera,)
+        for one in cameras:
+            check_camera(one)
+        if params is not None and not isinstance(params, Params):
+            raise ParameterError(f"params: expected Params, got {type(params).__name__}")
+        self.camera = camera
+        self._cameras = cameras
+        self.params = params or Params()
+        self._memory = _ldls.StreamMemory()
+
+    def segment(
+        self,
+        points: ArrayLike,
+        masks: InstanceMasks | Sequence[InstanceMasks],
+        *,
+        nonfinite: Literal["drop", "raise"] = "drop",
+        keep_origin: bool = False,
+        same_object: float = SAME_OBJECT,
+    ) -> Segmentation:
+        """Segment the next frame: points, and masks for each camera.
+
+        Options, result and errors are those of `ldls.segment`.
+        """
+        each = (masks,) if isinstance(masks, InstanceMasks) else tuple(masks)
+        if len(each) != len(self._cameras):
+            raise InputError(f"masks: got those of {len(each)} images, expected {len(self._cameras)}, one a camera")
+        views = tuple(View(own, camera) for own, camera in zip(each, self._cameras, strict=True))
+        return _segment(points, views, self.params, nonfinite, keep_origin, same_object, self._memory)
+
+    def __repr__(self) -> str:
+        return f"LabelDiffusion({self.camera!r}, {self.params!r})"
+
+
+def _views(masks: InstanceMasks | Sequence[View], camera: Camera | None) -> tuple[View, ...]:
+    if isinstance(masks, Sequence):
+        if camera is not None:
+            raise InputError("camera: expected None beside views, which have cameras of their own")
+        for view in masks:
+            if not isinstance(view, View):
+                raise InputError(f"masks: expected InstanceMasks or a list of View, got {type(view).__name__} in it")
+        return tuple(masks)
+    check_camera(camera)
+    assert camera is not None
+    return (View(masks, camera),)
+
+
+def _segment(
+    points: ArrayLike,
+    views: tuple[View, ...],
+    params: Params,
+    nonfinite: str,
+    keep_origin: bool,
+    same_object: float,
+    memory: _ldls.StreamMemory | None = None,
+) -> Segmentation:
+    cloud = as_points(points)
+    _check_nonfinite(cloud, nonfinite)
+    if not 0 < same_object <= 1:
+        raise ParameterError(f"same_object: got {same_object!r}, expected more than 0 and at most 1")
+    if len(views) == 1:
+        arrays, seen, instances = _one_camera(cloud, views[0], params, keep_origin, memory)
+    else:
+        arrays, seen, instances = _ring(cloud, views, params, keep_origin, same_object, memory)
+    _warn(cloud, arrays.report)
+    return Segmentation(
+        labels=arrays.labels,
+        diffused_labels=arrays.diffused_labels,
+        confidence=arrays.confidence,
+        in_view=arrays.in_view,
+        instances=instances,
+        views=seen,
+        report=_report(arrays, views, instances),
+        timings=arrays.timings,
+        points=cloud,
+        params=params,
+    )
+
+
+_Outcome = tuple[_ldls.SegmentationArrays, tuple[SeenView, ...], tuple[Instance, ...]]
+
+
+def _one_camera(
+    cloud: Points, view: View, params: Params, keep_origin: bool, memory: _ldls.StreamMemory | None
+) -> _Outcome:
+    arrays = _ldls.segment(
+        cloud, view.masks.core, view.camera.core, params.as_tuple(), keep_origin, params.threads, memory
+    )
+    labels = np.arange(1, len(view.masks) + 1, dtype=np.int32)
+    seen = SeenView(view=view, in_view=arrays.in_view, pixels=arrays.pixels, labels=labels)
+    instances = tuple(_instance(label, [(0, label - 1)], (view,)) for label in labels.tolist())
+    return arrays, (seen,), instances
+
+
+def _ring(
+    cloud: Points,
+    views: tuple[View, ...],
+    params: Params,
+    keep_origin: bool,
+    same_object: float,
+    memory: _ldls.StreamMemory | None,
+) -> _Outcome:
+    arrays, sightings, objects = _ldls.segment_ring(
+        cloud,
+        [view.masks.core for view in views],
+        [view.masks.categories.tolist() for view in views],
+        [view.camera.core for view in views],
+        same_object,
+        params.as_tuple(),
+        keep_origin,
+        params.threads,
+        memory,
+    )
+    sources = [[(number, mask - 1) for number, mask in parts] for parts in objects]
+    instances = tuple(_instance(label, parts, views) for label, parts in enumerate(sources, start=1))
+    labels = [np.zeros(len(view.masks), np.int32) for view in views]
+    for instance in instances:
+        for number, mask in instance.sources:
+            labels[number][mask] = instance.label
+    seen = tuple(
+        SeenView(view=view, in_view=arrays.in_view[at], pixels=pixels, labels=own)
+        for view, (at, pixels), own in zip(views, sightings, labels, strict=True)
+    )
+    return arrays, seen, instances
+
+
+def _instance(label: int, sources: Sequence[tuple[int, int]], views: tuple[View, ...]) -> Instance:
+    masks = [views[number].masks for number, _ in sources]
+    number, first = sources[0]
+    category = int(views[number].masks.categories[first])
+    scores = (float(own.scores[mask]) for own, (_, mask) in zip(masks, sources, strict=True))
+    return Instance(
+        label=label,
+        category=category,
+        name=masks[0].names[category],
+        score=max(scores),
+        sources=tuple(sources),
+    )
+
+
+def _check_nonfinite(cloud: Points, nonfinite: str) -> None:
+    if nonfinite == "drop":
+        return
+    if nonfinite != "raise":
+        raise ParameterError(f"nonfinite: got {nonfinite!r}, expected 'drop' or 'raise'")
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(cloud[:, :3]).all(axis=1))
+    if not finite.all():
+        raise NonFiniteError(
+            f"points: {finite.sum()} of {len(finite)} rows are finite, row {finite.argmin()} is the first "
+            "that is not; pass nonfinite='drop' to leave such rows out"
+        )
+
+
+def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
+    if len(cloud) and report["n_nonfinite"] == len(cloud):
+        _warning(f"points: 0 of {len(cloud)} rows are finite; nothing is labelled", NoUsablePoints)
+        return
+    low, high = (np.array(bound) for bound in report["bounds"])
+    farthest = float(np.abs([low, high]).max()) if len(cloud) else 0.0
+    step = float(np.spacing(np.float32(farthest)))
+    if cloud.dtype == np.float32 and step > COARSEST_STEP_M:
+        message = f"points: float32 spacing at {farthest:.1e} is {step:.2g} m; pass float64 or subtract an origin"
+        _warning(message, PrecisionWarning)
+    extent = float((high - low).max()) if len(cloud) else 0.0
+    if extent > WIDEST_CLOUD_M:
+        _warning(f"points: extent is {extent:.3g} m, over 10 km; are they in metres?", ScaleWarning)
+    if report["only_islands"]:
+        message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
+        _warning(message, DuplicateWarning)
+
+
+def _warning(message: str, category: type[Warning]) -> None:
+    # the caller of segment, four calls up, is the one to be told
+    warnings.warn(message, category, stacklevel=5)
+
+
+def _report(arrays: _ldls.SegmentationArrays, views: tuple[View, ...], instances: tuple[Instance, ...]) -> Report:
+    counts = dict(arrays.report)
+    del counts["bounds"], counts["only_islands"]
+    areas = [[mask.area for mask in view.masks] for view in views]
+    empty = tuple(i.label for i in instances if not any(areas[number][mask] for number, mask in i.sources))
+    return Report(n_points=len(arrays.labels), n_in_view=len(arrays.in_view), empty_masks=empty, **counts)

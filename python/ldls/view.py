@@ -1,0 +1,73 @@
+"""What one camera took of a moment: an image's masks, and the camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.camera import Camera
+from ldls.errors import InputError, MaskError
+from ldls.masks import InstanceMasks
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Instance masks of an image, and the camera that took it.
+
+    Attributes:
+        masks: Instance masks of the image.
+        camera: The camera.
+        name: What to call it, as "CAM_FRONT"; "camera 0", "camera 1" and so on without one.
+
+    Raises:
+        InputError: One is of another type.
+        MaskError: The masks are of an image of another size than the camera's.
+    """
+
+    masks: InstanceMasks
+    camera: Camera
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.masks, InstanceMasks):
+            raise InputError(
+                f"masks: expected InstanceMasks, got {type(self.masks).__name__}; "
+                "make them with InstanceMasks.from_array, from_coco or from_file"
+            )
+        check_camera(self.camera)
+        expected, found = self.camera.image_size, self.masks.image_size
+        if expected is not None and found != tuple(expected):
+            hint = "; swapped?" if found == tuple(expected)[::-1] else ""
+            raise MaskError(f"masks: {found}, the camera's image is {expected}{hint}")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SeenView:
+    """A view, and what came of it.
+
+    Attributes:
+        view: Masks and camera.
+        in_view: (n,) int64: indices of the points that the camera sees, ascending.
+        pixels: (n, 2) float64: u (right) and v (down) of these points in pixels.
+        labels: (M,) int32: label in the whole result of each of the M masks.
+    """
+
+    view: View
+    in_view: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+    labels: NDArray[np.int32]
+
+
+def check_camera(camera: object) -> None:
+    """Refuse what is no camera.
+
+    Raises:
+        InputError: It is of another type.
+    """
+    if not isinstance(camera, Camera):
+        raise InputError(
+            f"camera: expected Camera, got {type(camera).__name__}; "
+            "make one with Camera(projection=..., T_camera_lidar=...) or Camera.from_kitti"
+        )
