@@ -34,6 +34,57 @@ def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1):
     return Expected(in_view, pixels, diffused, kept, z, edges)
 
 
+def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1):
+    """`views` holds masks (M, H, W), categories (M,) and a camera matrix for each camera. Labels, and the instances
+    (camera, mask), both from 0, of each label from 1."""
+    seen = [project(points, matrix, masks.shape[1:], min_depth_m) for masks, _, matrix in views]
+    in_view = np.unique(np.concatenate([rows for rows, _ in seen]))
+    groups = same_objects(views, seen, same_object)
+    labels, mass = np.zeros((len(in_view), len(groups) + 1)), np.zeros(len(in_view))
+    for camera, ((masks, _, _), (rows, pixels)) in enumerate(zip(views, seen, strict=True)):
+        of_instance = [0] + [1 + [(camera, m) in group for group in groups].index(True) for m in range(len(masks))]
+        own, own_mass = pixel_edges(pixels, masks, params.window, params.pixel_weight)
+        at = np.searchsorted(in_view, rows)
+        for instance, label in enumerate(of_instance):
+            labels[at, label] += own[:, instance]
+        mass[at] += own_mass
+    edges = point_edges(points[in_view, :3].astype(np.float64), params.neighbors, params.sigma)
+    row_sums = edges.sum(axis=1) + mass
+    A, b = diags_array(1 / row_sums, shape=edges.shape) @ edges, labels / row_sums[:, None]
+    z = np.zeros_like(b)
+    for _ in range(params.iterations):
+        z = A @ z + b
+    kept = largest_components(edges, z.argmax(axis=1))
+    whole = np.full(len(points), -1)
+    whole[in_view] = kept
+    return whole, groups
+
+
+def same_objects(views, seen, same_object):
+    """Groups of instances, the pairs that agree best joined first; one instance a camera."""
+    pairs = []
+    for one in range(len(views)):
+        for other in range(one + 1, len(views)):
+            _, here, there = np.intersect1d(seen[one][0], seen[other][0], return_indices=True)
+            covers = []
+            for camera, at in ((one, here), (other, there)):
+                column, row = np.floor(seen[camera][1][at] + 0.5).astype(int).reshape(-1, 2).T
+                covers.append(views[camera][0][:, row, column])
+            for m, first in enumerate(covers[0]):
+                for k, second in enumerate(covers[1]):
+                    both, either = (first & second).sum(), (first | second).sum()
+                    same_category = views[one][1][m] == views[other][1][k]
+                    if both and same_category and both >= same_object * either:
+                        pairs.append((-both / either, (one, m), (other, k)))
+    groups = [[(camera, m)] for camera, view in enumerate(views) for m in range(len(view[0]))]
+    for _, first, second in sorted(pairs):
+        a, b = (next(g for g in groups if instance in g) for instance in (first, second))
+        if a is not b and not {camera for camera, _ in a} & {camera for camera, _ in b}:
+            groups[min(groups.index(a), groups.index(b))] = sorted(a + b)
+            groups.remove(b if b in groups else a)
+    return groups
+
+
 def project(points, camera_matrix, image_size, min_depth_m):
     xyz = points[:, :3].astype(np.float64)
     usable = np.isfinite(xyz).all(axis=1) & (xyz != 0).any(axis=1)
