@@ -57,6 +57,12 @@ class ParameterError(InputError):
     code = "parameter"
 
 
+class SourceError(InputError):
+    """A source of frames that is not whole, or of which nobody can tell what it is."""
+
+    code = "source"
+
+
 class FileFormatError(LdlsError, ValueError):
     """A file that is not what its format says."""
 
@@ -127,3 +133,7 @@ class DuplicateWarning(LdlsWarning):
 
 class RecoveredFileWarning(LdlsWarning):
     """A truncated file of which the whole part was read."""
+
+
+class LeftOutWarning(LdlsWarning):
+    """Sweeps that no frame is made of, for something that belongs to them is missing."""

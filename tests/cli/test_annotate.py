@@ -68,4 +68,4 @@ def test_without_images_the_usual_size_is_taken(broken, tmp_path):
     (broken / "image_2/000003.png").write_bytes(b"PNG")
     outcome = run(app, ["annotate", str(broken), str(tmp_path / "out")])
     assert outcome.exit_code == 1
-    assert "000003.png: not an image" in outcome.stderr
+    assert "000003.png: not a whole image" in outcome.stderr

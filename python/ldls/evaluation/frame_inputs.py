@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.errors import CorruptFileError, InputError
+from ldls.errors import InputError
 from ldls.io import read_points
+from ldls.io.images import read_image_size
 
 POINT_ENDINGS = (".bin", ".pcd.bin", ".npy")
 
@@ -56,16 +57,8 @@ class FrameInputs:
         return replace(camera, image_size=self._image_size(name))
 
     def _image_size(self, name: str) -> tuple[int, int] | None:
-        from PIL import Image
-
         path = None if self.images is None else self.images / f"{name}.png"
-        if path is None or not path.exists():
-            return None
-        try:
-            with Image.open(path) as image:
-                return image.height, image.width
-        except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-            raise CorruptFileError(f"{path}: not an image ({error})") from None
+        return read_image_size(path) if path is not None and path.exists() else None
 
 
 def ranges_of(points: Points) -> NDArray[np.float64]:

@@ -1,8 +1,10 @@
-"""Camera images from files."""
+"""Image files."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
@@ -14,19 +16,37 @@ from ldls.errors import CorruptFileError, LimitError
 
 
 def read_image(path: str | PathLike[str]) -> NDArray[np.uint8]:
-    """(H, W, 3) RGB pixels of an image file of any format that Pillow reads.
+    """(H, W, 3) RGB pixels.
 
     Raises:
         CorruptFileError: It is no image, or not a whole one.
-        LimitError: It has more pixels than Pillow takes for safe (178,956,970).
+        LimitError: It has more pixels than Pillow takes.
         FileNotFoundError: There is no such file.
     """
-    path = Path(path)
+    with _opened(Path(path)) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def read_image_size(path: str | PathLike[str]) -> tuple[int, int]:
+    """(height, width) in pixels, by the head of the file.
+
+    Raises:
+        CorruptFileError: It is no image.
+        LimitError: It has more pixels than Pillow takes.
+        FileNotFoundError: There is no such file.
+    """
+    with _opened(Path(path)) as image:
+        return image.height, image.width
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Image.Image]:
     try:
         with warnings.catch_warnings():
+            # Pillow warns from half its limit on, which is ours
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(path) as image:
-                return np.asarray(image.convert("RGB"))
+                yield image
     except Image.DecompressionBombError as error:
         raise LimitError(f"{path}: {error}") from None
     except (FileNotFoundError, PermissionError, IsADirectoryError):

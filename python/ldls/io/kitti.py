@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
@@ -27,16 +28,21 @@ def read_calibration(path: str | PathLike[str], *, camera: int = 2) -> tuple[NDA
     if camera not in range(4):
         raise ParameterError(f"camera: got {camera!r}, expected 0 to 3")
     path = Path(path)
-    matrices = _parse(path)
+    matrices = read_rows(path, SIZES)
     projection = _get(path, matrices, f"P{camera}").reshape(3, 4)
     if "Tr" in matrices and "Tr_velo_to_cam" not in matrices:
-        return projection, _homogeneous(matrices["Tr"].reshape(3, 4))
-    velo_to_cam = _homogeneous(_get(path, matrices, "Tr_velo_to_cam").reshape(3, 4))
-    rectification = _homogeneous(_get(path, matrices, "R0_rect").reshape(3, 3))
+        return projection, homogeneous(matrices["Tr"].reshape(3, 4))
+    velo_to_cam = homogeneous(_get(path, matrices, "Tr_velo_to_cam").reshape(3, 4))
+    rectification = homogeneous(_get(path, matrices, "R0_rect").reshape(3, 3))
     return projection, rectification @ velo_to_cam
 
 
-def _parse(path: Path) -> dict[str, NDArray[np.float64]]:
+def read_rows(path: Path, sizes: Mapping[str, int]) -> dict[str, NDArray[np.float64]]:
+    """The numbers of each line `key: numbers` whose key is one of `sizes`, which says how many there must be.
+
+    Raises:
+        CalibrationError: A key is doubled, or a line does not hold the numbers it should.
+    """
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -44,12 +50,13 @@ def _parse(path: Path) -> dict[str, NDArray[np.float64]]:
     matrices: dict[str, NDArray[np.float64]] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.partition("#")[0].split()
-        key = SPELLINGS.get(words[0].rstrip(":"), words[0].rstrip(":")) if words else ""
-        if key not in SIZES:
+        key = words[0].rstrip(":") if words else ""
+        key = key if key in sizes else SPELLINGS.get(key, key)
+        if key not in sizes:
             continue
         if key in matrices:
             raise CalibrationError(f"{path}, line {number}: key '{words[0]}' stands there twice")
-        matrices[key] = _numbers(f"{path}, line {number}", words[1:], SIZES[key])
+        matrices[key] = _numbers(f"{path}, line {number}", words[1:], sizes[key])
     return matrices
 
 
@@ -72,7 +79,8 @@ def _get(path: Path, matrices: dict[str, NDArray[np.float64]], key: str) -> NDAr
     return matrices[key]
 
 
-def _homogeneous(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def homogeneous(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(4, 4) transform of a (3, 3) rotation or a (3, 4) transform."""
     full = np.eye(4)
     full[:3, : matrix.shape[1]] = matrix
     return full
