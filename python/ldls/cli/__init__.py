@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ldls.cli import annotate, demo, evaluate, masks, reproduce, segment, simulate
+from ldls.cli import annotate, demo, evaluate, info, masks, reproduce, segment, simulate
 
 app = typer.Typer(
     name="ldls",
@@ -15,6 +15,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command(name="segment")(segment.segment)
+app.command(name="info")(info.info)
 app.add_typer(masks.app, name="masks")
 app.command(name="demo")(demo.demo)
 app.command(name="simulate")(simulate.simulate)

@@ -1,5 +1,31 @@
-"""Sources of frames: data sets, drives, bags and folders, one module each."""
+"""Sources of frames: data sets, drives, bags and folders, one module each.
 
+for frame in open_source("2011_09_26/2011_09_26_drive_0001_sync"):
+    result = ldls.segment(frame.points, masks_of(frame.images[0].read()), frame.images[0].camera)
+"""
+
+from ldls.datasets.folder import FolderSource
 from ldls.datasets.frame import CameraImage, Frame, Source
+from ldls.datasets.kitti_object import KittiObjectSource
+from ldls.datasets.kitti_odometry import KittiOdometrySource
+from ldls.datasets.kitti_raw import KittiRawSource
+from ldls.datasets.nuscenes import NuScenesSource
+from ldls.datasets.nuscenes_frame import Box2d, NuScenesFrameSource, read_boxes_2d
+from ldls.datasets.registry import SOURCES, SourceClass, open_source
 
-__all__ = ["CameraImage", "Frame", "Source"]
+__all__ = [
+    "SOURCES",
+    "Box2d",
+    "CameraImage",
+    "FolderSource",
+    "Frame",
+    "KittiObjectSource",
+    "KittiOdometrySource",
+    "KittiRawSource",
+    "NuScenesFrameSource",
+    "NuScenesSource",
+    "Source",
+    "SourceClass",
+    "open_source",
+    "read_boxes_2d",
+]

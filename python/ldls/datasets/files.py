@@ -91,7 +91,7 @@ def choose(path: Path, what: str, found: Sequence[str], wanted: str | None) -> s
     """
     if wanted is None and len(found) == 1:
         return found[0]
-    if wanted in found:
+    if wanted is not None and wanted in found:
         return wanted
     there = some(found) or "none"
     if wanted is None:

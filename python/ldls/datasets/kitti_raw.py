@@ -120,7 +120,7 @@ def _drive(path: Path, wanted: str | None) -> Path:
         raise SourceError(f"{path}: its images are not rectified; get the drive's '_sync' folder instead")
     drives = _drives(path)
     if wanted is None and ((path / LIDAR).is_dir() or not drives):
-        return path.resolve()  # the calibration lies in its parent
+        return path.absolute()  # the calibration lies in its parent
     return path / choose(path, "drive", drives, wanted)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
@@ -42,11 +41,8 @@ def read_image_size(path: str | PathLike[str]) -> tuple[int, int]:
 @contextmanager
 def _opened(path: Path) -> Iterator[Image.Image]:
     try:
-        with warnings.catch_warnings():
-            # Pillow warns from half its limit on, which is ours
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path) as image:
-                yield image
+        with Image.open(path) as image:
+            yield image
     except Image.DecompressionBombError as error:
         raise LimitError(f"{path}: {error}") from None
     except (FileNotFoundError, PermissionError, IsADirectoryError):

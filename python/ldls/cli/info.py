@@ -1,0 +1,210 @@
+"""`ldls info`: what a source of frames holds, and whether it looks sound."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.progress import progress
+from ldls.errors import ParameterError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ldls.datasets import Frame, Source
+    from ldls.datasets.inspection import Finding, FrameFacts
+
+LOOKED_AT = 8
+"""Frames that are read without --all."""
+SHOWN = 30
+"""Findings that are listed."""
+
+
+@speaks_plainly
+def info(
+    source: Annotated[Path, typer.Argument(help="Folder or file of frames.", exists=True)],
+    dataset: Annotated[
+        str | None, typer.Option(help="Kind of the source, as kitti-raw.", show_default="guessed")
+    ] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=VALUE of the kind, as camera=3 or scene=scene-0061; may be repeated."),
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Look at every frame, not only at some.")] = False,
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="Write a picture: one frame's points, coloured by depth, over its images.", dir_okay=False),
+    ] = None,
+    frame: Annotated[str | None, typer.Option(help="Which frame to draw.", show_default="the first")] = None,
+) -> None:
+    """Say what a source of frames holds and check some of its frames, or all.
+
+    Prints kind, time, cameras, points and truth, then whatever is not as it should be: files that cannot be read,
+    clouds without points, cameras that see none, images of another size than their calibration, gaps and steps back in
+    time. Exit status 1 if something is broken.
+
+    Example: ldls info 2011_09_26/2011_09_26_drive_0001_sync --picture check.png
+    """
+    from ldls.datasets import open_source
+    from ldls.datasets.inspection import check_stamps, inspect, sample
+
+    found = open_source(source, kind=dataset, **parse_options(option or []))
+    indices = list(range(len(found))) if every else sample(len(found), LOOKED_AT)
+    facts = [inspect(found, at) for at in progress(indices, len(indices), "looking at frames")]
+    stamps = stamps_of(found)
+    findings = [finding for each in facts for finding in each.findings] + check_stamps(found.names, stamps)
+    screen = console()
+    screen.print(summary_table(found, facts, stamps))
+    cameras = camera_table(found, facts)
+    if cameras is not None:
+        screen.print(cameras)
+    screen.print(finding_table(findings) if findings else f"{len(facts)} frames looked at, nothing found")
+    if picture is not None:
+        write_picture(chosen_frame(found, frame), picture)
+        screen.print(f"wrote {picture}", highlight=False, soft_wrap=True)
+    if any(finding.broken for finding in findings):
+        raise typer.Exit(1)
+
+
+def parse_options(words: Sequence[str]) -> dict[str, str | int | bool | tuple[int, ...]]:
+    """Options by name; numbers, lists of numbers such as 2,3, and true and false are taken as such.
+
+    Raises:
+        ParameterError: One is not NAME=VALUE.
+    """
+    options: dict[str, str | int | bool | tuple[int, ...]] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not name or not equals:
+            raise ParameterError(f"--option: got {word!r}, expected NAME=VALUE")
+        options[name] = _value(value)
+    return options
+
+
+def stamps_of(source: Source) -> tuple[float | None, ...]:
+    """Times of all sweeps that the source knows without reading them; None for each of a source that does not."""
+    unknown: tuple[float | None, ...] = (None,) * len(source)
+    stamps: tuple[float | None, ...] = getattr(source, "stamps", unknown)
+    return stamps
+
+
+def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[float | None]) -> Table:
+    """Kind, frames, time, points and truth."""
+    from rich.table import Table
+
+    from ldls.datasets.inspection import classes_of
+
+    table = Table(title=str(source.path), show_header=False)
+    table.add_row("kind", source.kind)
+    table.add_row("frames", f"{len(source):,} ({source.names[0]} to {source.names[-1]})")
+    left_out = Counter(getattr(source, "left_out", {}).values())
+    if left_out:
+        why = ", ".join(f"{count:,} {reason}" for reason, count in left_out.most_common())
+        table.add_row("left out", f"{left_out.total():,} ({why})")
+    table.add_row("time", _time(stamps))
+    counts = [found.n_points for found in facts if found.n_points] or [0]
+    table.add_row("points a frame", f"{sum(counts) / len(counts):,.0f} ({min(counts):,} to {max(counts):,})")
+    classes = classes_of(facts)
+    labelled = sum(found.truth is not None for found in facts)
+    named = ", ".join(f"{name} {count:,}" for name, count in classes.items())
+    table.add_row("truth", f"{labelled} of {len(facts)} frames looked at: {named}" if labelled else "none")
+    return table
+
+
+def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
+    """A row for each camera of the first frame that was read; None where none was."""
+    from rich.table import Table
+
+    from ldls.datasets.inspection import field_of_view_deg
+
+    whole = next((found for found in facts if found.in_view), None)
+    if whole is None:
+        return None
+    table = Table(title=f"cameras, over {len(facts)} frames")
+    for heading in ("camera", "height x width", "distortion", "sees across x down", "points in view", "from the sweep"):
+        table.add_column(heading)
+    for image in source[source.names.index(whole.name)].images:
+        across, down = field_of_view_deg(image.camera)
+        shares = [found.in_view[image.name] for found in facts if image.name in found.in_view]
+        offsets = [found.offsets_s[image.name] for found in facts if image.name in found.offsets_s]
+        height, width = image.camera.image_size or (0, 0)
+        table.add_row(
+            image.name,
+            f"{height} x {width}",
+            image.camera.distortion.model,
+            f"{across:.0f} x {down:.0f} degrees",
+            f"{min(shares):.1%} to {max(shares):.1%}",
+            f"{min(offsets):+.3f} to {max(offsets):+.3f} s" if offsets else "-",
+        )
+    return table
+
+
+def finding_table(findings: Sequence[Finding]) -> Table:
+    """What was found, the broken first."""
+    from rich.table import Table
+
+    broken = sum(finding.broken for finding in findings)
+    table = Table(title=f"{broken:,} broken, {len(findings) - broken:,} worth a look")
+    for heading in ("", "frame", "what"):
+        table.add_column(heading, overflow="fold")
+    in_order = sorted(findings, key=lambda finding: not finding.broken)
+    for finding in in_order[:SHOWN]:
+        table.add_row("broken" if finding.broken else "look", finding.frame, finding.what)
+    if len(findings) > SHOWN:
+        table.add_row("", "", f"and {len(findings) - SHOWN:,} more")
+    return table
+
+
+def chosen_frame(source: Source, name: str | None) -> Frame:
+    """The frame of a name, or the first.
+
+    Raises:
+        ParameterError: There is no such frame.
+    """
+    if name is not None and name not in source.names:
+        raise ParameterError(f"--frame: got {name!r}, expected a name from {source.names[0]} to {source.names[-1]}")
+    return source[0 if name is None else source.names.index(name)]
+
+
+def write_picture(frame: Frame, path: Path) -> None:
+    """Write the picture of a frame's points over its images.
+
+    Raises:
+        ParameterError: The frame has no image.
+    """
+    from ldls.io.whole_file import whole_file
+    from ldls.viewing.depth import depth_picture
+
+    if not frame.images:
+        raise ParameterError(f"--picture: frame {frame.name} has no image")
+    with whole_file(path) as file:
+        depth_picture(frame).save(file, "PNG")
+
+
+def _value(text: str) -> str | int | bool | tuple[int, ...]:
+    if text in ("true", "false"):
+        return text == "true"
+    parts = text.split(",")
+    if not all(part.isdecimal() for part in parts):
+        return text
+    # 08 names a sequence, 8 is a number
+    padded = len(parts) == 1 and len(text) > 1 and text.startswith("0")
+    return text if padded else int(text) if len(parts) == 1 else tuple(map(int, parts))
+
+
+def _time(stamps: Sequence[float | None]) -> str:
+    import numpy as np
+
+    known = [stamp for stamp in stamps if stamp is not None]
+    if not known:
+        return "not known"
+    if len(known) == 1:
+        return f"one moment, {known[0]:.3f} s"
+    usual = float(np.median(np.diff(known)))
+    rate = f", {1 / usual:.1f} frames a second" if usual > 0 else ""
+    return f"{known[-1] - known[0]:.1f} s{rate}"

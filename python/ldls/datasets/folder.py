@@ -1,0 +1,185 @@
+"""A plain folder of frames, described by a small file, ldls.toml."""
+
+from __future__ import annotations
+
+import glob
+import math
+import re
+from dataclasses import replace
+from functools import partial
+from os import PathLike
+from pathlib import Path, PurePath
+
+from ldls.camera import Camera
+from ldls.cloud import Points
+from ldls.datasets.files import whole_frames
+from ldls.datasets.folder_description import FILE, CameraDescription, read_description, template
+from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.truth import of_points
+from ldls.errors import CorruptFileError, ParameterError, SourceError, UnsupportedFormatError
+from ldls.evaluation import Labeling, read_labeling
+from ldls.io import read_points
+from ldls.io.images import read_image, read_image_size
+from ldls.io.safe_paths import strictly_below
+from ldls.io.text import read_lines
+from ldls.masks import InstanceMasks
+
+__all__ = ["FolderSource", "template"]
+
+FRAME = "{frame}"
+
+
+class FolderSource:
+    """Frames of a folder that an ldls.toml describes; `template()` has every key.
+
+    Attributes:
+        kind: "folder".
+        path: Folder of ldls.toml.
+        names: What {frame} stands for, sorted.
+        stamps: Times of the sweeps in seconds; None for each without a file of stamps.
+        left_out: What frames lack that have only some of their files, by name.
+    """
+
+    kind = "folder"
+    looks_for = FILE
+
+    def __init__(self, path: str | PathLike[str], *, allow_outside: bool = False, truth: bool = True) -> None:
+        """Read the description and look for the frames.
+
+        Args:
+            path: The description, or the folder of ldls.toml.
+            allow_outside: Whether paths may be absolute or lead out of the folder.
+            truth: Whether frames have their truth, where the description names it.
+
+        Raises:
+            ParameterError: A key is unknown, missing, or of another type.
+            UnsafePathError: A path leads out of the folder.
+            SourceError: No frame is whole, or a stamp is missing.
+            CalibrationError: A calibration cannot be a camera's.
+            FileFormatError: The description or a file of stamps is broken.
+            FileNotFoundError: There is no description, or a file that it names is not there.
+        """
+        file = _description_in(Path(path))
+        self.path = file.parent
+        self._file, self._allow_outside = file, allow_outside
+        self._described = read_description(file)
+        self._cameras = self._described.cameras
+        self._points = self._find(self._described.points)
+        self._images = {name: self._find(each.images) for name, each in self._cameras.items()}
+        images = {f"cameras.{name}": files for name, files in self._images.items()}
+        frames = whole_frames(self.path, {"points": self._points, **images})
+        self.names, self.left_out = frames.names, frames.left_out
+        self.stamps = self._read_stamps(self._described.stamps)
+        self._image_stamps = {name: self._read_stamps(each.stamps) for name, each in self._cameras.items()}
+        self._truth = truth
+        for each in self._cameras.values():
+            self._camera(each, self.names[0])
+
+    @classmethod
+    def recognises(cls, path: Path) -> bool:
+        """Whether `path` is a folder with an ldls.toml, or a TOML file."""
+        return _description_in(path).suffix == ".toml" and _description_in(path).is_file()
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __getitem__(self, index: int) -> Frame:
+        name = self.names[index]
+        points = read_points(self._points[name], columns=self._described.columns)
+        return Frame(
+            name=name,
+            points=points,
+            stamp=self.stamps[index],
+            images=tuple(self._image(camera, index) for camera in self._cameras),
+            truth=self._read_truth(name, points),
+        )
+
+    def read_masks(self, index: int) -> tuple[InstanceMasks, ...]:
+        """The stored masks of a frame, one for each camera.
+
+        Raises:
+            SourceError: The description names no masks of a camera.
+            MaskError: The masks are broken.
+            FileNotFoundError: A file is missing.
+        """
+        name = self.names[index]
+        missing = [camera for camera, each in self._cameras.items() if each.masks is None]
+        if missing:
+            raise SourceError(f'{self._file}: names no masks of {", ".join(missing)}; add masks = "..."')
+        return tuple(_masks_of(self._one(each.masks or "", name)) for each in self._cameras.values())
+
+    def _image(self, camera: str, index: int) -> CameraImage:
+        name = self.names[index]
+        path = self._images[camera][name]
+        made = self._camera(self._cameras[camera], name)
+        made = made if made.image_size is not None else replace(made, image_size=read_image_size(path))
+        stamp = self._image_stamps[camera][index]
+        return CameraImage(name=camera, camera=made, read=partial(read_image, path), stamp=stamp, path=path)
+
+    def _camera(self, each: CameraDescription, name: str) -> Camera:
+        if each.inline is not None:
+            return each.inline
+        path = self._one(each.calibration or "", name)
+        return Camera.from_kitti(path, camera=each.number, image_size=each.image_size)
+
+    def _read_truth(self, name: str, points: Points) -> Labeling | None:
+        pattern = self._described.truth
+        if not self._truth or pattern is None:
+            return None
+        path = self._one(pattern, name)
+        if not path.exists():
+            return None
+        return of_points(read_labeling(path, format=self._described.truth_format), points, path)
+
+    def _read_stamps(self, pattern: str | None) -> tuple[float | None, ...]:
+        if pattern is None:
+            return (None,) * len(self.names)
+        path = self._safe(pattern)
+        stamps = dict(_stamp(path, number, line) for number, line in enumerate(read_lines(path), start=1))
+        missing = [name for name in self.names if name not in stamps]
+        if missing:
+            raise SourceError(f"{path}: has no stamp of {len(missing)} frames, the first is {missing[0]}")
+        return tuple(stamps[name] for name in self.names)
+
+    def _find(self, pattern: str) -> dict[str, Path]:
+        """Files of a pattern by what {frame} stands for in their paths."""
+        if FRAME not in pattern:
+            raise ParameterError(
+                f"{self._file}: {pattern!r} has no {FRAME}, expected a path such as 'lidar/{FRAME}.bin'"
+            )
+        self._safe(pattern.replace(FRAME, "frame"))
+        pattern = PurePath(pattern).as_posix()
+        before, *after = (re.escape(part) for part in pattern.split(FRAME))
+        shape = re.compile(before + "(?P<frame>[^/]+)" + "(?P=frame)".join(after))
+        found = glob.glob(glob.escape(pattern).replace(FRAME, "*"), root_dir=self.path)  # noqa: PTH207 - absolute ones
+        names = {matched["frame"]: path for path in found if (matched := shape.fullmatch(Path(path).as_posix()))}
+        return {name: self._safe(path) for name, path in sorted(names.items())}
+
+    def _one(self, pattern: str, name: str) -> Path:
+        return self._safe(pattern.replace(FRAME, name))
+
+    def _safe(self, name: str) -> Path:
+        return self.path / name if self._allow_outside else strictly_below(self.path, name, place=str(self._file))
+
+
+def _description_in(path: Path) -> Path:
+    return path / FILE if path.is_dir() else path
+
+
+def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:
+    name, *words = line.rsplit(None, 1) or [""]
+    try:
+        seconds = float("".join(words))
+    except ValueError:
+        seconds = math.nan
+    if not name or not math.isfinite(seconds):
+        raise CorruptFileError(f"{path}, line {number}: expected 'frame seconds', got {line!r}")
+    return name.strip(), seconds
+
+
+def _masks_of(path: Path) -> InstanceMasks:
+    if path.suffix == ".json":
+        return InstanceMasks.from_coco(path)
+    if path.suffix == ".npz":
+        return InstanceMasks.from_npz(path)
+    raise UnsupportedFormatError(f"{path}: cannot read {path.suffix!r} masks, expected .json or .npz")

@@ -1,0 +1,190 @@
+"""`ldls.toml`: what lies where in a plain folder of frames."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ldls.camera import Camera
+from ldls.distortion import Distortion
+from ldls.errors import CalibrationError, CorruptFileError, ParameterError
+
+FILE = "ldls.toml"
+TOP: dict[str, type] = {
+    "points": str, "columns": int, "stamps": str, "truth": str, "truth_format": str, "cameras": dict,
+}  # fmt: skip
+CAMERA: dict[str, type] = {
+    "images": str, "masks": str, "stamps": str, "calibration": str, "calibration_camera": int, "K": list,
+    "T_camera_lidar": list, "image_size": list, "distortion": dict,
+}  # fmt: skip
+DISTORTION: dict[str, type] = {"model": str, "coefficients": list}
+
+TEMPLATE = """\
+# Where the frames of this folder lie. {frame} stands for the name of a frame; paths are relative to this folder.
+points = "lidar/{frame}.bin"        # .bin (float32 rows) or .npy: x y z first, in metres
+columns = 4                         # floats a row of a .bin: 4 by default, 5 for .pcd.bin
+stamps = "lidar/stamps.txt"         # optional: lines `frame seconds`
+truth = "labels/{frame}.label"      # optional: any format that `ldls evaluate` reads
+truth_format = "semantic-kitti"     # only where the file's ending does not tell
+
+# one table a camera; its calibration inline ...
+[cameras.front]
+images = "front/{frame}.png"
+masks = "front_masks/{frame}.json"  # optional: COCO .json, or .npz of ldls
+stamps = "front/stamps.txt"         # optional
+image_size = [480, 640]             # optional: height, width in pixels; else that of each image
+K = [[525.0, 0.0, 319.5], [0.0, 525.0, 239.5], [0.0, 0.0, 1.0]]
+# lidar to camera: camera x right, y down, z forward
+T_camera_lidar = [
+    [0.0, -1.0, 0.0, 0.0],
+    [0.0, 0.0, -1.0, -0.1],
+    [1.0, 0.0, 0.0, -0.1],
+    [0.0, 0.0, 0.0, 1.0],
+]
+# "plumb_bob" k1 k2 p1 p2 k3, "rational_polynomial" (8 numbers), "equidistant" (4); leave it out for rectified images
+distortion = { model = "plumb_bob", coefficients = [-0.05, 0.01, 0.0, 0.0, 0.0] }
+
+# ... or by a KITTI file, one for all frames or, with {frame}, one a frame
+[cameras.left]
+images = "left/{frame}.png"
+calibration = "calib/{frame}.txt"
+calibration_camera = 2              # which P of the file; 2 by default
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraDescription:
+    """What ldls.toml says of a camera.
+
+    Attributes:
+        images: Pattern of its images.
+        masks: Pattern of their masks, if there are any.
+        stamps: File of their stamps, if there is one.
+        calibration: Pattern of KITTI calibration files, where the calibration is not inline.
+        number: Which camera of those files.
+        inline: The camera, where its calibration is inline.
+        image_size: (height, width) in pixels, where it is told.
+    """
+
+    images: str
+    masks: str | None
+    stamps: str | None
+    calibration: str | None
+    number: int
+    inline: Camera | None
+    image_size: tuple[int, int] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FolderDescription:
+    """What ldls.toml says.
+
+    Attributes:
+        points: Pattern of the sweeps.
+        columns: Floats a row of `.bin` files; None for the default.
+        stamps: File of the sweeps' stamps, if there is one.
+        truth: Pattern of the true labels, if there are any.
+        truth_format: Their format, where the ending does not tell.
+        cameras: Cameras by name.
+    """
+
+    points: str
+    columns: int | None
+    stamps: str | None
+    truth: str | None
+    truth_format: str | None
+    cameras: Mapping[str, CameraDescription]
+
+
+def read_description(path: Path) -> FolderDescription:
+    """What an ldls.toml says.
+
+    Raises:
+        CorruptFileError: It is no TOML.
+        ParameterError: A key is unknown, missing, or of another type.
+        CalibrationError: A camera cannot be.
+        FileNotFoundError: There is no such file.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise CorruptFileError(f"{path}: not a TOML file ({error})") from None
+    _check(str(path), content, TOP, needed=("points", "cameras"))
+    cameras = {name: _camera(f"{path}, cameras.{name}", each) for name, each in content["cameras"].items()}
+    if not cameras:
+        raise ParameterError(f"{path}: cameras: expected a table [cameras.NAME] or more")
+    return FolderDescription(
+        points=content["points"],
+        columns=content.get("columns"),
+        stamps=content.get("stamps"),
+        truth=content.get("truth"),
+        truth_format=content.get("truth_format"),
+        cameras=cameras,
+    )
+
+
+def template() -> str:
+    """A complete ldls.toml with every key, to be changed."""
+    return TEMPLATE
+
+
+def _camera(place: str, content: Any) -> CameraDescription:  # noqa: ANN401
+    _check(place, content, CAMERA, needed=("images",))
+    inline = [key for key in ("K", "T_camera_lidar", "distortion") if key in content]
+    by_file = [key for key in ("calibration", "calibration_camera") if key in content]
+    if inline and by_file:
+        raise ParameterError(f"{place}: has {', '.join(inline)} and {', '.join(by_file)}; expected one or the other")
+    if "calibration" not in content and not {"K", "T_camera_lidar"} <= content.keys():
+        raise ParameterError(f"{place}: has no calibration; expected K and T_camera_lidar, or calibration")
+    size = _image_size(place, content.get("image_size"))
+    return CameraDescription(
+        images=content["images"],
+        masks=content.get("masks"),
+        stamps=content.get("stamps"),
+        calibration=content.get("calibration"),
+        number=content.get("calibration_camera", 2),
+        inline=_inline(place, content, size) if inline else None,
+        image_size=size,
+    )
+
+
+def _inline(place: str, content: Mapping[str, Any], size: tuple[int, int] | None) -> Camera:
+    distortion = content.get("distortion", {})
+    _check(f"{place}.distortion", distortion, DISTORTION, needed=())
+    try:
+        return Camera(
+            projection=content["K"],
+            T_camera_lidar=content["T_camera_lidar"],
+            image_size=size,
+            distortion=Distortion(distortion.get("model", "none"), tuple(distortion.get("coefficients", ()))),
+        )
+    except CalibrationError as error:
+        raise CalibrationError(f"{place}: {error}") from None
+
+
+def _image_size(place: str, size: list[Any] | None) -> tuple[int, int] | None:
+    if size is None:
+        return None
+    if len(size) != 2 or not all(isinstance(side, int) and side > 0 for side in size):
+        raise ParameterError(f"{place}: image_size is {size}, expected [height, width] in pixels")
+    return size[0], size[1]
+
+
+def _check(place: str, content: Any, keys: Mapping[str, type], *, needed: tuple[str, ...]) -> None:  # noqa: ANN401
+    if not isinstance(content, dict):
+        raise ParameterError(f"{place}: expected a table, got {content!r}")
+    for key, value in content.items():
+        if key not in keys:
+            close = difflib.get_close_matches(key, keys, n=1)
+            hint = f"; did you mean {close[0]}?" if close else ""
+            raise ParameterError(f"{place}: unknown key {key!r}, expected {', '.join(keys)}{hint}")
+        if type(value) is not keys[key]:
+            expected = {str: "a text", int: "a whole number", list: "a list", dict: "a table"}[keys[key]]
+            raise ParameterError(f"{place}: {key} is {value!r}, expected {expected}")
+    missing = [key for key in needed if key not in content]
+    if missing:
+        raise ParameterError(f"{place}: lacks {', '.join(missing)}; found {', '.join(content) or 'nothing'}")

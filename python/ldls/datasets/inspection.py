@@ -1,0 +1,174 @@
+"""Whether the frames of a source look sound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.camera import Camera
+from ldls.datasets.frame import CameraImage, Frame, Source
+from ldls.errors import LdlsError
+from ldls.stages import project
+
+LEAST_IN_VIEW = 0.01
+"""Share of points below which a camera hardly sees the cloud: most calibrations that are wrong lead there."""
+LARGEST_OFFSET_S = 0.1
+"""An image farther from its sweep than this is of another turn of the lidar."""
+LARGEST_GAP = 2.5
+"""Gaps are longer than this many times the median time between frames."""
+FAN_DEG = np.arange(-89.9, 89.95, 0.1)
+FAN_RANGE_M = 10_000.0
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a frame, or a source, that is not as it should be.
+
+    Attributes:
+        frame: Name of the frame; empty where it is about the source.
+        what: What was found.
+        broken: Whether it makes the frame useless; otherwise it is worth a look.
+    """
+
+    frame: str
+    what: str
+    broken: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameFacts:
+    """What one frame holds.
+
+    Attributes:
+        name: Name of the frame.
+        n_points: Its points.
+        in_view: Share of the points that each camera sees, by its name.
+        offsets_s: How much later than the sweep each image was taken, in seconds, where both stamps are known.
+        truth: Points of each class that truth has; None without truth.
+        findings: What is not as it should be.
+    """
+
+    name: str
+    n_points: int = 0
+    in_view: Mapping[str, float] = field(default_factory=dict)
+    offsets_s: Mapping[str, float] = field(default_factory=dict)
+    truth: Mapping[str, int] | None = None
+    findings: tuple[Finding, ...] = ()
+
+
+def sample(count: int, wanted: int) -> list[int]:
+    """Up to `wanted` of the numbers below `count`: the first, the last, and some evenly between."""
+    return sorted({round(at) for at in np.linspace(0, count - 1, min(count, wanted)).tolist()})
+
+
+def inspect(source: Source, index: int) -> FrameFacts:
+    """What a frame holds and what is wrong with it; a frame that cannot be read is a finding, not an error."""
+    name = source.names[index]
+    try:
+        frame = source[index]
+    except (LdlsError, OSError) as error:
+        return FrameFacts(name=name, findings=(Finding(name, str(error), broken=True),))
+    shares = {image.name: in_view(frame, image) for image in frame.images}
+    offsets = {i.name: i.stamp - frame.stamp for i in frame.images if None not in (i.stamp, frame.stamp)}
+    return FrameFacts(
+        name=name,
+        n_points=len(frame.points),
+        in_view=shares,
+        offsets_s=offsets,
+        truth=None if frame.truth is None else {n: c for n, c in frame.truth.counts().items() if c},
+        findings=(
+            *_of_cloud(frame),
+            *(found for image in frame.images for found in _of_image(frame, image)),
+            *_of_views(name, shares if len(frame.points) else {}),
+            *_of_offsets(name, offsets),
+        ),
+    )
+
+
+def in_view(frame: Frame, image: CameraImage) -> float:
+    """Share of the frame's points that the camera sees; 0 of none."""
+    if not len(frame.points) or image.camera.image_size is None:
+        return 0.0
+    return len(project(frame.points, image.camera, image_size=image.camera.image_size)[0]) / len(frame.points)
+
+
+def check_stamps(names: Sequence[str], stamps: Sequence[float | None]) -> list[Finding]:
+    """Gaps and steps back between the frames that have stamps."""
+    known = [(name, stamp) for name, stamp in zip(names, stamps, strict=True) if stamp is not None]
+    steps = np.diff([stamp for _, stamp in known])
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    findings = []
+    for (before, _), (name, _), step in zip(known, known[1:], steps.tolist(), strict=False):
+        if not step > 0:
+            findings.append(Finding(name, f"its stamp is {-step:.3f} s before that of {before}", broken=True))
+        elif step > LARGEST_GAP * usual:
+            findings.append(Finding(name, f"{step:.3f} s after {before}, frames are {usual:.3f} s apart", broken=False))
+    return findings
+
+
+def field_of_view_deg(camera: Camera) -> tuple[float, float]:
+    """Angles that the camera sees across and down the middle of its image, in degrees, by its own projection."""
+    return _angle_deg(camera, 0), _angle_deg(camera, 1)
+
+
+def classes_of(facts: Iterable[FrameFacts]) -> dict[str, int]:
+    """Points of each class of the truth over all frames, the most frequent first."""
+    counts: dict[str, int] = {}
+    for found in facts:
+        for name, count in (found.truth or {}).items():
+            counts[name] = counts.get(name, 0) + count
+    return dict(sorted(counts.items(), key=lambda pair: -pair[1]))
+
+
+def _angle_deg(camera: Camera, axis: int) -> float:
+    """Extent of the rays across (axis 0) or down (1) that the image shows; rays lie in a plane through the axis."""
+    angles = np.radians(FAN_DEG)
+    rays = np.zeros((len(angles), 4))
+    rays[:, axis], rays[:, 2], rays[:, 3] = FAN_RANGE_M * np.sin(angles), FAN_RANGE_M * np.cos(angles), 1
+    points = (rays @ np.linalg.inv(camera.T_camera_lidar).T)[:, :3]
+    if camera.image_size is None:
+        return 0.0
+    seen: NDArray[np.float64] = FAN_DEG[project(points, camera, image_size=camera.image_size)[0]]
+    return float(np.ptp(seen)) if len(seen) else 0.0
+
+
+def _of_cloud(frame: Frame) -> list[Finding]:
+    if not len(frame.points):
+        return [Finding(frame.name, "its cloud is empty", broken=True)]
+    finite = np.isfinite(frame.points[:, :3]).all(axis=1)
+    if not finite.any():
+        return [Finding(frame.name, f"none of its {len(finite):,} points is finite", broken=True)]
+    if not finite.all():
+        return [Finding(frame.name, f"{1 - finite.mean():.1%} of its points are not finite", broken=False)]
+    return []
+
+
+def _of_image(frame: Frame, image: CameraImage) -> list[Finding]:
+    try:
+        shape = image.read().shape
+    except (LdlsError, OSError) as error:
+        return [Finding(frame.name, f"{image.name}: {error}", broken=True)]
+    expected = image.camera.image_size
+    if expected is not None and shape[:2] != tuple(expected):
+        what = f"{image.name}: image is {shape[0]} x {shape[1]}, its calibration is for {expected[0]} x {expected[1]}"
+        return [Finding(frame.name, f"{what} (height x width)", broken=True)]
+    return []
+
+
+def _of_views(name: str, shares: Mapping[str, float]) -> list[Finding]:
+    return [
+        Finding(name, f"{camera}: sees {share:.2%} of the points; wrong calibration?", broken=share == 0)
+        for camera, share in shares.items()
+        if not share >= LEAST_IN_VIEW
+    ]
+
+
+def _of_offsets(name: str, offsets: Mapping[str, float]) -> list[Finding]:
+    return [
+        Finding(name, f"{camera}: taken {offset:+.3f} s from the sweep", broken=False)
+        for camera, offset in offsets.items()
+        if not abs(offset) <= LARGEST_OFFSET_S
+    ]

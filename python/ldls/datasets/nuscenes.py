@@ -1,0 +1,150 @@
+"""nuScenes: key frames of six cameras and a lidar, by the tables of the data set.
+
+FOLDER/v1.0-mini/*.json, FOLDER/samples/LIDAR_TOP, FOLDER/samples/CAM_FRONT and so on; for truth FOLDER/panoptic or
+FOLDER/lidarseg with their tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from ldls.camera import Camera
+from ldls.cloud import Points
+from ldls.datasets import nuscenes_tables as tables
+from ldls.datasets.files import warn_left_out
+from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.nuscenes_tables import Reading
+from ldls.datasets.truth import of_points
+from ldls.errors import SourceError
+from ldls.evaluation import Labeling, read_lidarseg, read_panoptic
+from ldls.io import read_points
+from ldls.io.images import read_image
+from ldls.io.safe_paths import below
+
+LIDAR = "LIDAR_TOP"
+CAMERAS = ("CAM_FRONT", "CAM_FRONT_RIGHT", "CAM_BACK_RIGHT", "CAM_BACK", "CAM_BACK_LEFT", "CAM_FRONT_LEFT")
+COLUMNS = 5
+TRUTHS = {"panoptic": read_panoptic, "lidarseg": read_lidarseg}
+"""Readers of the tables of truth, the one with instances first."""
+
+
+class NuScenesSource:
+    """The key frames of one scene of nuScenes, or of all.
+
+    The car moves between the stamps of sweep and images; each camera's transform contains that.
+
+    Attributes:
+        kind: "nuscenes".
+        path: Folder of the data set.
+        names: Scene and number of each frame in it, as "scene-0061_007"; scenes in the order of their time.
+        stamps: Times of the sweeps in seconds since 1970.
+        left_out: What frames lack that have only some of their files, by name.
+    """
+
+    kind = "nuscenes"
+    looks_for = "v1.0-*/sample_data.json"
+
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        *,
+        scene: str | None = None,
+        version: str | None = None,
+        truth: bool = True,
+    ) -> None:
+        """Read the tables, a row at a time; what is kept is some 6 kB a frame.
+
+        Args:
+            path: Folder of the data set.
+            scene: Name of a scene, as "scene-0061"; all of them without it.
+            version: Name of the tables' folder, as "v1.0-mini", if there are several.
+            truth: Whether frames have their truth, where it is there.
+
+        Raises:
+            SourceError: A table is missing, no frame is whole, or there is no such scene.
+            FileFormatError: A table is broken.
+            CalibrationError: A pose is none.
+            UnsafePathError: A table names a file out of the folder.
+            FileNotFoundError: There is no such folder.
+        """
+        self.path = Path(path)
+        folder = tables.find_tables(self.path, version)
+        samples = tables.read_sample_names(folder, scene)
+        self._sensors = tables.read_sensors(folder, (LIDAR, *CAMERAS))
+        readings = tables.read_readings(folder, samples, self._sensors)
+        missing = _missing(self.path, readings)
+        self.left_out = {samples[token]: f"no {' and no '.join(what)}" for token, what in missing.items()}
+        warn_left_out(self.path, list(self.left_out.values()), len(samples))
+        self.names = tuple(name for token, name in samples.items() if token not in missing)
+        if not self.names:
+            raise SourceError(f"{self.path}: none of {len(samples)} key frames has all its files in samples/")
+        self._frames = tuple(readings[token] for token in samples if token not in missing)
+        self.stamps: tuple[float | None, ...] = tuple(frame[LIDAR].stamp_us / 1e6 for frame in self._frames)
+        self._poses = tables.read_poses(folder, {taken.pose for frame in self._frames for taken in frame.values()})
+        sweeps = {frame[LIDAR].token for frame in self._frames} if truth else set()
+        self._truths = {name: tables.read_truth_files(folder, name, sweeps) for name in TRUTHS}
+
+    @classmethod
+    def recognises(cls, path: Path) -> bool:
+        """Whether `path` looks like nuScenes."""
+        return any(path.glob("v1.0-*/sample_data.json"))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __getitem__(self, index: int) -> Frame:
+        frame = self._frames[index]
+        sweep = frame[LIDAR]
+        points = read_points(self._file(sweep.filename), columns=COLUMNS)
+        return Frame(
+            name=self.names[index],
+            points=points,
+            stamp=self.stamps[index],
+            images=tuple(self._image(channel, frame[channel], sweep) for channel in CAMERAS),
+            truth=self._read_truth(sweep.token, points),
+        )
+
+    def _image(self, channel: str, taken: Reading, sweep: Reading) -> CameraImage:
+        path = self._file(taken.filename)
+        sensor, lidar = self._sensors[taken.sensor], self._sensors[sweep.sensor]
+        T_global_lidar = self._poses[sweep.pose] @ lidar.T_ego_sensor
+        T_global_camera = self._poses[taken.pose] @ sensor.T_ego_sensor
+        camera = Camera(
+            projection=sensor.intrinsic,
+            T_camera_lidar=np.linalg.inv(T_global_camera) @ T_global_lidar,
+            image_size=taken.size,
+        )
+        return CameraImage(
+            name=channel, camera=camera, read=partial(read_image, path), stamp=taken.stamp_us / 1e6, path=path
+        )
+
+    def _read_truth(self, sweep: str, points: Points) -> Labeling | None:
+        for name, read in TRUTHS.items():
+            if sweep in self._truths[name]:
+                path = self._file(self._truths[name][sweep])
+                return of_points(read(path), points, path)
+        return None
+
+    def _file(self, name: str) -> Path:
+        return below(self.path, name, place=f"{self.path}, tables")
+
+
+def _missing(path: Path, readings: Mapping[str, Mapping[str, Reading]]) -> dict[str, list[str]]:
+    """Channels that a sample lacks, by its token; folders are listed once, for there may be 240,000 files."""
+    names = {taken.filename for frame in readings.values() for taken in frame.values()}
+    there = _listed(path, {str(Path(name).parent) for name in names})
+    lacks = {
+        token: [c for c in (LIDAR, *CAMERAS) if c not in frame or str(Path(frame[c].filename)) not in there]
+        for token, frame in readings.items()
+    }
+    return {token: channels for token, channels in lacks.items() if channels}
+
+
+def _listed(path: Path, folders: Iterable[str]) -> set[str]:
+    found = [below(path, folder, place=f"{path}, tables") for folder in folders]
+    return {str(child.relative_to(path)) for folder in found if folder.is_dir() for child in folder.iterdir()}

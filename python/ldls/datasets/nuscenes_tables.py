@@ -1,0 +1,212 @@
+"""The tables of nuScenes: what each sensor took for a key frame, and where the car and its sensors were.
+
+Tables are read a row at a time; only rows of the key frames that are wanted are kept.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls.datasets.files import choose, some
+from ldls.errors import CalibrationError, CorruptFileError, SourceError
+from ldls.io.json_rows import read_json_rows
+
+TABLES = ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")
+UNIT_SLACK = 1e-3
+"""How far the length of a rotation's quaternion may be from 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What one sensor took for a key frame.
+
+    Attributes:
+        token: Its token in sample_data.
+        filename: Its file, below the folder of the data set.
+        stamp_us: When it was taken, in microseconds since 1970.
+        sensor: Token of its calibrated sensor.
+        pose: Token of the car's pose then.
+        size: (height, width) of an image in pixels.
+    """
+
+    token: str
+    filename: str
+    stamp_us: int
+    sensor: str
+    pose: str
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CalibratedSensor:
+    """A sensor on a car.
+
+    Attributes:
+        channel: Its name, as "CAM_FRONT".
+        T_ego_sensor: (4, 4) from the sensor's frame to the car's.
+        intrinsic: (3, 3) matrix K of a camera; empty for others.
+    """
+
+    channel: str
+    T_ego_sensor: NDArray[np.float64]
+    intrinsic: NDArray[np.float64]
+
+
+def find_tables(path: Path, version: str | None) -> Path:
+    """Folder of the tables.
+
+    Raises:
+        SourceError: There is none, there are several, or one lacks a table.
+        FileNotFoundError: There is no folder `path`.
+    """
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: there is no such folder")
+    found = sorted(table.parent.name for table in path.glob("v1.0-*/sample_data.json"))
+    tables = path / choose(path, "version", found, version)
+    missing = [name for name in TABLES if not (tables / f"{name}.json").is_file()]
+    if missing:
+        there = some(sorted(table.name for table in tables.glob("*.json")))
+        raise SourceError(f"{tables}: has no {', '.join(f'{name}.json' for name in missing)}; found {there}")
+    return tables
+
+
+def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
+    """Names of the samples of a scene, or of all scenes, by token: scene and number, in the order of their time.
+
+    Raises:
+        SourceError: There is no such scene.
+        CorruptFileError: A table is broken.
+    """
+    names = {row["token"]: row["name"] for row in _rows(tables, "scene", ("token", "name"))}
+    if scene is not None:
+        choose(tables, "scene", sorted(names.values()), scene)
+    samples: dict[str, list[tuple[int, str]]] = defaultdict(list)
+    for row in _rows(tables, "sample", ("token", "scene_token", "timestamp")):
+        name = names.get(row["scene_token"])
+        if name is not None and scene in (None, name):
+            samples[name].append((row["timestamp"], row["token"]))
+    in_order = sorted((sorted(found), name) for name, found in samples.items())
+    return {token: f"{name}_{number:03d}" for found, name in in_order for number, (_, token) in enumerate(found)}
+
+
+def read_sensors(tables: Path, channels: tuple[str, ...]) -> dict[str, CalibratedSensor]:
+    """The calibrated sensors of the wanted channels, by token.
+
+    Raises:
+        CalibrationError: A pose is none.
+        CorruptFileError: A table is broken.
+    """
+    named = {row["token"]: row["channel"] for row in _rows(tables, "sensor", ("token", "channel"))}
+    keys = ("token", "sensor_token", "translation", "rotation", "camera_intrinsic")
+    return {
+        row["token"]: CalibratedSensor(
+            named[row["sensor_token"]],
+            _transform(f"{tables / 'calibrated_sensor.json'}, {row['token']}", row),
+            np.array(row["camera_intrinsic"], np.float64),
+        )
+        for row in _rows(tables, "calibrated_sensor", keys)
+        if named.get(row["sensor_token"]) in channels
+    }
+
+
+def read_readings(
+    tables: Path, samples: Mapping[str, str], sensors: Mapping[str, CalibratedSensor]
+) -> dict[str, dict[str, Reading]]:
+    """What each of `sensors` took for the key frames `samples`: by sample and channel.
+
+    Raises:
+        CorruptFileError: The table is broken.
+    """
+    found: dict[str, dict[str, Reading]] = {token: {} for token in samples}
+    sizes: dict[tuple[int, int], tuple[int, int]] = {}
+    own = {token: token for token in sensors}
+    keys = ("token", "sample_token", "is_key_frame", "calibrated_sensor_token", "ego_pose_token", "filename",
+            "timestamp", "height", "width")  # fmt: skip
+    for row in _rows(tables, "sample_data", keys):
+        sensor = own.get(row["calibrated_sensor_token"])
+        if not row["is_key_frame"] or sensor is None or row["sample_token"] not in found:
+            continue
+        size = (row["height"] or 0, row["width"] or 0)
+        found[row["sample_token"]][sensors[sensor].channel] = Reading(
+            token=row["token"],
+            filename=row["filename"],
+            stamp_us=row["timestamp"],
+            sensor=sensor,
+            pose=row["ego_pose_token"],
+            size=sizes.setdefault(size, size),
+        )
+    return found
+
+
+def read_poses(tables: Path, tokens: set[str]) -> dict[str, NDArray[np.float64]]:
+    """(4, 4) T_global_ego of each pose that is wanted.
+
+    Raises:
+        CalibrationError: One is no pose.
+        CorruptFileError: The table is broken, or lacks one.
+    """
+    rows = _rows(tables, "ego_pose", ("token", "translation", "rotation"))
+    path = tables / "ego_pose.json"
+    poses = {row["token"]: _transform(f"{path}, {row['token']}", row) for row in rows if row["token"] in tokens}
+    if len(poses) < len(tokens):
+        raise CorruptFileError(f"{path}: lacks {len(tokens) - len(poses)} of {len(tokens)} poses of sample_data.json")
+    return poses
+
+
+def read_truth_files(tables: Path, name: str, tokens: set[str]) -> dict[str, str]:
+    """Files of the table `name`, "lidarseg" or "panoptic", by the sweeps `tokens` that they label; empty without it.
+
+    Raises:
+        CorruptFileError: The table is broken.
+    """
+    if not (tables / f"{name}.json").is_file():
+        return {}
+    rows = _rows(tables, name, ("sample_data_token", "filename"))
+    return {row["sample_data_token"]: row["filename"] for row in rows if row["sample_data_token"] in tokens}
+
+
+def rotation_matrix(place: str, quaternion: ArrayLike) -> NDArray[np.float64]:
+    """(3, 3) rotation of a unit quaternion w x y z.
+
+    Raises:
+        CalibrationError: Its length is not 1.
+    """
+    numbers = np.asarray(quaternion, np.float64)
+    length = float(np.linalg.norm(numbers))
+    if numbers.shape != (4,) or not abs(length - 1) <= UNIT_SLACK:
+        raise CalibrationError(f"{place}: rotation {numbers.tolist()} has length {length:.4g}, expected w x y z of 1")
+    w, x, y, z = numbers / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _transform(place: str, row: Mapping[str, Any]) -> NDArray[np.float64]:
+    translation = np.asarray(row["translation"], np.float64)
+    if translation.shape != (3,) or not np.isfinite(translation).all():
+        raise CalibrationError(f"{place}: translation {row['translation']}, expected three finite numbers")
+    transform = np.eye(4)
+    transform[:3, :3] = rotation_matrix(place, row["rotation"])
+    transform[:3, 3] = translation
+    return transform
+
+
+def _rows(tables: Path, name: str, keys: tuple[str, ...]) -> Iterator[dict[str, Any]]:
+    """The rows of a table, each with all of `keys`."""
+    path = tables / f"{name}.json"
+    for number, row in enumerate(read_json_rows(path), start=1):
+        if not row.keys() >= set(keys):
+            missing = ", ".join(key for key in keys if key not in row)
+            raise CorruptFileError(f"{path}, row {number}: lacks {missing}")
+        yield row

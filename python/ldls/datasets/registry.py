@@ -1,0 +1,101 @@
+"""Every kind of source, and which one a path is."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from os import PathLike
+from pathlib import Path
+from typing import Any, Protocol
+
+from ldls.datasets.folder import FolderSource
+from ldls.datasets.frame import Source
+from ldls.datasets.kitti_object import KittiObjectSource
+from ldls.datasets.kitti_odometry import KittiOdometrySource
+from ldls.datasets.kitti_raw import KittiRawSource
+from ldls.datasets.nuscenes import NuScenesSource
+from ldls.datasets.nuscenes_frame import NuScenesFrameSource
+from ldls.errors import ParameterError, SourceError
+
+
+class SourceClass(Protocol):
+    """A class of sources.
+
+    Attributes:
+        kind: Its name in the registry.
+        looks_for: What a path must have to be one, for messages.
+    """
+
+    kind: str
+    looks_for: str
+
+    def __call__(self, *args: Any, **options: Any) -> Source:  # noqa: ANN401
+        """Open a path."""
+        ...
+
+    def recognises(self, path: Path) -> bool:
+        """Whether a path looks like one; reads nothing but names."""
+        ...
+
+
+SOURCES: dict[str, SourceClass] = {
+    "kitti-object": KittiObjectSource,
+    "kitti-raw": KittiRawSource,
+    "kitti-odometry": KittiOdometrySource,
+    "nuscenes": NuScenesSource,
+    "nuscenes-frame": NuScenesFrameSource,
+    "folder": FolderSource,
+}
+"""Classes of sources by kind."""
+
+
+def open_source(path: str | PathLike[str], *, kind: str | None = None, **options: Any) -> Source:  # noqa: ANN401
+    """The source of frames at a path.
+
+    Args:
+        path: A folder, or a file such as a bag.
+        kind: One of `SOURCES`; by default the only one that recognises the path.
+        options: Those of the kind's class, as `camera` or `scene`.
+
+    Raises:
+        SourceError: No kind recognises the path, or several do, or the source is not whole.
+        ParameterError: There is no such kind or option.
+        FileNotFoundError: There is nothing at the path.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: there is no such file or folder")
+    if kind is not None and kind not in SOURCES:
+        raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(SOURCES)}{_nearest(kind, list(SOURCES))}")
+    source = SOURCES[guess_kind(path) if kind is None else kind]
+    _check_options(source, options)
+    return source(path, **options)
+
+
+def guess_kind(path: Path) -> str:
+    """The only kind that recognises a path.
+
+    Raises:
+        SourceError: None does, or several do; the message lists the kinds and what they look for.
+    """
+    found = [kind for kind, source in SOURCES.items() if source.recognises(path)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        what = "; ".join(f"{kind} ({SOURCES[kind].looks_for})" for kind in found)
+        raise SourceError(f"{path}: may be {what}; say which by kind= or --dataset")
+    what = "; ".join(f"{kind} ({source.looks_for})" for kind, source in SOURCES.items())
+    raise SourceError(f"{path}: is no source of frames; looked for {what}")
+
+
+def _check_options(source: SourceClass, options: dict[str, Any]) -> None:
+    known = [p.name for p in inspect.signature(source).parameters.values() if p.kind == p.KEYWORD_ONLY]
+    for name in options:
+        if name not in known:
+            there = f"expected {', '.join(known)}" if known else "expected none"
+            raise ParameterError(f"{name}: {source.kind} has no such option, {there}{_nearest(name, known)}")
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    return f"; did you mean {close[0]}?" if close else ""
