@@ -63,7 +63,9 @@ def info(
     cameras = camera_table(found, facts)
     if cameras is not None:
         screen.print(cameras)
-    screen.print(finding_table(findings) if findings else f"{len(facts)} frames looked at, nothing found")
+    screen.print(
+        finding_table(findings) if findings else f"looked at {len(facts)} of {len(found)} frames, found nothing wrong"
+    )
     if picture is not None:
         write_picture(chosen_frame(found, frame), picture)
         screen.print(f"wrote {picture}", highlight=False, soft_wrap=True)
@@ -101,18 +103,18 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
 
     table = Table(title=str(source.path), show_header=False)
     table.add_row("kind", source.kind)
-    table.add_row("frames", f"{len(source):,} ({source.names[0]} to {source.names[-1]})")
+    table.add_row("frames", f"{len(source):,} ({_range(source.names[0], source.names[-1])})")
     left_out = Counter(getattr(source, "left_out", {}).values())
     if left_out:
         why = ", ".join(f"{count:,} {reason}" for reason, count in left_out.most_common())
         table.add_row("left out", f"{left_out.total():,} ({why})")
     table.add_row("time", _time(stamps))
     counts = [found.n_points for found in facts if found.n_points] or [0]
-    table.add_row("points a frame", f"{sum(counts) / len(counts):,.0f} ({min(counts):,} to {max(counts):,})")
+    table.add_row("points a frame", _range(f"{min(counts):,}", f"{max(counts):,}"))
     classes = classes_of(facts)
     labelled = sum(found.truth is not None for found in facts)
     named = ", ".join(f"{name} {count:,}" for name, count in classes.items())
-    table.add_row("truth", f"{labelled} of {len(facts)} frames looked at: {named}" if labelled else "none")
+    table.add_row("truth", f"points in {labelled} of {len(facts)} frames: {named}" if labelled else "none")
     return table
 
 
@@ -125,8 +127,9 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
     whole = next((found for found in facts if found.in_view), None)
     if whole is None:
         return None
-    table = Table(title=f"cameras, over {len(facts)} frames")
-    for heading in ("camera", "height x width", "distortion", "sees across x down", "points in view", "from the sweep"):
+    table = Table(title="cameras")
+    headings = ("camera", "height x width", "distortion", "view in degrees", "points in view", "s from sweep")
+    for heading in headings:
         table.add_column(heading)
     for image in source[source.names.index(whole.name)].images:
         across, down = field_of_view_deg(image.camera)
@@ -137,9 +140,9 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
             image.name,
             f"{height} x {width}",
             image.camera.distortion.model,
-            f"{across:.0f} x {down:.0f} degrees",
-            f"{min(shares):.1%} to {max(shares):.1%}",
-            f"{min(offsets):+.3f} to {max(offsets):+.3f} s" if offsets else "-",
+            f"{across:.0f} x {down:.0f}",
+            _range(f"{min(shares):.1%}", f"{max(shares):.1%}"),
+            _range(f"{min(offsets):+.3f}", f"{max(offsets):+.3f}") if offsets else "-",
         )
     return table
 
@@ -195,6 +198,10 @@ def _value(text: str) -> str | int | bool | tuple[int, ...]:
     # 08 names a sequence, 8 is a number
     padded = len(parts) == 1 and len(text) > 1 and text.startswith("0")
     return text if padded else int(text) if len(parts) == 1 else tuple(map(int, parts))
+
+
+def _range(low: str, high: str) -> str:
+    return low if low == high else f"{low} to {high}"
 
 
 def _time(stamps: Sequence[float | None]) -> str:

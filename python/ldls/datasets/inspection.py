@@ -72,7 +72,8 @@ def inspect(source: Source, index: int) -> FrameFacts:
     except (LdlsError, OSError) as error:
         return FrameFacts(name=name, findings=(Finding(name, str(error), broken=True),))
     shares = {image.name: in_view(frame, image) for image in frame.images}
-    offsets = {i.name: i.stamp - frame.stamp for i in frame.images if None not in (i.stamp, frame.stamp)}
+    began = frame.stamp
+    offsets = {i.name: i.stamp - began for i in frame.images if i.stamp is not None and began is not None}
     return FrameFacts(
         name=name,
         n_points=len(frame.points),
@@ -138,7 +139,7 @@ def _angle_deg(camera: Camera, axis: int) -> float:
 def _of_cloud(frame: Frame) -> list[Finding]:
     if not len(frame.points):
         return [Finding(frame.name, "its cloud is empty", broken=True)]
-    finite = np.isfinite(frame.points[:, :3]).all(axis=1)
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(frame.points[:, :3]).all(axis=1))
     if not finite.any():
         return [Finding(frame.name, f"none of its {len(finite):,} points is finite", broken=True)]
     if not finite.all():

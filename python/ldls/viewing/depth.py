@@ -41,7 +41,8 @@ def depth_colours(depth_m: NDArray[np.float64]) -> NDArray[np.uint8]:
     place = np.log(np.clip(depth_m, NEAR_M, FAR_M) / NEAR_M) / np.log(FAR_M / NEAR_M)
     hue = 4.8 * place[:, None]  # sixths of the circle: 0 red, 2 green, 4 blue
     distance = np.abs((hue - [0, 2, 4] + 3) % 6 - 3)
-    return np.round(255 * np.clip(2 - distance, 0, 1)).astype(np.uint8)
+    colours: NDArray[np.uint8] = np.round(255 * np.clip(2 - distance, 0, 1)).astype(np.uint8)
+    return colours
 
 
 def _tile(image: NDArray[np.uint8], points: Points, camera: Camera, width: int) -> Image.Image:
