@@ -97,13 +97,14 @@ def stamps_of(source: Source) -> tuple[float | None, ...]:
 
 def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[float | None]) -> Table:
     """Kind, frames, time, points and truth."""
+    from rich.markup import escape
     from rich.table import Table
 
     from ldls.datasets.inspection import classes_of
 
-    table = Table(title=str(source.path), show_header=False)
+    table = Table(title=escape(str(source.path)), show_header=False)
     table.add_row("kind", source.kind)
-    table.add_row("frames", f"{len(source):,} ({_range(source.names[0], source.names[-1])})")
+    table.add_row("frames", escape(f"{len(source):,} ({_range(source.names[0], source.names[-1])})"))
     left_out = Counter(getattr(source, "left_out", {}).values())
     if left_out:
         why = ", ".join(f"{count:,} {reason}" for reason, count in left_out.most_common())
@@ -114,12 +115,13 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
     classes = classes_of(facts)
     labelled = sum(found.truth is not None for found in facts)
     named = ", ".join(f"{name} {count:,}" for name, count in classes.items())
-    table.add_row("truth", f"points in {labelled} of {len(facts)} frames: {named}" if labelled else "none")
+    table.add_row("truth", escape(f"points in {labelled} of {len(facts)} frames: {named}") if labelled else "none")
     return table
 
 
 def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
     """A row for each camera of the first frame that was read; None where none was."""
+    from rich.markup import escape
     from rich.table import Table
 
     from ldls.datasets.inspection import field_of_view_deg
@@ -137,7 +139,7 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
         offsets = [found.offsets_s[image.name] for found in facts if image.name in found.offsets_s]
         height, width = image.camera.image_size or (0, 0)
         table.add_row(
-            image.name,
+            escape(image.name),
             f"{height} x {width}",
             image.camera.distortion.model,
             f"{across:.0f} x {down:.0f}",
@@ -149,6 +151,7 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
 
 def finding_table(findings: Sequence[Finding]) -> Table:
     """What was found, the broken first."""
+    from rich.markup import escape
     from rich.table import Table
 
     broken = sum(finding.broken for finding in findings)
@@ -157,7 +160,7 @@ def finding_table(findings: Sequence[Finding]) -> Table:
         table.add_column(heading, overflow="fold")
     in_order = sorted(findings, key=lambda finding: not finding.broken)
     for finding in in_order[:SHOWN]:
-        table.add_row("broken" if finding.broken else "look", finding.frame, finding.what)
+        table.add_row("broken" if finding.broken else "look", escape(finding.frame), escape(finding.what))
     if len(findings) > SHOWN:
         table.add_row("", "", f"and {len(findings) - SHOWN:,} more")
     return table

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -41,6 +42,13 @@ class CameraName(StrEnum):
     RING = "ring"
 
 
+class Layout(StrEnum):
+    """How frames lie in folders."""
+
+    KITTI = "kitti"
+    KITTI_RAW = "kitti-raw"
+
+
 @speaks_plainly
 def simulate(
     out: Annotated[Path, typer.Argument(help="Folder for the frames; made if need be.", file_okay=False)],
@@ -52,6 +60,10 @@ def simulate(
         CameraName,
         typer.Option(help="KITTI's 1242 x 375, a robot's 640 x 480, or a ring of six of 1600 x 900."),
     ] = CameraName.KITTI,
+    layout: Annotated[
+        Layout,
+        typer.Option(help="Single scenes as KITTI's object data, or one drive through a scene as KITTI's raw data."),
+    ] = Layout.KITTI,
     suite: Annotated[
         SuitePart | None,
         typer.Option(
@@ -70,21 +82,28 @@ def simulate(
     JSON: what a segmenter would find) and annotations (`instance class`, a line a point, `0 background` for none).
     A ring's other cameras go to image_ring_1 to image_ring_5, with calib_ring_K and masks_ring_K.
 
-    A seed is a frame: the same one gives the same files. Frames that are there already are kept.
+    With --layout kitti-raw the frames are a drive, ten a second, through the scene of the seed: folder
+    DATE/DATE_drive_NNNN_sync with velodyne_points, image_02, masks_02 and annotations; the calibration is in DATE.
+
+    A seed is a frame, or a drive: the same one gives the same files. Frames that are there already are kept.
     Needs the extra `sim` of ldls.
 
     Example: ldls simulate scenes --frames 5 --scene campus, and then ldls segment
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt
     --masks scenes/training/masks/000000.json --out results
     """
-    orders = _suite_orders(suite, errors) if suite else _orders(frames, seed, scene, lidar, camera, errors)
-    summaries = _make(out, orders, processes)
+    if layout is Layout.KITTI_RAW:
+        where, total, making = _drive(out, suite, frames, seed, scene, lidar, camera, errors, processes)
+    else:
+        orders = _suite_orders(suite, errors) if suite else _orders(frames, seed, scene, lidar, camera, errors)
+        where, total, making = out / "training", len(orders), _frames(out, orders, processes)
+    summaries = _followed(making, total)
     screen = console()
     made = [s for s in summaries if s is not None]
     if made:
         screen.print(summary_table(made))
     kept = len(summaries) - len(made)
-    screen.print(f"wrote {len(made)} frames to {out / 'training'}", highlight=False, soft_wrap=True)
+    screen.print(f"wrote {len(made)} frames to {where}", highlight=False, soft_wrap=True)
     if kept:
         screen.print(f"kept {kept} that were there; delete them to make them anew", highlight=False)
 
@@ -133,10 +152,41 @@ def _suite_orders(part: SuitePart, errors: bool) -> list[FrameOrder]:
     return suite_orders(part.value)
 
 
-def _make(out: Path, orders: list[FrameOrder], processes: int) -> list[FrameSummary | None]:
-    from rich.progress import track
+def _drive(
+    out: Path,
+    suite: SuitePart | None,
+    frames: int,
+    seed: int,
+    scene: SceneKind,
+    lidar: LidarName,
+    camera: CameraName,
+    errors: bool,
+    processes: int,
+) -> tuple[Path, int, Iterator[FrameSummary | None]]:
+    """Folder and frames of a drive, and what makes them."""
+    from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_folder, write_drive
 
+    if suite is not None:
+        raise ParameterError("--suite: its frames are single scenes; leave out --layout kitti-raw")
+    drive = Drive(
+        n_frames=frames,
+        seed=seed,
+        kind=scene.value,
+        lidar=lidar.value,
+        camera=camera.value,
+        segmenter=SegmenterErrors() if errors else SegmenterErrors.none(),
+        sensors=SensorErrors() if errors else SensorErrors.none(),
+    )
+    return drive_folder(out, drive), frames, write_drive(out, drive, processes=processes)
+
+
+def _frames(out: Path, orders: list[FrameOrder], processes: int) -> Iterator[FrameSummary | None]:
     from ldls.simulation import make_frames
 
-    frames = make_frames(out, orders, processes=processes)
-    return list(track(frames, "simulating", total=len(orders), console=console(), transient=True))
+    return make_frames(out, orders, processes=processes)
+
+
+def _followed(frames: Iterator[FrameSummary | None], total: int) -> list[FrameSummary | None]:
+    from rich.progress import track
+
+    return list(track(frames, "simulating", total=total, console=console(), transient=True))

@@ -4,6 +4,7 @@
 """
 
 from ldls.simulation.demo.street import SimulatedFrame, street_scene
+from ldls.simulation.drive import Drive, drive_frame
 from ldls.simulation.errors import SegmenterErrors, SensorErrors
 from ldls.simulation.frame import SceneFrame, View, scene_frame
 from ldls.simulation.kitti_layout import write_kitti
@@ -11,6 +12,7 @@ from ldls.simulation.lidars import LIDARS, Lidar
 from ldls.simulation.objects import SceneObject
 from ldls.simulation.photograph import PixelTruth
 from ldls.simulation.production import FrameOrder, FrameSummary, make_frames
+from ldls.simulation.raw_layout import drive_folder, write_drive
 from ldls.simulation.rig import Rig, make_rig
 from ldls.simulation.scenes import Scene, make_scene
 from ldls.simulation.segmenting import segmented, true_masks
@@ -18,6 +20,7 @@ from ldls.simulation.suite import make_suite, suite, suite_folder, suite_orders
 
 __all__ = [
     "LIDARS",
+    "Drive",
     "FrameOrder",
     "FrameSummary",
     "Lidar",
@@ -30,6 +33,8 @@ __all__ = [
     "SensorErrors",
     "SimulatedFrame",
     "View",
+    "drive_folder",
+    "drive_frame",
     "make_frames",
     "make_rig",
     "make_scene",
@@ -41,5 +46,6 @@ __all__ = [
     "suite_folder",
     "suite_orders",
     "true_masks",
+    "write_drive",
     "write_kitti",
 ]

@@ -105,11 +105,35 @@ def scene_frame(
     """
     rig = make_rig() if rig is None else rig
     sensors = SensorErrors() if sensors is None else sensors
-    scene = make_scene(seed, kind=kind)
-    photographed, scanned = RayCaster(scene.shape), scene.after(sensors.delay_s)
+    drift = sensors.calibrated(np.eye(4), np.random.default_rng((seed, 1)))
+    return frame_of(make_scene(seed, kind=kind), rig, seed, drift=drift, delay_s=sensors.delay_s, segmenter=segmenter)
+
+
+def frame_of(
+    scene: Scene,
+    rig: Rig,
+    seed: int,
+    *,
+    drift: NDArray[np.float64],
+    delay_s: float,
+    segmenter: SegmenterErrors | None = None,
+) -> SceneFrame:
+    """The frame that a rig at the scene's origin takes.
+
+    Args:
+        scene: The scene at the time of the images.
+        rig: Lidar and cameras.
+        seed: Which noise.
+        drift: (4, 4) error of the calibration, after the true transform.
+        delay_s: The sweep is this much later than the images.
+        segmenter: How wrong the masks are; `SegmenterErrors()` by default.
+
+    Raises:
+        ImportError: `ldls[sim]` is not installed.
+    """
+    photographed, scanned = RayCaster(scene.shape), scene.after(delay_s)
     caster = photographed if scanned is scene else RayCaster(scanned.shape)
     sweep = scan(scanned, caster, rig.lidar, rig.height_m, np.random.default_rng((seed, 0)))
-    drift = sensors.calibrated(np.eye(4), np.random.default_rng((seed, 1)))
     return SceneFrame(
         points=sweep.points,
         rings=sweep.rings,

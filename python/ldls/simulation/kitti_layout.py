@@ -37,12 +37,12 @@ def write_kitti(folder: str | PathLike[str], name: str, frame: SceneFrame) -> No
     Point annotations come last, so a frame that has them has everything.
     """
     training = Path(folder) / "training"
-    _write(training / "velodyne" / f"{name}.bin", frame.points.astype("<f4").tobytes())
+    write(training / "velodyne" / f"{name}.bin", frame.points.astype("<f4").tobytes())
     for k, view in enumerate(frame.views):
         suffix = "" if k == 0 else f"_ring_{k}"
         _write_view(training, "image_2" if k == 0 else f"image{suffix}", suffix, name, view)
-    _write_lines(training / "label_2" / f"{name}.txt", label_rows(frame.objects, frame.views[0]))
-    _write_lines(training / "annotations" / f"{name}.txt", _annotations(frame))
+    write_lines(training / "label_2" / f"{name}.txt", label_rows(frame.objects, frame.views[0]))
+    write_lines(training / "annotations" / f"{name}.txt", annotation_lines(frame))
 
 
 def is_whole(folder: str | PathLike[str], name: str) -> bool:
@@ -52,12 +52,17 @@ def is_whole(folder: str | PathLike[str], name: str) -> bool:
 
 def _write_view(training: Path, images: str, suffix: str, name: str, view: View) -> None:
     picture = training / images / f"{name}.png"
-    picture.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(picture) as file:
-        Image.fromarray(view.image).save(file, "PNG", compress_level=3)
-    _write_lines(training / f"calib{suffix}" / f"{name}.txt", _calibration(view.camera))
+    write_picture(picture, view.image)
+    write_lines(training / f"calib{suffix}" / f"{name}.txt", _calibration(view.camera))
     document = coco_document(view.masks, int(name), picture.name)
-    _write(training / f"masks{suffix}" / f"{name}.json", json.dumps(document).encode())
+    write(training / f"masks{suffix}" / f"{name}.json", json.dumps(document).encode())
+
+
+def write_picture(path: Path, image: NDArray[np.uint8]) -> None:
+    """Write a PNG and its folder, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as file:
+        Image.fromarray(image).save(file, "PNG", compress_level=3)
 
 
 def coco_document(masks: InstanceMasks, image_id: int, file_name: str) -> dict[str, object]:
@@ -86,14 +91,15 @@ def coco_document(masks: InstanceMasks, image_id: int, file_name: str) -> dict[s
 def _calibration(camera: Camera) -> list[str]:
     matrices = {f"P{k}": camera.projection for k in range(4)}
     matrices |= {"R0_rect": np.eye(3), "Tr_velo_to_cam": camera.T_camera_lidar[:3], "Tr_imu_to_velo": np.eye(3, 4)}
-    return [f"{key}: {_row(matrix)}" for key, matrix in matrices.items()]
+    return [f"{key}: {row_of(matrix)}" for key, matrix in matrices.items()]
 
 
-def _row(matrix: NDArray[np.float64]) -> str:
+def row_of(matrix: NDArray[np.float64]) -> str:
+    """The numbers of a matrix, row by row, as KITTI writes them."""
     return " ".join(f"{value:.12e}" for value in matrix.ravel())
 
 
-def _annotations(frame: SceneFrame) -> list[str]:
+def annotation_lines(frame: SceneFrame) -> list[str]:
     """A line for each point; instances count from 1 over the whole turn."""
     named = [f"{m} {annotation_name(thing.category)}" for m, thing in enumerate(frame.objects, start=1)]
     lines = np.array([NOTHING, *named])
@@ -101,11 +107,13 @@ def _annotations(frame: SceneFrame) -> list[str]:
     return chosen
 
 
-def _write_lines(path: Path, lines: Iterable[str]) -> None:
-    _write(path, "".join(f"{line}\n" for line in lines).encode())
+def write_lines(path: Path, lines: Iterable[str]) -> None:
+    """Write a text file and its folder, whole or not at all."""
+    write(path, "".join(f"{line}\n" for line in lines).encode())
 
 
-def _write(path: Path, content: bytes) -> None:
+def write(path: Path, content: bytes) -> None:
+    """Write a file and its folder, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         file.write(content)

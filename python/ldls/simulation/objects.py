@@ -36,13 +36,17 @@ class SceneObject:
 
     def after(self, seconds: float) -> SceneObject:
         """The object `seconds` later."""
-        (x, y, z), (vx, vy) = self.centre_m, self.velocity_m_s
-        return replace(self, centre_m=(x + vx * seconds, y + vy * seconds, z))
+        vx, vy = self.velocity_m_s
+        return self.moved((vx * seconds, vy * seconds, 0.0))
 
     def below(self, height_m: float) -> SceneObject:
         """The object in a frame whose origin lies `height_m` higher."""
-        x, y, z = self.centre_m
-        return replace(self, centre_m=(x, y, z - height_m))
+        return self.moved((0.0, 0.0, -height_m))
+
+    def moved(self, by_m: tuple[float, float, float]) -> SceneObject:
+        """The object elsewhere."""
+        (x, y, z), (dx, dy, dz) = self.centre_m, by_m
+        return replace(self, centre_m=(x + dx, y + dy, z + dz))
 
     def corners_m(self) -> NDArray[np.float64]:
         """(8, 3) corners of the box, in metres."""

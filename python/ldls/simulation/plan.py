@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,6 +58,13 @@ class Plan:
         self.objects.append(SceneObject(category, centre, *size, float(yaw), velocity))
         self.placed.append((len(self.objects), self._stand(shape, x_m, y_m, yaw)))
         return True
+
+    def remove(self, numbers: Container[int]) -> None:
+        """Take objects away by their numbers, from 1; the others are numbered anew, in their order."""
+        kept = [m for m in range(1, len(self.objects) + 1) if m not in numbers]
+        new = {0: 0} | {old: m for m, old in enumerate(kept, start=1)}
+        self.placed = [(new[m], shape) for m, shape in self.placed if m in new]
+        self.objects = [self.objects[m - 1] for m in kept]
 
     def _stand(self, shape: Shape, x_m: float, y_m: float, yaw: float) -> Shape:
         return shape.turned(yaw).moved((x_m, y_m, self.ground.height_m(x_m, y_m)))

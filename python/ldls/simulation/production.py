@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from os import PathLike, fspath
+from typing import Protocol
 
 import numpy as np
 
@@ -44,6 +45,17 @@ class FrameOrder:
     segmenter: SegmenterErrors
     sensors: SensorErrors
 
+    def is_whole(self, folder: str | PathLike[str]) -> bool:
+        """Whether the frame is in `folder`."""
+        return is_whole(folder, self.name)
+
+    def make(self, folder: str | PathLike[str]) -> FrameSummary:
+        """Write the frame; what it holds."""
+        rig = make_rig(lidar=self.lidar, camera=self.camera)
+        frame = scene_frame(self.seed, kind=self.kind, rig=rig, segmenter=self.segmenter, sensors=self.sensors)
+        write_kitti(folder, self.name, frame)
+        return summary_of(self.name, frame)
+
 
 @dataclass(frozen=True)
 class FrameSummary:
@@ -64,8 +76,20 @@ class FrameSummary:
     masks: int
 
 
+class Order(Protocol):
+    """Something that makes a frame."""
+
+    def is_whole(self, folder: str | PathLike[str]) -> bool:
+        """Whether the frame is in `folder`."""
+        ...
+
+    def make(self, folder: str | PathLike[str]) -> FrameSummary:
+        """Write the frame; what it holds."""
+        ...
+
+
 def make_frames(
-    folder: str | PathLike[str], orders: Sequence[FrameOrder], *, processes: int = 2
+    folder: str | PathLike[str], orders: Sequence[Order], *, processes: int = 2
 ) -> Iterator[FrameSummary | None]:
     """Write the frames that are not whole in `folder` yet; yields each as it is done, None for one that was there.
 
@@ -77,7 +101,7 @@ def make_frames(
     """
     if processes < 1:
         raise ParameterError(f"processes: got {processes}, expected 1 or more")
-    missing = [order for order in orders if not is_whole(folder, order.name)]
+    missing = [order for order in orders if not order.is_whole(folder)]
     yield from [None] * (len(orders) - len(missing))
     if processes == 1 or len(missing) < 2:
         yield from (make_frame(fspath(folder), order) for order in missing)
@@ -91,15 +115,13 @@ def make_frames(
             pool.shutdown(cancel_futures=True)
 
 
-def make_frame(folder: str, order: FrameOrder) -> FrameSummary:
+def make_frame(folder: str, order: Order) -> FrameSummary:
     """Write one frame; what it holds."""
-    rig = make_rig(lidar=order.lidar, camera=order.camera)
-    frame = scene_frame(order.seed, kind=order.kind, rig=rig, segmenter=order.segmenter, sensors=order.sensors)
-    write_kitti(folder, order.name, frame)
-    return _summary(order.name, frame)
+    return order.make(folder)
 
 
-def _summary(name: str, frame: SceneFrame) -> FrameSummary:
+def summary_of(name: str, frame: SceneFrame) -> FrameSummary:
+    """What a frame holds."""
     seen = np.unique(frame.instances[frame.instances > 0])
     kinds, counts = np.unique([frame.objects[m - 1].category for m in seen], return_counts=True)
     labels, points = np.unique(frame.categories[frame.categories > 0], return_counts=True)

@@ -40,12 +40,16 @@ class Scene:
         if seconds == 0:
             return self
         by_m = np.zeros((len(self.objects) + 1, 3))
-        by_m[1:, :2] = [o.velocity_m_s for o in self.objects]
+        by_m[1:, :2] = [np.multiply(o.velocity_m_s, seconds) for o in self.objects]
+        return self.moved(by_m)
+
+    def moved(self, by_m: NDArray[np.float64]) -> Scene:
+        """The scene with its scenery moved by the first of the rows (M + 1, 3), in metres, each object by its own."""
         vertex_objects = np.zeros(len(self.shape.vertices_m), np.int32)
         vertex_objects[self.shape.faces] = self.face_objects[:, None]
-        moved = self.shape.vertices_m + seconds * by_m[vertex_objects]
-        objects = tuple(o.after(seconds) for o in self.objects)
-        return replace(self, shape=replace(self.shape, vertices_m=moved), objects=objects)
+        shape = replace(self.shape, vertices_m=self.shape.vertices_m + by_m[vertex_objects])
+        objects = tuple(o.moved((x, y, z)) for o, (x, y, z) in zip(self.objects, by_m[1:].tolist(), strict=True))
+        return replace(self, shape=shape, objects=objects)
 
 
 def make_scene(seed: int = 0, *, kind: str = "street") -> Scene:
@@ -55,12 +59,22 @@ def make_scene(seed: int = 0, *, kind: str = "street") -> Scene:
         ParameterError: There is no such kind.
         ImportError: `ldls[sim]` is not installed.
     """
+    return build(make_plan(seed, kind=kind))
+
+
+def make_plan(seed: int = 0, *, kind: str = "street") -> Plan:
+    """The plan of the scene of a seed.
+
+    Raises:
+        ParameterError: There is no such kind.
+    """
     if kind not in LAYOUTS:
         raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(LAYOUTS)}")
-    return _built(LAYOUTS[kind](np.random.default_rng(seed)))
+    return LAYOUTS[kind](np.random.default_rng(seed))
 
 
-def _built(plan: Plan) -> Scene:
+def build(plan: Plan) -> Scene:
+    """The scene of a plan."""
     faces = [np.full(len(shape.faces), number, np.int32) for number, shape in plan.placed]
     return Scene(
         shape=join([shape for _, shape in plan.placed]),
