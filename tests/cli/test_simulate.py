@@ -37,8 +37,19 @@ def test_no_errors_means_perfect_masks_and_calibration(tmp_path):
         pytest.param(["--lidar", "hdl-65"], id="no such lidar"),
         pytest.param(["--frames", "0"], id="no frames"),
         pytest.param(["--suite", "tuning", "--no-errors"], id="a suite without its errors"),
+        pytest.param(["--suite", "tuning", "--layout", "kitti-raw"], id="a suite as a drive"),
+        pytest.param(["--camera", "ring", "--layout", "kitti-raw"], id="a drive with a ring"),
     ],
 )
 def test_what_cannot_be_made_is_refused(tmp_path, arguments):
     assert run(tmp_path / "out", *arguments).exit_code != 0
     assert not (tmp_path / "out").exists()
+
+
+def test_a_drive_is_written_in_the_raw_layout(tmp_path):
+    result = run(tmp_path, "--frames", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL)
+    assert result.exit_code == 0, result.output
+    (drive,) = tmp_path.glob("2026_01_06/2026_01_06_drive_0005_sync")
+    assert len(list((drive / "velodyne_points/data").iterdir())) == 2
+    assert len((drive / "image_02/timestamps.txt").read_text().splitlines()) == 2
+    assert "kept 2" in run(tmp_path, "--frames", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL).output

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -100,15 +99,15 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
     from rich.markup import escape
     from rich.table import Table
 
+    from ldls.datasets.files import counts_of
     from ldls.datasets.inspection import classes_of
 
     table = Table(title=escape(str(source.path)), show_header=False)
     table.add_row("kind", source.kind)
     table.add_row("frames", escape(f"{len(source):,} ({_range(source.names[0], source.names[-1])})"))
-    left_out = Counter(getattr(source, "left_out", {}).values())
+    left_out = getattr(source, "left_out", {}).values()
     if left_out:
-        why = ", ".join(f"{count:,} {reason}" for reason, count in left_out.most_common())
-        table.add_row("left out", f"{left_out.total():,} ({why})")
+        table.add_row("left out", f"{len(left_out):,} ({counts_of(left_out)})")
     table.add_row("time", _time(stamps))
     counts = [found.n_points for found in facts if found.n_points] or [0]
     table.add_row("points a frame", _range(f"{min(counts):,}", f"{max(counts):,}"))

@@ -62,11 +62,17 @@ def whole_frames(path: Path, parts: Mapping[str, Mapping[str, Path]]) -> WholeFr
     return WholeFrames(names=names, left_out=left_out)
 
 
-def warn_left_out(path: Path, reasons: Sequence[str], n_sweeps: int) -> None:
+def warn_left_out(path: Path, reasons: Iterable[str], n_sweeps: int) -> None:
     """Warn of sweeps that are left out, if there are any, by what they lack."""
-    if reasons:
-        why = ", ".join(f"{count} {reason}" for reason, count in Counter(reasons).most_common())
-        warnings.warn(f"{path}: {len(reasons)} of {n_sweeps} sweeps are left out: {why}", LeftOutWarning, stacklevel=4)
+    counted = Counter(reasons)
+    if counted:
+        message = f"{path}: {counted.total()} of {n_sweeps} sweeps are left out: {counts_of(counted)}"
+        warnings.warn(message, LeftOutWarning, stacklevel=4)
+
+
+def counts_of(reasons: Iterable[str]) -> str:
+    """How often each reason occurs, the most frequent first."""
+    return ", ".join(f"{count:,} {reason}" for reason, count in Counter(reasons).most_common())
 
 
 def check_folders(path: Path, names: Iterable[str]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets import nuscenes_tables as tables
-from ldls.datasets.files import warn_left_out
+from ldls.datasets.files import counts_of, warn_left_out
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.nuscenes_tables import Reading
 from ldls.datasets.truth import of_points
@@ -79,10 +79,11 @@ class NuScenesSource:
         readings = tables.read_readings(folder, samples, self._sensors)
         missing = _missing(self.path, readings)
         self.left_out = {samples[token]: f"no {' and no '.join(what)}" for token, what in missing.items()}
-        warn_left_out(self.path, list(self.left_out.values()), len(samples))
         self.names = tuple(name for token, name in samples.items() if token not in missing)
         if not self.names:
-            raise SourceError(f"{self.path}: none of {len(samples)} key frames has all its files in samples/")
+            why = counts_of(self.left_out.values())
+            raise SourceError(f"{self.path}: none of {len(samples)} key frames has all its files: {why}")
+        warn_left_out(self.path, self.left_out.values(), len(samples))
         self._frames = tuple(readings[token] for token in samples if token not in missing)
         self.stamps: tuple[float | None, ...] = tuple(frame[LIDAR].stamp_us / 1e6 for frame in self._frames)
         self._poses = tables.read_poses(folder, {taken.pose for frame in self._frames for taken in frame.values()})

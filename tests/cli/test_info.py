@@ -1,0 +1,123 @@
+"""`ldls info` from the outside."""
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+import ldls
+from datasets import layouts
+from ldls.cli import app
+from ldls.datasets.inspection import check_stamps, field_of_view_deg, sample
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["info", *map(str, arguments)])
+
+
+def test_a_sound_drive_is_described(tmp_path):
+    drive = layouts.kitti_raw(tmp_path, n_frames=6)
+    (drive / "velodyne_points/data/0000000002.bin").unlink()
+    result = run(drive, "--all", "--picture", tmp_path / "check.png", "--frame", "0000000001")
+    assert result.exit_code == 0, result.output
+    for expected in (
+        "kitti-raw",
+        "1 no velodyne_points",
+        "1.0 frames a second",
+        "60 x 80",
+        "77 x 62",
+        "50.0%",
+        "-0.010",
+    ):
+        assert expected in result.output
+    with Image.open(tmp_path / "check.png") as picture:
+        assert (picture.width, picture.height) == (1242, 932)
+        assert len(np.unique(np.asarray(picture).reshape(-1, 3), axis=0)) > 20, "points are drawn in colours of depth"
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "message"),
+    [
+        pytest.param(lambda d: (d / "velodyne_points/data/0000000001.bin").write_bytes(b"123"), 1,
+                     "3 bytes is not a multiple of 16", id="a cut sweep"),
+        pytest.param(lambda d: (d / "velodyne_points/data/0000000001.bin").write_bytes(b""), 1, "its cloud is empty",
+                     id="an empty sweep"),
+        pytest.param(lambda d: layouts.write_points(d / "velodyne_points/data/0000000001.bin",
+                                                    layouts.cloud() * np.float32(np.nan)), 1,
+                     "none of its 100 points is finite", id="a cloud of NaN"),
+        pytest.param(lambda d: (d / "image_02/data/0000000001.png").write_bytes(b"PNG"), 1, "not a whole image",
+                     id="a broken image"),
+        pytest.param(lambda d: layouts.write_image(d / "image_02/data/0000000001.png", (30, 40)), 1,
+                     "image is 30 x 40, its calibration is for 60 x 80", id="an image of another size"),
+        pytest.param(lambda d: layouts.write_text(d.parent / "calib_velo_to_cam.txt",
+                                                  "R: 0 0 -1 0 1 0 1 0 0\nT: 0 0 -50\n"), 1, "wrong calibration?",
+                     id="a camera that sees nothing"),
+        pytest.param(lambda d: _stamps(d, "velodyne_points", ["25.0", "26.0", "25.5"]), 1, "0.500 s before that of",
+                     id="a step back"),
+        pytest.param(lambda d: _stamps(d, "image_02", ["25.0", "25.1", "25.2"]), 0, "taken -1.851 s from the sweep",
+                     id="images of another time"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_found(tmp_path, change, status, message):
+    drive = layouts.kitti_raw(tmp_path)
+    change(drive)
+    result = run(drive)
+    assert message in " ".join(result.output.replace("│", " ").split()), result.output
+    assert result.exit_code == status
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        pytest.param(["--dataset", "kitti"], "expected one of kitti-object", id="no such kind"),
+        pytest.param(["--option", "camera"], "expected NAME=VALUE", id="an option without a value"),
+        pytest.param(["--option", "camera=7"], "from 0 to 3", id="no such camera"),
+        pytest.param(["--frame", "9", "--picture", "x.png"], "expected a name from", id="no such frame"),
+    ],
+)
+def test_wrong_options_are_refused(tmp_path, monkeypatch, options, message):
+    monkeypatch.chdir(tmp_path)
+    result = run(layouts.kitti_raw(tmp_path), *options)
+    assert result.exit_code == 1 and message in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("camera=3", 3), ("camera=2,3", (2, 3)), ("sequence=08", "08"), ("truth=false", False), ("scene=a-1", "a-1")],
+)
+def test_options_become_values(text, value):
+    from ldls.cli.info import parse_options
+
+    (found,) = parse_options([text]).values()
+    assert found == value and type(found) is type(value)
+
+
+def test_the_sample_has_the_first_and_the_last():
+    assert sample(100, 5)[0] == 0 and sample(100, 5)[-1] == 99 and len(sample(100, 5)) == 5
+    assert sample(3, 8) == [0, 1, 2] and sample(1, 8) == [0]
+
+
+def test_gaps_and_steps_back_are_told_apart():
+    names = tuple("abcdef")
+    found = check_stamps(names, (0.0, 0.1, 0.2, 0.9, None, 0.8))
+    assert [(finding.frame, finding.broken) for finding in found] == [("d", False), ("f", True)]
+    assert check_stamps(names[:2], (None, None)) == []
+
+
+def test_field_of_view_is_that_of_the_projection_and_its_distortion():
+    pinhole = ldls.Camera(projection=layouts.K, image_size=layouts.SIZE)
+    assert field_of_view_deg(pinhole) == pytest.approx((77.3, 61.9), abs=0.7)
+    barrel = ldls.Distortion("plumb_bob", (-0.1, 0, 0, 0, 0))
+    wider = ldls.Camera(projection=layouts.K, image_size=layouts.SIZE, distortion=barrel)
+    assert field_of_view_deg(wider)[0] > field_of_view_deg(pinhole)[0] + 2
+
+
+def test_real_frames_look_sound(data_folder):
+    for folder in ("kitti", "nuscenes"):
+        result = run(data_folder / folder)
+        assert result.exit_code == 0 and "found nothing wrong" in result.output
+
+
+def _stamps(drive, sensor, seconds):
+    lines = [f"2011-09-26 13:02:{text}\n" for text in seconds]
+    layouts.write_text(drive / sensor / "timestamps.txt", "".join(lines))

@@ -1,0 +1,332 @@
+"""Every source on a small layout of its own, and what is said where something is missing."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+import ldls
+from datasets import layouts
+from ldls.datasets import SOURCES, Frame, open_source, read_boxes_2d
+from ldls.errors import LeftOutWarning
+from ldls.stages import project
+
+WRITERS = {
+    "kitti-object": layouts.kitti_object,
+    "kitti-raw": layouts.kitti_raw,
+    "kitti-odometry": layouts.kitti_odometry,
+    "nuscenes": layouts.nuscenes,
+    "folder": layouts.plain_folder,
+}
+
+
+def n_in_view(frame: Frame, camera=0):
+    image = frame.images[camera]
+    return len(project(frame.points, image.camera, image_size=image.camera.image_size)[0])
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_a_source_yields_frames_with_points_camera_and_image(tmp_path, kind):
+    source = open_source(WRITERS[kind](tmp_path))
+    assert source.kind == kind
+    frames = list(source)
+    assert [frame.name for frame in frames] == list(source.names)
+    assert len(source) == len(frames) == len(source.stamps)
+    for frame in frames:
+        assert frame.points[:, :3].tolist() == layouts.cloud()[:, :3].tolist()
+        assert frame.images[0].camera.image_size == layouts.SIZE
+        assert frame.images[0].read().shape == (*layouts.SIZE, 3)
+        assert n_in_view(frame) == 50
+    with pytest.raises(IndexError):
+        source[len(source)]
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_frames_are_read_only_when_they_are_asked_for(tmp_path, kind):
+    path = WRITERS[kind](tmp_path)
+    source = open_source(path)
+    second = source[1]
+    second.images[0].path.unlink()
+    assert len(source[0].points) == 100
+    with pytest.raises(FileNotFoundError, match=re.escape(second.images[0].path.name)):
+        second.images[0].read()
+
+
+@pytest.mark.parametrize(
+    ("kind", "deeper"),
+    [
+        pytest.param("kitti-object", "training", id="parent of training"),
+        pytest.param("kitti-raw", None, id="folder of a day"),
+        pytest.param("kitti-odometry", None, id="parent of sequences"),
+    ],
+)
+def test_the_parent_of_the_only_one_will_do(tmp_path, kind, deeper):
+    path = WRITERS[kind](tmp_path / deeper if deeper else tmp_path)
+    parents = {"kitti-object": tmp_path, "kitti-raw": path.parent, "kitti-odometry": tmp_path}
+    assert open_source(parents[kind]).path == path
+
+
+def test_stamps_of_a_raw_drive_are_read_to_the_nanosecond_that_a_float_holds(tmp_path):
+    frame = open_source(layouts.kitti_raw(tmp_path))[1]
+    assert frame.stamp == pytest.approx(1317042146.951199337, abs=3e-7)
+    assert frame.images[0].stamp - frame.stamp == pytest.approx(-0.01, abs=1e-6)
+
+
+def test_a_raw_drive_leaves_out_frames_that_lack_a_file(tmp_path):
+    drive = layouts.kitti_raw(tmp_path, n_frames=4)
+    (drive / "velodyne_points/data/0000000001.bin").unlink()
+    source = open_source(drive)
+    assert source.names == ("0000000000", "0000000002", "0000000003")
+    assert source.left_out == {"0000000001": "no velodyne_points"}
+    assert source[1].stamp == pytest.approx(1317042147.951199, abs=1e-6), "a stamp is that of its number"
+    (drive / "image_02/data/0000000003.png").unlink()
+    with pytest.warns(LeftOutWarning, match="1 of 3 sweeps are left out: 1 no image_02"):
+        assert len(open_source(drive)) == 2
+
+
+def test_truth_of_odometry_is_that_of_its_labels(tmp_path):
+    frame = open_source(layouts.kitti_odometry(tmp_path))[0]
+    assert frame.truth.counts()["car"] == 50 and set(frame.truth.instances) == {0, 7}
+    assert frame.stamp == 0
+    assert open_source(tmp_path, truth=False)[0].truth is None
+
+
+def test_truth_of_kitti_is_its_annotations_before_its_boxes(tmp_path):
+    folder = layouts.kitti_object(tmp_path)
+    box = "Car 0 0 0 0 0 80 60 4 5 5 0 2 10 0\n"
+    layouts.write_text(folder / "label_2/000000.txt", box)
+    assert open_source(folder)[0].truth.counts()["Car"] > 40
+    layouts.write_text(folder / "annotations/000000.txt", "1 Pedestrian\n" * 100)
+    assert open_source(folder)[0].truth.counts()["Pedestrian"] == 100
+    assert open_source(folder)[1].truth is None
+
+
+def test_nuscenes_contains_the_way_of_the_car_between_the_stamps(tmp_path):
+    source = open_source(layouts.nuscenes(tmp_path))
+    frame = source[0]
+    assert [image.name for image in frame.images] == list(layouts.CHANNELS)
+    assert frame.images[0].stamp - frame.stamp == pytest.approx(-0.02, abs=1e-6)
+    # the camera was 0.2 m farther back when it took the image
+    expected = layouts.T.copy()
+    expected[2, 3] = 0.2
+    assert frame.images[0].camera.T_camera_lidar == pytest.approx(expected, abs=1e-9)
+    assert frame.truth.counts()["vehicle.car"] == 100
+    assert frame.points.shape == (100, 5)
+
+
+def test_a_scene_of_nuscenes_is_chosen_by_name(tmp_path):
+    layouts.nuscenes(tmp_path, scenes=("scene-0001", "scene-0002"))
+    assert len(open_source(tmp_path)) == 4
+    source = open_source(tmp_path, scene="scene-0002")
+    assert source.names == ("scene-0002_000", "scene-0002_001")
+    with pytest.raises(ldls.SourceError, match="no scene 'scene-0003'; found scene-0001, scene-0002"):
+        open_source(tmp_path, scene="scene-0003")
+
+
+def test_folder_has_distortion_stamps_and_masks(tmp_path):
+    folder = layouts.plain_folder(tmp_path)
+    pixels = np.zeros((1, *layouts.SIZE), bool)
+    (folder / "masks").mkdir()
+    ldls.InstanceMasks.from_array(pixels, categories=[1], scores=[1]).save(folder / "masks/b.npz")
+    source = open_source(folder)
+    assert source.names == ("a", "b") and source.stamps == (0.0, 0.1)
+    assert source[0].images[0].camera.distortion.model == "plumb_bob"
+    (masks,) = source.read_masks(1)
+    assert masks.image_size == layouts.SIZE
+    with pytest.raises(FileNotFoundError):
+        source.read_masks(0)
+
+
+def test_the_template_describes_a_folder(tmp_path):
+    from ldls.datasets.folder import template
+
+    description = template()
+    layouts.kitti_object(tmp_path / "kitti", frames=("a",))
+    layouts.write_text(tmp_path / "ldls.toml", description)
+    layouts.write_points(tmp_path / "lidar/a.bin")
+    layouts.write_points(tmp_path / "labels/a.label", np.full(100, 10, "<u4"))
+    layouts.write_image(tmp_path / "front/a.png", (480, 640))
+    layouts.write_image(tmp_path / "left/a.png")
+    shutil.copytree(tmp_path / "kitti/calib", tmp_path / "calib")
+    for stamps in ("lidar/stamps.txt", "front/stamps.txt"):
+        layouts.write_text(tmp_path / stamps, "a 12.5\n")
+    frame = open_source(tmp_path)[0]
+    assert [image.name for image in frame.images] == ["front", "left"]
+    assert frame.images[0].camera.image_size == (480, 640) and frame.images[1].camera.image_size == layouts.SIZE
+    assert frame.stamp == frame.images[0].stamp == 12.5 and frame.images[1].stamp is None
+    assert frame.truth.counts()["car"] == 100
+
+
+def without(*paths):
+    def change(folder):
+        for path in paths:
+            target = folder / path
+            shutil.rmtree(target) if target.is_dir() else target.unlink()
+
+    return change
+
+
+def with_text(path, text):
+    return lambda folder: layouts.write_text(folder / path, text)
+
+
+def replaced(path, old, new):
+    return lambda folder: (folder / path).write_text((folder / path).read_text().replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "error", "message"),
+    [
+        pytest.param("kitti-object", without("image_2"), ldls.SourceError, "has no folder image_2; found calib, vel",
+                     id="object without images"),
+        pytest.param("kitti-object", without(*(f"calib/00000{k}.txt" for k in range(3))), ldls.SourceError,
+                     "velodyne 3, calib 0, image_2 3", id="object without any calibration"),
+        pytest.param("kitti-object", with_text("calib/000000.txt", "P2: 1 2 3\n"), ldls.CalibrationError,
+                     "expected 12 numbers, got 3", id="object with a broken calibration"),
+        pytest.param("kitti-object", with_text("annotations/000000.txt", "0 background\n" * 99), ldls.InputError,
+                     "labels: 99, points: 100", id="object with too few annotations"),
+        pytest.param("kitti-raw", without("../calib_velo_to_cam.txt"), FileNotFoundError, "calib_velo_to_cam.txt",
+                     id="raw without calibration"),
+        pytest.param("kitti-raw", with_text("../calib_velo_to_cam.txt", "R: 1 0 0 0 1 0 0 0 1\n"),
+                     ldls.CalibrationError, "key 'T' missing", id="raw without translation"),
+        pytest.param("kitti-raw", with_text("image_02/timestamps.txt", "2011-09-26 13:02:25.9\n"), ldls.SourceError,
+                     "has 1 stamps, expected one for each frame up to 0000000002", id="raw with too few stamps"),
+        pytest.param("kitti-raw", replaced("velodyne_points/timestamps.txt", "13:02:26", "noon"),
+                     ldls.CorruptFileError, "line 2: expected a time", id="raw with a broken stamp"),
+        pytest.param("kitti-raw", without("image_02"), ldls.SourceError, "no folder image_02; found velodyne_points",
+                     id="raw without images"),
+        pytest.param("kitti-odometry", with_text("times.txt", "0.0\n"), ldls.SourceError, "has 1 times",
+                     id="odometry with too few times"),
+        pytest.param("kitti-odometry", with_text("times.txt", "0.0\nnan\n0.2\n"), ldls.CorruptFileError,
+                     "line 2: expected a time", id="odometry with a broken time"),
+        pytest.param("kitti-odometry", with_text("calib.txt", f"P2: {layouts.row(layouts.P)}\n"),
+                     ldls.CalibrationError, "key 'Tr_velo_to_cam' missing", id="odometry without Tr"),
+        pytest.param("kitti-odometry", with_text("labels/000000.label", "abcd"), ldls.CorruptFileError, "class 25185",
+                     id="odometry with a broken label"),
+        pytest.param("nuscenes", without("v1.0-mini/ego_pose.json"), ldls.SourceError, "has no ego_pose.json; found",
+                     id="nuscenes without poses"),
+        pytest.param("nuscenes", without("samples/CAM_BACK"), ldls.SourceError, "none of 2 key frames .* 2 no CAM_BACK",
+                     id="nuscenes without a camera's files"),
+        pytest.param("nuscenes", with_text("v1.0-mini/sample.json", '[{"token": "a"}'), ldls.CorruptFileError,
+                     "row 1: lacks scene_token, timestamp", id="nuscenes with another sample table"),
+        pytest.param("nuscenes", with_text("v1.0-mini/sensor.json", "[]x"), ldls.SourceError, "none of",
+                     id="nuscenes without sensors"),
+        pytest.param("nuscenes", replaced("v1.0-mini/sample_data.json", "samples/CAM_BACK/", "../CAM_BACK/"),
+                     ldls.UnsafePathError, "leads out of", id="nuscenes with a path that climbs out"),
+        pytest.param("nuscenes", replaced("v1.0-mini/calibrated_sensor.json", "0.5", "0.7"), ldls.CalibrationError,
+                     "expected w x y z of 1", id="nuscenes with a rotation that is none"),
+        pytest.param("folder", with_text("ldls.toml", "points = 3 4"), ldls.CorruptFileError, "not a TOML file",
+                     id="folder with broken TOML"),
+        pytest.param("folder", replaced("ldls.toml", "images =", "image ="), ldls.ParameterError,
+                     "unknown key 'image', .*did you mean images", id="folder with a misspelt key"),
+        pytest.param("folder", replaced("ldls.toml", '"lidar/{frame}.bin"', "7"), ldls.ParameterError,
+                     "points is 7, expected a text", id="folder with a number for a path"),
+        pytest.param("folder", replaced("ldls.toml", "T_camera_lidar", "#"), ldls.ParameterError,
+                     "has no calibration", id="folder without extrinsics"),
+        pytest.param("folder", replaced("ldls.toml", "[0.0, 0.0, 1.0]]", "[0.0, 0.0, 0.0]]"), ldls.CalibrationError,
+                     "cameras.front", id="folder with a singular K"),
+        pytest.param("folder", replaced("ldls.toml", "lidar/{frame}", "../lidar/{frame}"), ldls.UnsafePathError,
+                     "leads out of", id="folder with a path that climbs out"),
+        pytest.param("folder", replaced("ldls.toml", "lidar/{frame}", "/lidar/{frame}"), ldls.UnsafePathError,
+                     "leads out of", id="folder with an absolute path"),
+        pytest.param("folder", replaced("ldls.toml", "lidar/{frame}", "lidar/x"), ldls.ParameterError,
+                     "has no {frame}", id="folder without {frame}"),
+        pytest.param("folder", with_text("stamps.txt", "a 1.0\n"), ldls.SourceError,
+                     "no stamp of 1 frames, the first is b", id="folder with too few stamps"),
+        pytest.param("folder", without("front"), ldls.SourceError, "points 2, cameras.front 0",
+                     id="folder without images"),
+    ],
+)  # fmt: skip
+def test_what_is_missing_or_broken_is_said(tmp_path, kind, change, error, message):
+    path = WRITERS[kind](tmp_path)
+    change(path)
+    with pytest.raises(error, match=message):
+        open_source(path, kind=kind)[0]
+
+
+def test_links_out_of_a_folder_are_refused_unless_they_are_allowed(tmp_path):
+    folder = layouts.plain_folder(tmp_path / "inside")
+    (folder / "lidar").rename(tmp_path / "lidar")
+    (folder / "lidar").symlink_to(tmp_path / "lidar")
+    with pytest.raises(ldls.UnsafePathError, match="by a link"):
+        open_source(folder)
+    assert len(open_source(folder, allow_outside=True)) == 2
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "error", "message"),
+    [
+        pytest.param(lambda p: None, {}, ldls.SourceError, "is no source of frames; looked for .*ldls.toml",
+                     id="empty folder"),
+        pytest.param(lambda p: (layouts.kitti_object(p), layouts.plain_folder(p)), {}, ldls.SourceError,
+                     "may be kitti-object .* folder .*say which by kind=", id="two kinds in one folder"),
+        pytest.param(layouts.kitti_object, {"kind": "kitti"}, ldls.ParameterError, "did you mean kitti-",
+                     id="no such kind"),
+        pytest.param(layouts.kitti_object, {"camara": 3}, ldls.ParameterError,
+                     "expected camera, split, truth; did you mean camera?", id="no such option"),
+        pytest.param(layouts.kitti_object, {"camera": 4}, ldls.ParameterError, "from 0 to 3", id="no such camera"),
+        pytest.param(layouts.kitti_object, {"camera": (2, 2)}, ldls.ParameterError, "different", id="a camera twice"),
+        pytest.param(lambda p: (layouts.kitti_raw(p), shutil.copytree(p / "2011_09_26/2011_09_26_drive_0001_sync",
+                                                                      p / "2011_09_26/2011_09_26_drive_0002_sync")),
+                     {"at": "2011_09_26"}, ldls.SourceError, "holds 2 drives .*say which by drive=", id="two drives"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_opened_is_refused(tmp_path, make, options, error, message):
+    make(tmp_path)
+    options = dict(options)
+    with pytest.raises(error, match=message):
+        open_source(tmp_path / options.pop("at", "."), **options)
+
+
+def test_a_path_that_is_not_there_is_a_missing_file(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        open_source(tmp_path / "nothing")
+
+
+def test_every_kind_says_what_it_looks_for():
+    assert all(source.kind == kind and source.looks_for for kind, source in SOURCES.items())
+
+
+def test_real_kitti_frames(data_folder):
+    source = open_source(data_folder / "kitti")
+    assert source.names == ("000000", "000001", "000002", "000003", "000571")
+    frame = source[4]
+    assert len(frame.points) == 123_131 and n_in_view(frame) == 20_301 and frame.truth is None
+    assert source[0].truth.counts()["Pedestrian"] == 376
+
+
+def test_all_six_cameras_of_a_real_nuscenes_frame_see_points(data_folder):
+    (frame,) = open_source(data_folder / "nuscenes")
+    shares = [n_in_view(frame, camera) / len(frame.points) for camera in range(6)]
+    assert len(frame.images) == 6 and min(shares) > 0.08 and sum(shares) == pytest.approx(0.63, abs=0.02)
+    boxes = read_boxes_2d(data_folder / "nuscenes")
+    assert boxes.keys() == {image.name for image in frame.images}
+    views = [ldls.View(_filled(boxes[image.name]), image.camera, image.name) for image in frame.images]
+    result = ldls.segment(frame.points, views)
+    found = {name for name, o in zip([i.name for i in result.instances], result.objects, strict=True) if o.n_points}
+    assert {"truck", "pedestrian"} <= found
+
+
+def test_the_middle_of_a_real_nuscenes_box_is_its_middle(data_folder):
+    """The points in the boxes are those that nuScenes counted, but for a few at the faces."""
+    import json
+
+    from ldls.datasets.nuscenes_frame import points_in_upright_box
+
+    points = open_source(data_folder / "nuscenes")[0].points
+    boxes = json.loads((data_folder / "nuscenes/frame.json").read_text())["boxes_3d"]
+    found = [int(points_in_upright_box(points, np.array(box["center_size_yaw"])).sum()) for box in boxes]
+    counted = [box["lidar_points"] for box in boxes]
+    assert np.abs(np.subtract(found, counted)).sum() <= 0.03 * sum(counted)
+
+
+def _filled(boxes):
+    """Masks that are the rectangles of 2D boxes."""
+    pixels = np.zeros((len(boxes), 900, 1600), bool)
+    for number, box in enumerate(boxes):
+        left, top, right, bottom = np.clip(box.ltrb_px, 0, 1600).astype(int)
+        pixels[number, top:bottom, left:right] = True
+    names = {1: "pedestrian", 2: "truck", 3: "other"}
+    categories = [{"pedestrian": 1, "truck": 2}.get(box.category, 3) for box in boxes]
+    return ldls.InstanceMasks.from_array(pixels, categories=categories, scores=np.ones(len(boxes)), names=names)
