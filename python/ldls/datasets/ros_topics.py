@@ -1,0 +1,79 @@
+"""Which topics of a bag are read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ldls.errors import InputError
+from ldls.io.ros.bags import Bag
+from ldls.io.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, POINTS
+
+
+@dataclass(frozen=True)
+class RosTopics:
+    """Topics of clouds, of the images of each camera, and of their CameraInfo.
+
+    Attributes:
+        points: Topic of the clouds.
+        images: Topic of the images of each camera.
+        infos: Topic of the CameraInfo of each camera.
+    """
+
+    points: str
+    images: tuple[str, ...]
+    infos: tuple[str, ...]
+
+
+def choose_topics(bag: Bag, points: str | None, images: Sequence[str] | None, infos: Sequence[str] | None) -> RosTopics:
+    """The topics given, and for those that are not given the only ones there are.
+
+    Raises:
+        InputError: A topic is not in the bag or of another type, or there is none or several to guess from; the
+            message lists all there are.
+    """
+    if isinstance(images, str) or isinstance(infos, str):
+        raise InputError("image_topics, info_topics: expected lists of topics, got a text; put it in brackets")
+    chosen_points = _one(bag, "points_topic", points, (POINTS,))
+    if images is None:
+        images = (_one(bag, "image_topics", None, (IMAGE, COMPRESSED_IMAGE)),)
+    chosen_images = tuple(_one(bag, "image_topics", topic, (IMAGE, COMPRESSED_IMAGE)) for topic in images)
+    if infos is None:
+        infos = [_info_beside(bag, topic) for topic in chosen_images]
+    if len(infos) != len(chosen_images):
+        raise InputError(f"info_topics: got {len(infos)}, expected {len(chosen_images)}, one an image topic")
+    return RosTopics(
+        chosen_points, chosen_images, tuple(_one(bag, "info_topics", topic, (CAMERA_INFO,)) for topic in infos)
+    )
+
+
+def _info_beside(bag: Bag, image_topic: str) -> str:
+    """The CameraInfo topic in the namespace of an image topic, or in the nearest around it; else the only one."""
+    space = image_topic
+    while "/" in space:
+        space = space.rpartition("/")[0]
+        if f"{space}/camera_info" in bag.topics:
+            return f"{space}/camera_info"
+    return _one(bag, "info_topics", None, (CAMERA_INFO,))
+
+
+def _one(bag: Bag, option: str, given: str | None, types: tuple[str, ...]) -> str:
+    fitting = [topic.name for topic in bag.topics.values() if topic.type in types]
+    expected = " or ".join(kind.rpartition("/")[2] for kind in types)
+    if given is not None:
+        if given in fitting:
+            return given
+        found = bag.topics[given].type if given in bag.topics else "no such topic"
+        raise InputError(f"{bag.path}: {option}: {given!r} is {found}, expected {expected}; {_listed(bag)}")
+    if len(fitting) == 1:
+        return fitting[0]
+    raise InputError(
+        f"{bag.path}: {option}: {len(fitting) or 'no'} topics of {expected}, so none is guessed; {_listed(bag)}"
+    )
+
+
+def _listed(bag: Bag) -> str:
+    rows = [
+        f"{topic.name} ({topic.type}, {topic.count})" for topic in sorted(bag.topics.values(), key=lambda t: t.name)
+    ]
+    return "the bag has " + (", ".join(rows) or "no topics")

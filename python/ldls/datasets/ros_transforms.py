@@ -1,0 +1,121 @@
+"""Transforms between the frames of a robot, from /tf_static and /tf."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import CalibrationError
+from ldls.io.ros.messages import RigidMessage, TransformsMessage, nanoseconds
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass
+class _Edge:
+    """Transforms from a frame to its parent over time; a static one has a single entry.
+
+    Attributes:
+        parent: The parent.
+        stamps_ns: When each holds.
+        transforms: (4, 4) each, from the frame's to the parent's coordinates.
+    """
+
+    parent: str
+    stamps_ns: list[int] = field(default_factory=list)
+    transforms: list[Matrix] = field(default_factory=list)
+
+    def at(self, stamp_ns: int) -> Matrix:
+        """The transform of the nearest time."""
+        distances = [abs(stamp - stamp_ns) for stamp in self.stamps_ns]
+        return self.transforms[distances.index(min(distances))]
+
+
+class TransformTree:
+    """Frames and their parents.
+
+    Moving transforms are read only when static ones do not connect what is asked for.
+    """
+
+    def __init__(
+        self, static: Iterable[TransformsMessage], moving: Callable[[], Iterable[TransformsMessage]] | None = None
+    ) -> None:
+        """A tree of the messages of /tf_static, and a function that reads those of /tf."""
+        self._edges: dict[str, _Edge] = {}
+        self._moving = moving
+        self._add(static)
+
+    def _add(self, messages: Iterable[TransformsMessage]) -> None:
+        for message in messages:
+            for one in message.transforms:
+                child, parent = _plain(one.child_frame_id), _plain(one.header.frame_id)
+                edge = self._edges.get(child)
+                if edge is None or edge.parent != parent:
+                    edge = self._edges[child] = _Edge(parent)
+                edge.stamps_ns.append(nanoseconds(one.header.stamp))
+                edge.transforms.append(_matrix(one.transform, f"{parent} to {child}"))
+
+    def lookup(self, target: str, source: str, stamp_ns: int) -> Matrix:
+        """(4, 4) from coordinates in the frame `source` to coordinates in `target`, at the nearest times there are.
+
+        Raises:
+            CalibrationError: Nothing connects the frames; the message lists those there are.
+        """
+        target, source = _plain(target), _plain(source)
+        if not self._connected(target, source) and self._moving is not None:
+            moving, self._moving = self._moving, None
+            self._add(moving())
+        if not self._connected(target, source):
+            raise CalibrationError(
+                f"transforms: nothing connects the lidar's frame {source!r} and the camera's {target!r}; found "
+                f"{self._chains() or 'none'}; pass T_camera_lidar"
+            )
+        up_source, up_target = self._to_root(source, stamp_ns), self._to_root(target, stamp_ns)
+        return np.linalg.inv(up_target) @ up_source
+
+    def _ancestors(self, frame: str) -> list[str]:
+        found = [frame]
+        while found[-1] in self._edges and self._edges[found[-1]].parent not in found:
+            found.append(self._edges[found[-1]].parent)
+        return found
+
+    def _connected(self, one: str, other: str) -> bool:
+        return one == other or self._ancestors(one)[-1] == self._ancestors(other)[-1]
+
+    def _to_root(self, frame: str, stamp_ns: int) -> Matrix:
+        transform = np.eye(4)
+        for name in self._ancestors(frame)[:-1]:
+            transform = self._edges[name].at(stamp_ns) @ transform
+        return transform
+
+    def _chains(self) -> str:
+        """Every frame that is no parent, and the way up from it."""
+        parents = {edge.parent for edge in self._edges.values()}
+        chains = [" <- ".join(reversed(self._ancestors(frame))) for frame in sorted(self._edges.keys() - parents)]
+        return "; ".join(chains)
+
+
+def _plain(frame_id: str) -> str:
+    """The name without the slash that ROS 1 once put before it."""
+    return frame_id.removeprefix("/")
+
+
+def _matrix(message: RigidMessage, name: str) -> Matrix:
+    """(4, 4) from translation in metres and unit quaternion."""
+    q, t = message.rotation, message.translation
+    x, y, z, w = np.array([q.x, q.y, q.z, q.w], np.float64)
+    length = x * x + y * y + z * z + w * w
+    if not abs(length - 1) < 1e-3:
+        raise CalibrationError(f"transforms: the rotation from {name} has length {np.sqrt(length)}, expected 1")
+    s = 2 / length
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+        [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
+        [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
+    ]
+    matrix[:3, 3] = (t.x, t.y, t.z)
+    return matrix

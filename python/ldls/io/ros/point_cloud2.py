@@ -1,0 +1,152 @@
+"""PointCloud2 messages to arrays, and arrays to PointCloud2 messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.cloud import Points
+from ldls.errors import CorruptFileError, FileFormatError, InputError, UnsupportedFormatError
+from ldls.io.ros.messages import POINTS, FieldMessage, Header, PointsMessage, nanoseconds
+from ldls.io.ros.types import make, make_header
+
+DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+"""sensor_msgs/PointField: the number of each type."""
+POSITION = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """The N points of a PointCloud2 message, in its order; those of missing returns stay.
+
+    Attributes:
+        header: When and in which frame they were measured.
+        fields: (N,) structured array with every field of the message under its name, in this machine's byte order.
+    """
+
+    header: Header
+    fields: NDArray[np.void]
+
+    def points(self, names: Mapping[str, str] | None = None) -> Points:
+        """(N, 3) x y z in metres, or (N, 4) with intensity where there is one; float64 where x y z are.
+
+        Args:
+            names: What the message calls x, y, z and intensity, where it is not that.
+
+        Raises:
+            FileFormatError: x, y or z is missing or no real number; the message lists the fields there are.
+        """
+        called = {name: (names or {}).get(name, name) for name in (*POSITION, "intensity")}
+        self._check_position([called[name] for name in POSITION])
+        chosen = [name for name in called.values() if self._is_number(name)]
+        wide = any(self.fields.dtype[called[name]] == np.float64 for name in POSITION)
+        shape = (len(self.fields), len(chosen))
+        points: Points = np.empty(shape, np.float64) if wide else np.empty(shape, np.float32)
+        for column, name in enumerate(chosen):
+            points[:, column] = self.fields[name]
+        return points
+
+    def _is_number(self, name: str) -> bool:
+        return name in (self.fields.dtype.names or ()) and self.fields.dtype[name].shape == ()
+
+    def _check_position(self, names: list[str]) -> None:
+        for name in names:
+            if not self._is_number(name) or self.fields.dtype[name].kind != "f":
+                found = ", ".join(f"{n} {self.fields.dtype[n]}" for n in self.fields.dtype.names or ())
+                raise FileFormatError(
+                    f"points: expected a field {name!r} of float32 or float64, found {found or 'no fields'}; if it is "
+                    f'called otherwise, pass fields={{"{name}": its name}}'
+                )
+
+
+def decode(message: PointsMessage) -> PointCloud:
+    """The points of a message: `height` rows of `width` points, `row_step` and `point_step` bytes apart.
+
+    Raises:
+        CorruptFileError: Fields reach beyond the point, or the data are fewer than width and height say.
+        UnsupportedFormatError: A field has a type that PointField does not know.
+    """
+    layout = _layout(message)
+    width, height = message.width, message.height
+    content = np.ascontiguousarray(message.data).view(np.uint8)
+    needed = (height - 1) * message.row_step + width * message.point_step if width and height else 0
+    if message.row_step < width * message.point_step and height > 1:
+        raise CorruptFileError(
+            f"points: row_step is {message.row_step}, expected {width} points of {message.point_step} bytes or more"
+        )
+    if len(content) < needed:
+        raise CorruptFileError(
+            f"points: {len(content)} bytes, expected {needed} for {height} rows of {width} points of "
+            f"{message.point_step} bytes"
+        )
+    steps = (message.row_step, message.point_step)
+    rows: NDArray[np.void] = np.ndarray((height if needed else 0, width), layout, content, strides=steps)
+    header = Header(nanoseconds(message.header.stamp), message.header.frame_id)
+    return PointCloud(header, rows.astype(layout.newbyteorder("=")).reshape(-1))
+
+
+def _layout(message: PointsMessage) -> np.dtype[np.void]:
+    order = ">" if message.is_bigendian else "<"
+    names = [field.name for field in message.fields]
+    if len(set(names)) != len(names):
+        raise CorruptFileError(f"points: fields {', '.join(names)}, expected each name once")
+    formats = [_format(field, order) for field in message.fields]
+    for field, kind in zip(message.fields, formats, strict=True):
+        if field.offset + np.dtype(kind).itemsize > message.point_step:
+            raise CorruptFileError(
+                f"points: field {field.name!r} at byte {field.offset} reaches beyond the point of "
+                f"{message.point_step} bytes"
+            )
+    offsets = [field.offset for field in message.fields]
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": message.point_step})
+
+
+def _format(field: FieldMessage, order: str) -> Any:  # noqa: ANN401
+    if field.datatype not in DATATYPES:
+        raise UnsupportedFormatError(f"points: field {field.name!r} has type {field.datatype}, expected 1 to 8")
+    kind = order + DATATYPES[field.datatype]
+    # some writers count 0 where they mean 1
+    return kind if field.count <= 1 else (kind, (field.count,))
+
+
+def encode(types: Any, columns: Mapping[str, NDArray[Any]], header: Header) -> PointsMessage:  # noqa: ANN401
+    """A message with a field for each column (N,), one after the other without gaps, little-endian.
+
+    Raises:
+        InputError: Columns differ in length or have a type that PointField does not know.
+    """
+    known = {kind: number for number, kind in DATATYPES.items()}
+    lengths = {len(column) for column in columns.values()}
+    if len(lengths) != 1:
+        raise InputError(f"columns: expected one length, got {sorted(lengths)}")
+    fields, offset = [], 0
+    for name, column in columns.items():
+        kind = column.dtype.str[1:]
+        if kind not in known or column.ndim != 1:
+            raise InputError(f"columns: {name!r} is {column.dtype} {column.shape}, expected (N,) numbers")
+        fields.append(
+            make(types, "sensor_msgs/msg/PointField", name=name, offset=offset, datatype=known[kind], count=1)
+        )
+        offset += column.dtype.itemsize
+    count = lengths.pop()
+    packed = np.empty(count, [(name, "<" + column.dtype.str[1:]) for name, column in columns.items()])
+    for name, column in columns.items():
+        packed[name] = column
+    message: PointsMessage = make(
+        types,
+        POINTS,
+        header=make_header(types, header),
+        height=1,
+        width=count,
+        fields=fields,
+        is_bigendian=False,
+        point_step=offset,
+        row_step=offset * count,
+        data=packed.view(np.uint8).reshape(-1) if count else np.zeros(0, np.uint8),
+        is_dense=all(column.dtype.kind != "f" or bool(np.isfinite(column).all()) for column in columns.values()),
+    )
+    return message
