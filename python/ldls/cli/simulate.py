@@ -12,6 +12,7 @@ from rich.table import Table
 
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import SuitePart
+from ldls.cli.simulate_bag import write_bag
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -43,10 +44,16 @@ class CameraName(StrEnum):
 
 
 class Layout(StrEnum):
-    """How frames lie in folders."""
+    """What the files are."""
 
     KITTI = "kitti"
     KITTI_RAW = "kitti-raw"
+    ROSBAG1 = "rosbag1"
+    ROSBAG2 = "rosbag2"
+    MCAP = "mcap"
+
+
+BAGS = (Layout.ROSBAG1, Layout.ROSBAG2, Layout.MCAP)
 
 
 @speaks_plainly
@@ -75,6 +82,13 @@ def simulate(
         typer.Option("--errors/--no-errors", help="Masks, calibration and clocks wrong as in life, or perfect."),
     ] = True,
     processes: Annotated[int, typer.Option(min=1, help="Frames made at a time.")] = 2,
+    layout: Annotated[
+        Layout,
+        typer.Option(
+            help="KITTI's object folders, or the ROS bag of a robot that drives through a campus; --scene, --lidar and "
+            "--camera then do not count."
+        ),
+    ] = Layout.KITTI,
 ) -> None:
     """Make scenes with perfect labels: streets and campuses, seen by a lidar and a camera.
 
@@ -88,10 +102,18 @@ def simulate(
     A seed is a frame, or a drive: the same one gives the same files. Frames that are there already are kept.
     Needs the extra `sim` of ldls.
 
+    With --layout rosbag1, rosbag2 (SQLite) or mcap, OUT holds a bag of the VLP-16 and the camera of a robot, ten
+    frames a second, and masks and annotations named by stamp. Needs the extra `ros` too.
+
     Example: ldls simulate scenes --frames 5 --scene campus, and then ldls segment
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt
     --masks scenes/training/masks/000000.json --out results
     """
+    if layout in BAGS:
+        if suite:
+            raise ParameterError(f"--suite: the suite is in KITTI's layout; use --frames with --layout {layout.value}")
+        write_bag(out, layout.value, frames=frames, seed=seed, errors=errors)
+        return
     if layout is Layout.KITTI_RAW:
         where, total, making = _drive(out, suite, frames, seed, scene, lidar, camera, errors, processes)
     else:

@@ -14,6 +14,8 @@ from ldls.simulation.photograph import PixelTruth
 from ldls.simulation.production import FrameOrder, FrameSummary, make_frames
 from ldls.simulation.raw_layout import drive_folder, write_drive
 from ldls.simulation.rig import Rig, make_rig
+from ldls.simulation.robot_drive import Moment, robot_drive
+from ldls.simulation.ros_layout import write_robot_drive
 from ldls.simulation.scenes import Scene, make_scene
 from ldls.simulation.segmenting import segmented, true_masks
 from ldls.simulation.suite import make_suite, suite, suite_folder, suite_orders
@@ -25,6 +27,7 @@ __all__ = [
     "FrameSummary",
     "Lidar",
     "PixelTruth",
+    "Moment",
     "Rig",
     "Scene",
     "SceneFrame",
@@ -37,6 +40,8 @@ __all__ = [
     "drive_frame",
     "make_frames",
     "make_rig",
+    "robot_drive",
+    "write_robot_drive",
     "make_scene",
     "make_suite",
     "scene_frame",

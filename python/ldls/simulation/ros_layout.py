@@ -1,0 +1,233 @@
+"""A simulated drive as a ROS bag, with masks and truth beside it.
+
+OUT/drive.bag or OUT/drive/     the bag: ROS 1, or ROS 2 with SQLite or MCAP storage
+OUT/masks/STAMP.json            what a segmenter finds in the image of the sweep, as COCO JSON with scores
+OUT/annotations/STAMP.txt       `instance class`, a line a point of the sweep; `0 background` for no object
+
+STAMP is that of the sweep in nanoseconds, the name that `ldls.datasets.RosBag` gives the frame.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ldls.io.ros.bags import Topic
+from ldls.io.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, NANOSECONDS, POINTS, TRANSFORMS, Header
+from ldls.io.ros.point_cloud2 import encode
+from ldls.io.ros.types import make, make_header
+from ldls.io.ros.writer import BagWriter
+from ldls.io.whole_file import whole_file
+from ldls.simulation.boxes import annotation_name
+from ldls.simulation.robot_drive import IMAGE_DELAY_S, PERIOD_S, ROBOT, Moment, robot_drive
+from ldls.simulation.errors import SegmenterErrors
+from ldls.simulation.kitti_layout import NOTHING, coco_document
+from ldls.simulation.lenses import LensModel
+from ldls.simulation.scanning import Sweep
+
+START_NS = 1_700_000_000 * NANOSECONDS
+"""Stamp of the first sweep."""
+LATENCY_NS = 3_000_000
+"""How long after its stamp a message is received."""
+POINTS_TOPIC, INFO_TOPIC, IMAGE_TOPIC = "/velodyne_points", "/camera/camera_info", "/camera/image_raw"
+LIDAR_FRAME, OPTICAL_FRAME = "velodyne", "camera_optical_frame"
+OPTICAL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+"""Axes of an optical frame (right, down, forward), as columns in those of a body (forward, left, up)."""
+
+
+def write_robot_drive(
+    folder: str | PathLike[str],
+    kind: str,
+    *,
+    frames: int = 20,
+    seed: int = 0,
+    segmenter: SegmenterErrors | None = None,
+    compressed: bool = False,
+) -> Path:
+    """Write the bag of a robot's drive through a campus; where it is.
+
+    The bag has /velodyne_points (x y z intensity ring time, as the VLP-16's driver has it), /camera/image_raw (or
+    /camera/image_raw/compressed), /camera/camera_info with a plumb_bob lens, /tf_static and /tf.
+
+    Args:
+        folder: Where to write; made if need be.
+        kind: "rosbag1", "rosbag2" (SQLite) or "mcap".
+        frames: How many sweeps, ten a second.
+        seed: Which scene, and which noise.
+        segmenter: How wrong the masks are; `SegmenterErrors()` by default.
+        compressed: Whether images are PNG rather than raw.
+
+    Raises:
+        ParameterError: There is no such kind, or `frames` is below 1.
+        FileExistsError: The bag is there already.
+        ImportError: `ldls[sim,ros]` is not installed.
+    """
+    folder = Path(folder)
+    path = folder / ("drive.bag" if kind == "rosbag1" else "drive")
+    bag = BagWriter(path, kind)
+    folder.mkdir(parents=True, exist_ok=True)
+    with bag:
+        image_topic = f"{IMAGE_TOPIC}/compressed" if compressed else IMAGE_TOPIC
+        bag.add_topic(Topic("/tf_static", TRANSFORMS, 0, latched=True))
+        bag.add_topic(Topic("/tf", TRANSFORMS, 0))
+        bag.add_topic(Topic(POINTS_TOPIC, POINTS, 0))
+        bag.add_topic(Topic(image_topic, COMPRESSED_IMAGE if compressed else IMAGE, 0))
+        bag.add_topic(Topic(INFO_TOPIC, CAMERA_INFO, 0))
+        bag.write("/tf_static", _static_transforms(bag.types), START_NS)
+        for moment in robot_drive(frames, seed=seed, segmenter=segmenter):
+            _write_moment(bag, image_topic, moment)
+            _write_beside(folder, moment)
+    return path
+
+
+def _stamp_ns(seconds: float) -> int:
+    return START_NS + round(seconds * NANOSECONDS)
+
+
+def _write_moment(bag: BagWriter, image_topic: str, moment: Moment) -> None:
+    swept, taken = _stamp_ns(moment.seconds), _stamp_ns(moment.seconds + IMAGE_DELAY_S)
+    image_header = make_header(bag.types, Header(taken, OPTICAL_FRAME))
+    image = (_png if image_topic.endswith("compressed") else _image)(bag.types, moment.image, image_header)
+    info = _camera_info(bag.types, image_header)
+    cloud = encode(bag.types, velodyne_columns(moment.sweep), Header(swept, LIDAR_FRAME))
+    way = np.eye(4)
+    way[0, 3] = moment.travelled_m
+    moved = make(bag.types, TRANSFORMS, transforms=[_transform(bag.types, Header(swept, "odom"), "base_link", way)])
+    for topic, message, stamp_ns in (
+        ("/tf", moved, swept),
+        (POINTS_TOPIC, cloud, swept),
+        (image_topic, image, taken),
+        (INFO_TOPIC, info, taken),
+    ):
+        bag.write(topic, message, stamp_ns + LATENCY_NS)
+
+
+def velodyne_columns(sweep: Sweep) -> dict[str, NDArray[Any]]:
+    """The fields of the VLP-16's driver: ring 0 is the lowest beam, intensity 0 to 255, time in seconds of the turn."""
+    x, y, z, intensity = sweep.points.T
+    turned = (np.pi - np.arctan2(y, x)) / (2 * np.pi)
+    beams = len(ROBOT.lidar.elevations_deg)
+    return {
+        "x": x,
+        "y": y,
+        "z": z,
+        "intensity": np.round(255 * intensity).astype(np.float32),
+        "ring": (beams - 1 - sweep.rings).astype(np.uint16),
+        "time": (PERIOD_S * turned).astype(np.float32),
+    }
+
+
+def _image(types: Any, pixels: NDArray[np.uint8], header: Any) -> Any:  # noqa: ANN401
+    height, width, _ = pixels.shape
+    return make(
+        types,
+        IMAGE,
+        header=header,
+        height=height,
+        width=width,
+        encoding="rgb8",
+        is_bigendian=0,
+        step=3 * width,
+        data=pixels.reshape(-1),
+    )
+
+
+def _png(types: Any, pixels: NDArray[np.uint8], header: Any) -> Any:  # noqa: ANN401
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "PNG", compress_level=3)
+    data = np.frombuffer(file.getvalue(), np.uint8)
+    return make(types, COMPRESSED_IMAGE, header=header, format="rgb8; png compressed bgr8", data=data)
+
+
+def _camera_info(types: Any, header: Any) -> Any:  # noqa: ANN401
+    model = ROBOT.cameras[0].model
+    assert isinstance(model, LensModel)
+    region = make(
+        types,
+        "sensor_msgs/msg/RegionOfInterest",
+        x_offset=0,
+        y_offset=0,
+        height=0,
+        width=0,
+        do_rectify=False,
+    )
+    matrices: dict[str, NDArray[np.float64]] = {
+        "D": np.array(model.distortion.coefficients),
+        "K": model.projection()[:, :3].reshape(-1),
+        "R": np.eye(3).reshape(-1),
+        "P": model.projection().reshape(-1),
+    }
+    fields = types.types[CAMERA_INFO].__dataclass_fields__
+    return make(
+        types,
+        CAMERA_INFO,
+        header=header,
+        height=model.height,
+        width=model.width,
+        distortion_model=model.distortion.model,
+        binning_x=0,
+        binning_y=0,
+        roi=region,
+        **{name if name in fields else name.lower(): matrix for name, matrix in matrices.items()},
+    )
+
+
+def _static_transforms(types: Any) -> Any:  # noqa: ANN401
+    """From the robot's body to the lidar, to the camera, and from the camera's body to its optical frame."""
+    lidar, camera, optical = np.eye(4), np.eye(4), np.eye(4)
+    lidar[2, 3] = ROBOT.height_m
+    camera[:3, 3] = lidar[:3, 3] + ROBOT.cameras[0].position_m
+    optical[:3, :3] = OPTICAL
+    edges = (
+        ("base_link", LIDAR_FRAME, lidar),
+        ("base_link", "camera_link", camera),
+        ("camera_link", OPTICAL_FRAME, optical),
+    )
+    messages = [_transform(types, Header(START_NS, parent), child, matrix) for parent, child, matrix in edges]
+    return make(types, TRANSFORMS, transforms=messages)
+
+
+def _transform(types: Any, header: Header, child: str, T_parent_child: NDArray[np.float64]) -> Any:  # noqa: ANN401
+    x, y, z = T_parent_child[:3, 3].tolist()
+    qx, qy, qz, qw = _quaternion(T_parent_child[:3, :3])
+    transform = make(
+        types,
+        "geometry_msgs/msg/Transform",
+        translation=make(types, "geometry_msgs/msg/Vector3", x=x, y=y, z=z),
+        rotation=make(types, "geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+    )
+    stamped = "geometry_msgs/msg/TransformStamped"
+    return make(types, stamped, header=make_header(types, header), child_frame_id=child, transform=transform)
+
+
+def _quaternion(rotation: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """Quaternion x y z w of a rotation by less than half a turn."""
+    w = np.sqrt(1 + np.trace(rotation)) / 2
+    x, y, z = rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
+    return float(x / (4 * w)), float(y / (4 * w)), float(z / (4 * w)), float(w)
+
+
+def _write_beside(folder: Path, moment: Moment) -> None:
+    name = str(_stamp_ns(moment.seconds))
+    document = coco_document(moment.masks, round(moment.seconds / PERIOD_S), f"{name}.png")
+    _write(folder / "masks" / f"{name}.json", json.dumps(document).encode())
+    _write(folder / "annotations" / f"{name}.txt", "".join(f"{line}\n" for line in _annotations(moment)).encode())
+
+
+def _annotations(moment: Moment) -> Iterator[str]:
+    for instance, category in zip(moment.sweep.instances.tolist(), moment.categories.tolist(), strict=True):
+        yield f"{instance} {annotation_name(category)}" if instance else NOTHING
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(path) as file:
+        file.write(content)
