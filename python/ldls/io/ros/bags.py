@@ -22,6 +22,7 @@ from ldls.errors import (
 )
 from ldls.io.ros.messages import seconds
 from ldls.io.ros.salvage import Salvage, salvage
+from ldls.io.ros.salvage_db3 import check_size
 from ldls.io.ros.types import standard_types
 
 SUFFIXES = (".bag", ".db3", ".mcap")
@@ -122,32 +123,34 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
         raise FileNotFoundError(f"{path}: no such bag")
     if path.is_file() and path.suffix not in SUFFIXES:
         raise UnsupportedFormatError(f"{path}: expected a {', '.join(SUFFIXES)} file or a folder with metadata.yaml")
+    files = _storage_files(path)
     try:
+        for file in files:
+            if file.suffix == ".db3":
+                check_size(file)
         return _IndexedBag(path)
     except FileFormatError as error:
-        found = salvage(_storage_files(path, error))
+        found = salvage(files)
         if found.damage is None and not found.messages:
             raise
-        return _salvaged(path, found, found.damage or str(error), recover)
+        damage = f"{path}: {found.damage}" if found.damage else str(error)
+        return _salvaged(path, found, damage, recover)
 
 
 def _salvaged(path: Path, found: Salvage, damage: str, recover: bool) -> Bag:
     last = f"the last at {seconds(found.messages[-1].received_ns)}" if found.messages else "so nothing can be saved"
-    message = f"{path}: {damage}; {len(found.messages)} whole messages before it, {last}"
+    message = f"{damage}; {len(found.messages)} whole messages before it, {last}"
     if not recover:
         raise TruncatedFileError(f"{message}; pass recover=True to read them")
     warnings.warn(message, RecoveredFileWarning, stacklevel=4)
     return _SalvagedBag(path, found)
 
 
-def _storage_files(path: Path, error: FileFormatError) -> list[Path]:
-    """The storage files of a bag, in the order of their names."""
+def _storage_files(path: Path) -> list[Path]:
+    """The storage files of a bag, in the order of their names; none where they are compressed."""
     if path.is_file():
         return [path]
-    files = sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
-    if not files:
-        raise error
-    return files
+    return sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
 
 
 class _IndexedBag:

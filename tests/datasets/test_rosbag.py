@@ -1,0 +1,247 @@
+"""Small bags through the source: what comes out, and what is refused and how."""
+
+import pickle
+import shutil
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+
+from datasets.ros_samples import START_NS, STEP_NS, Recording, picture
+from ldls.datasets import RosBag
+from ldls.errors import (
+    CalibrationError,
+    CorruptFileError,
+    FileFormatError,
+    InputError,
+    ParameterError,
+    RecoveredFileWarning,
+    TruncatedFileError,
+    UnsupportedFormatError,
+)
+from ldls.stages import project
+
+KINDS = ("rosbag1", "rosbag2", "mcap")
+LIDAR_TO_OPTICAL = np.array([[0, -1, 0, 0], [0, 0, -1, -1], [1, 0, 0, 0], [0, 0, 0, 1.0]])
+"""Between the frames of a `Recording`: the lidar is 1 m above the camera."""
+
+
+def written(tmp_path, **changes):
+    recording = Recording(**changes)
+    return recording.write(tmp_path / ("small.bag" if recording.kind == "rosbag1" else "small"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_hold_clouds_images_and_cameras(tmp_path, kind):
+    bag = RosBag(written(tmp_path, kind=kind))
+    assert (len(bag), bag.kind, bag.unpaired) == (3, "rosbag", 0)
+    assert bag.names == tuple(str(START_NS + k * STEP_NS) for k in range(3))
+    np.testing.assert_allclose(bag.offsets_s, 0.01)
+    for number, frame in enumerate(bag):
+        expected = np.column_stack(list(Recording().cloud(number).values()))
+        np.testing.assert_array_equal(frame.points, expected)
+        assert frame.points.dtype == np.float32
+        (image,) = frame.images
+        assert (frame.stamp, image.stamp) == pytest.approx((1000 + 0.1 * number, 1000.01 + 0.1 * number))
+        np.testing.assert_array_equal(image.read(), picture(number))
+        np.testing.assert_allclose(image.camera.T_camera_lidar, LIDAR_TO_OPTICAL, atol=1e-9)
+        assert image.camera.distortion.model == "plumb_bob"
+        assert image.camera.image_size == (60, 80)
+    assert bag.header(1).stamp_ns == START_NS + STEP_NS
+    assert bag.header(1).frame_id == "lidar"
+    with pytest.raises(IndexError, match="there are 3"):
+        bag[3]
+
+
+@pytest.mark.parametrize(("kind", "suffix"), [("rosbag2", ".db3"), ("mcap", ".mcap")])
+def test_bare_storage_files_are_bags(tmp_path, kind, suffix):
+    bag = RosBag(written(tmp_path, kind=kind) / f"small{suffix}")
+    np.testing.assert_array_equal(bag[2].images[0].read(), picture(2))
+
+
+def test_a_source_travels_between_processes(tmp_path):
+    bag = pickle.loads(pickle.dumps(RosBag(written(tmp_path))))
+    frame = pickle.loads(pickle.dumps(bag[1]))
+    np.testing.assert_array_equal(frame.images[0].read(), picture(1))
+
+
+def test_doubles_stay_doubles(tmp_path):
+    assert RosBag(written(tmp_path, point_dtype=np.float64))[0].points.dtype == np.float64
+
+
+def test_clouds_need_no_images(tmp_path):
+    bag = RosBag(written(tmp_path, image_topics=(), info_topics=()), image_topics=())
+    assert len(bag) == 3 and bag[0].images == () and bag.offsets_s.shape == (3, 0)
+
+
+def test_sweeps_without_an_image_are_no_frames(tmp_path):
+    path = written(tmp_path, image_offset_ns=STEP_NS + 10_000_000)
+    bag = RosBag(path)
+    assert (len(bag), bag.unpaired) == (2, 1)
+    assert bag.names[0] == str(START_NS + STEP_NS)
+    np.testing.assert_array_equal(bag[0].images[0].read(), picture(0))
+    assert len(RosBag(path, max_offset_s=0.2)) == 3
+
+
+def test_several_cameras_have_their_own_topics(tmp_path):
+    topics = ("/left/image_raw", "/right/image_rect_color")
+    path = written(tmp_path, image_topics=topics, info_topics=("/left/camera_info", "/right/camera_info"))
+    left, right = RosBag(path, image_topics=topics)[0].images
+    assert (left.name, right.name) == ("left_image_raw", "right_image_rect_color")
+    assert left.camera.projection[0, 0] == 100 and not left.camera.distortion.is_none
+    assert right.camera.projection[0, 0] == 110 and right.camera.distortion.is_none
+
+
+def test_moving_frames_are_looked_up_at_the_nearest_time(tmp_path):
+    path = written(tmp_path, edges=(("base", "lidar"), ("head", "camera")), moving=(("base", "head"),))
+    heights = [frame.images[0].camera.T_camera_lidar[1, 3] for frame in RosBag(path)]
+    np.testing.assert_allclose(heights, [-1, 0, 1], atol=1e-9)
+
+
+@pytest.mark.parametrize("as_file", [False, True], ids=["array", "text file"])
+def test_a_given_transform_comes_first(tmp_path, as_file):
+    given = np.eye(4)
+    given[0, 3] = 0.25
+    if as_file:
+        np.savetxt(tmp_path / "T.txt", given[:3], header="camera from lidar")
+    bag = RosBag(written(tmp_path, edges=()), T_camera_lidar=tmp_path / "T.txt" if as_file else given)
+    np.testing.assert_array_equal(bag[0].images[0].camera.T_camera_lidar, given)
+
+
+def test_binning_and_region_move_and_scale_pixels(tmp_path):
+    whole = RosBag(written(tmp_path, D=[]))[0].images[0].camera
+    part = Recording(D=[], binning=2, region=(10, 20, 40, 50)).write(tmp_path / "part.bag")
+    camera = RosBag(part)[0].images[0].camera
+    assert camera.image_size == (20, 25)
+    points = np.array([[10.0, 0.3, 0.9], [10.0, -0.1, -0.5]])
+    (_, whole_uv), (_, uv) = (project(points, c, image_size=(60, 80)) for c in (whole, camera))
+    np.testing.assert_allclose(uv, (whole_uv + 0.5 - (20, 10)) / 2 - 0.5)
+
+
+def test_a_field_of_another_name_can_be_named(tmp_path):
+    path = written(tmp_path, columns=("px", "y", "z"))
+    assert RosBag(path, fields={"x": "px"})[0].points.shape == (50, 3)
+
+
+def test_names_count_where_stamps_repeat(tmp_path):
+    path = written(tmp_path, stamps_stand_still=True, sweeps=1)
+    assert RosBag(path).names == (str(START_NS),)
+
+
+ROWS = [
+    pytest.param({}, {"points_topic": "/nope"}, InputError, "no such topic.*/points .sensor_msgs/msg/PointCloud2, 3",
+                 id="no such topic"),
+    pytest.param({}, {"points_topic": "/camera/image_raw"}, InputError, "sensor_msgs/msg/Image, expected PointCloud2",
+                 id="topic of another type"),
+    pytest.param({"image_topics": ("/a/image", "/b/image")}, {}, InputError, "2 topics of Image or CompressedImage",
+                 id="two image topics to guess from"),
+    pytest.param({"info_topics": ()}, {}, InputError, "info_topics: no topics of CameraInfo", id="no CameraInfo"),
+    pytest.param({"sweeps": 0}, {}, InputError, "has no messages", id="no messages"),
+    pytest.param({"image_offset_ns": 5_000_000_000}, {}, InputError, r"within 0.05 s.*nearest is \+4\.800000 s off",
+                 id="stamps that never match"),
+    pytest.param({"stamps_stand_still": True}, {}, InputError, "all 3 messages of /points have the stamp",
+                 id="a clock that stands still"),
+    pytest.param({}, {"max_offset_s": -1}, ParameterError, "max_offset_s: got -1", id="negative tolerance"),
+    pytest.param({}, {"T_camera_lidar": {"/nope": np.eye(4)}}, ParameterError, "/nope is none of /camera/image_raw",
+                 id="transform of no camera"),
+    pytest.param({}, {"image_topics": "/camera/image_raw"}, InputError, "put it in brackets", id="topic, not a list"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "options", "error", "message"), ROWS)
+def test_what_cannot_be_opened_is_refused(tmp_path, changes, options, error, message):
+    path = written(tmp_path, **changes)
+    with pytest.raises(error, match=message):
+        RosBag(path, **options)
+
+
+FRAME_ROWS = [
+    pytest.param({"edges": ()}, CalibrationError, "nothing connects .*'lidar' .*'camera'; found none", id="no tf"),
+    pytest.param({"edges": (("base", "lidar"), ("map", "pole"))}, CalibrationError,
+                 "found base <- lidar; map <- pole", id="missing transform"),
+    pytest.param({"model": "cata_fish"}, CalibrationError, "'cata_fish' is unknown", id="unknown distortion"),
+    pytest.param({"K": [0.0] * 9}, CalibrationError, "K: all zeros, so the camera is not calibrated", id="zero K"),
+    pytest.param({"columns": ("x", "y", "height")}, FileFormatError, "field 'z'.*x float32, y float32, height float32",
+                 id="missing field"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "error", "message"), FRAME_ROWS)
+def test_frames_that_cannot_be_read_say_why(tmp_path, changes, error, message):
+    bag = RosBag(written(tmp_path, **changes))
+    with pytest.raises(error, match=message) as caught:
+        bag[0]
+    assert str(bag.path) in str(caught.value)
+
+
+def test_an_image_of_another_size_than_its_calibration_is_refused(tmp_path):
+    image = RosBag(written(tmp_path, size=(480, 640)))[0].images[0]
+    with pytest.raises(CalibrationError, match=r"image is \(60, 80\), its CameraInfo says \(480, 640\)"):
+        image.read()
+
+
+def storage(path):
+    """The one storage file of a bag."""
+    return path if path.is_file() else next(p for p in path.iterdir() if p.suffix != ".yaml")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 0.999])
+def test_truncated_bags_say_how_far_they_are_whole(tmp_path, kind, share):
+    path = written(tmp_path, kind=kind, sweeps=60)
+    file = storage(path)
+    content = file.read_bytes()
+    file.write_bytes(content[: int(len(content) * share)])
+    with pytest.raises(TruncatedFileError, match=r"whole messages before it, the last at 100\d\.\d{9}; pass recover"):
+        RosBag(path)
+    with pytest.warns(RecoveredFileWarning, match="whole messages"):
+        bag = RosBag(path, recover=True)
+    assert 60 * (share - 0.35) < len(bag) <= 60
+    last = len(bag) - 1
+    np.testing.assert_array_equal(bag[last].images[0].read(), picture(last))
+    np.testing.assert_array_equal(bag[last].points, np.column_stack(list(Recording().cloud(last).values())))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("size", [0, 5, 13, 40, 120])
+def test_bags_cut_off_at_the_head_are_refused(tmp_path, kind, size):
+    path = written(tmp_path, kind=kind)
+    file = storage(path)
+    file.write_bytes(file.read_bytes()[:size])
+    with pytest.raises((TruncatedFileError, CorruptFileError), match="small"):
+        RosBag(path)
+
+
+def test_a_bag_that_was_never_closed_has_no_index(tmp_path):
+    path = written(tmp_path)
+    content = bytearray(path.read_bytes())
+    at = content.index(b"index_pos=") + len(b"index_pos=")
+    content[at : at + 8] = bytes(8)
+    path.write_bytes(content)
+    with pytest.raises(TruncatedFileError, match="has no index, as its recording was not closed; 10 whole messages"):
+        RosBag(path)
+    with pytest.warns(RecoveredFileWarning):
+        assert len(RosBag(path, recover=True)) == 3
+
+
+def test_a_folder_without_metadata_can_be_recovered(tmp_path):
+    path = written(tmp_path, kind="mcap")
+    (path / "metadata.yaml").unlink()
+    with pytest.raises(TruncatedFileError, match="no metadata.yaml"):
+        RosBag(path)
+    with pytest.warns(RecoveredFileWarning):
+        assert len(RosBag(path, recover=True)) == 3
+
+
+def test_what_is_no_bag_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no such bag"):
+        RosBag(tmp_path / "none.bag")
+    (tmp_path / "text.txt").write_text("text")
+    with pytest.raises(UnsupportedFormatError, match=".bag, .db3, .mcap"):
+        RosBag(tmp_path / "text.txt")
+    with pytest.raises(CorruptFileError, match="no metadata.yaml"):
+        RosBag(tmp_path)
+    shutil.copy(tmp_path / "text.txt", tmp_path / "text.bag")
+    with pytest.raises((CorruptFileError, TruncatedFileError), match="no ROS 1 bag"):
+        RosBag(tmp_path / "text.bag")
