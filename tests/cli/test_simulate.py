@@ -39,6 +39,7 @@ def test_no_errors_means_perfect_masks_and_calibration(tmp_path):
         pytest.param(["--suite", "tuning", "--no-errors"], id="a suite without its errors"),
         pytest.param(["--suite", "tuning", "--layout", "kitti-raw"], id="a suite as a drive"),
         pytest.param(["--camera", "ring", "--layout", "kitti-raw"], id="a drive with a ring"),
+        pytest.param(["--suite", "tuning", "--layout", "mcap"], id="a suite as a bag"),
     ],
 )
 def test_what_cannot_be_made_is_refused(tmp_path, arguments):
@@ -53,3 +54,14 @@ def test_a_drive_is_written_in_the_raw_layout(tmp_path):
     assert len(list((drive / "velodyne_points/data").iterdir())) == 2
     assert len((drive / "image_02/timestamps.txt").read_text().splitlines()) == 2
     assert "kept 2" in run(tmp_path, "--frames", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL).output
+
+
+@pytest.mark.parametrize(("layout", "name"), [("rosbag1", "drive.bag"), ("mcap", "drive/drive.mcap")])
+def test_a_drive_is_a_bag_with_masks_beside_it(tmp_path, layout, name):
+    pytest.importorskip("rosbags")
+    result = run(tmp_path / "out", "--frames", 1, "--layout", layout)
+    assert result.exit_code == 0, result.output
+    assert "wrote 1 sweeps" in result.output
+    assert (tmp_path / "out" / name).is_file()
+    assert [p.name for p in (tmp_path / "out/masks").iterdir()] == ["1700000000000000000.json"]
+    assert run(tmp_path / "out", "--frames", 1, "--layout", layout).exit_code != 0

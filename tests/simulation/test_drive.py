@@ -1,0 +1,160 @@
+"""The simulated robot: its lens, its bag, and its sweeps through the source to labels and back."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+pytest.importorskip("embreex")
+
+import ldls
+from ldls.datasets import RosBag
+from ldls.errors import CalibrationError, ParameterError
+from ldls.evaluation import read_annotations
+from ldls.io.labelled_bag import LabelledBag
+from ldls.simulation import SegmenterErrors, drive, write_drive
+from ldls.simulation.drive import ROBOT
+from ldls.simulation.lenses import LensModel, distorted, undistorted
+from ldls.stages import project
+
+KINDS = {"rosbag1": "drive.bag", "rosbag2": "drive", "mcap": "drive"}
+FRAMES, SEED = 4, 0
+RATIONAL = ldls.Distortion("rational_polynomial", (0.1, -0.05, 1e-3, 2e-3, 0.01, 0.2, 0.1, 0.02))
+MODEL = ROBOT.cameras[0].model
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def drive_folder(request, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp(request.param)
+    kind = request.param
+    errors = SegmenterErrors.none()
+    path = write_drive(folder, kind, frames=FRAMES, seed=SEED, segmenter=errors, compressed=kind == "mcap")
+    assert path == folder / KINDS[kind]
+    return folder
+
+
+@pytest.fixture(scope="module")
+def moments():
+    return list(drive(FRAMES, seed=SEED, segmenter=SegmenterErrors.none()))
+
+
+def ious(labels, truth):
+    """IoU of each object that has 10 true points or more in view, with the label that overlaps it most."""
+    seen = labels >= 0
+    found = []
+    for number in np.unique(truth[seen & (truth > 0)]):
+        mine = truth[seen] == number
+        if mine.sum() >= 10:
+            others = [labels[seen] == label for label in np.unique(labels[seen & (labels > 0)])]
+            found.append(max(((mine & other).sum() / (mine | other).sum() for other in others), default=0.0))
+    return found
+
+
+def test_the_rays_of_a_lens_come_back_to_their_pixels():
+    points = 12 * MODEL.directions()
+    camera = ldls.Camera(projection=MODEL.projection(), distortion=MODEL.distortion)
+    in_view, pixels = project(points, camera, image_size=(480, 640))
+    assert len(in_view) > 0.99 * len(points)
+    v, u = np.divmod(in_view, 640)
+    np.testing.assert_allclose(pixels, np.column_stack([u, v]), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        pytest.param(
+            ldls.Distortion("rational_polynomial", (0.1, -0.05, 1e-3, 2e-3, 0.01, 0.2, 0.1, 0.02)), id="rational"
+        ),
+        pytest.param(ldls.Distortion(), id="none"),
+    ],
+)
+def test_undistorting_undoes_distorting(lens):
+    points = np.random.default_rng(0).uniform(-0.6, 0.6, (50, 2))
+    np.testing.assert_allclose(undistorted(distorted(points, lens), lens), points, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("lens", "match"),
+    [
+        pytest.param(ldls.Distortion("plumb_bob", (-3.0, 0, 0, 0)), "folds back", id="folds back"),
+        pytest.param(ldls.Distortion("equidistant", (0.1, 0, 0, 0)), "not simulated", id="fisheye"),
+    ],
+)
+def test_lenses_that_cannot_be_simulated(lens, match):
+    with pytest.raises(CalibrationError, match=match):
+        LensModel(64, 48, 40.0, (31.5, 23.5), lens).directions()
+
+
+def test_the_bag_holds_what_was_simulated(drive_folder, moments):
+    bag = RosBag(next(drive_folder.glob("drive*")))
+    assert len(bag) == FRAMES
+    np.testing.assert_allclose(bag.offsets_s, 0.012)
+    for number, (frame, moment) in enumerate(zip(bag, moments, strict=True)):
+        np.testing.assert_array_equal(frame.points[:, :3], moment.sweep.points[:, :3])
+        np.testing.assert_array_equal(bag.cloud(number).fields["ring"], 15 - moment.sweep.rings)
+        time = bag.cloud(number).fields["time"]
+        assert time.min() >= 0 and time.max() <= 0.1
+        (image,) = frame.images
+        np.testing.assert_array_equal(image.read(), moment.image)
+        assert image.camera.distortion == MODEL.distortion
+        np.testing.assert_allclose(image.camera.T_camera_lidar, ROBOT.cameras[0].T_camera_lidar(), atol=1e-12)
+        masks = ldls.InstanceMasks.from_coco(drive_folder / f"masks/{frame.name}.json")
+        np.testing.assert_array_equal(masks.to_array(), moment.masks.to_array())
+        truth = read_annotations(drive_folder / f"annotations/{frame.name}.txt")
+        np.testing.assert_array_equal(truth.instances, moment.sweep.instances)
+
+
+def test_from_bag_to_labelled_bag_and_back(drive_folder, moments, tmp_path):
+    source = RosBag(next(drive_folder.glob("drive*")))
+    kind = next(k for k in KINDS if drive_folder.name.startswith(k))
+    out = tmp_path / KINDS[kind]
+    results = []
+    with LabelledBag(out, kind) as bag:
+        bag.copy(source.path)
+        for number, frame in enumerate(source):
+            masks = ldls.InstanceMasks.from_coco(drive_folder / f"masks/{frame.name}.json")
+            results.append(ldls.segment(frame.points, masks, frame.images[0].camera))
+            bag.write(results[-1], source.header(number))
+    labelled = RosBag(out, points_topic="/points_labelled")
+    camera = ldls.Camera(
+        projection=MODEL.projection(), T_camera_lidar=ROBOT.cameras[0].T_camera_lidar(), distortion=MODEL.distortion
+    )
+    by_bag, direct = [], []
+    for number, (result, moment) in enumerate(zip(results, moments, strict=True)):
+        fields = labelled.cloud(number).fields
+        np.testing.assert_array_equal(fields["instance_id"], np.maximum(result.labels, 0))
+        np.testing.assert_array_equal(fields["class_id"], result.categories)
+        assert labelled.header(number) == source.header(number)
+        labels = np.where(result.labels < 0, -1, fields["instance_id"].astype(int))
+        by_bag += ious(labels, moment.sweep.instances)
+        direct += ious(ldls.segment(moment.sweep.points, moment.masks, camera).labels, moment.sweep.instances)
+    assert len(by_bag) >= 30
+    assert np.mean(by_bag) == pytest.approx(np.mean(direct), abs=0.01)
+    assert np.mean(by_bag) > 0.8
+
+
+def test_without_its_distortion_the_lens_costs_accuracy(moments):
+    true, pinhole = [], []
+    for moment in moments:
+        for found, lens in ((true, MODEL.distortion), (pinhole, ldls.Distortion())):
+            transform = ROBOT.cameras[0].T_camera_lidar()
+            camera = ldls.Camera(projection=MODEL.projection(), T_camera_lidar=transform, distortion=lens)
+            labels = ldls.segment(moment.sweep.points, moment.masks, camera).labels
+            found += ious(labels, moment.sweep.instances)
+    assert np.mean(true) > np.mean(pinhole) + 0.05
+
+
+def test_the_robot_drives_and_objects_move(moments):
+    assert [m.travelled_m for m in moments] == pytest.approx([0, 0.12, 0.24, 0.36])
+    assert not np.array_equal(moments[0].image, moments[3].image)
+    again = next(drive(1, seed=SEED, segmenter=SegmenterErrors.none()))
+    np.testing.assert_array_equal(again.sweep.points, moments[0].sweep.points)
+
+
+def test_bags_are_refused_before_anything_is_made(tmp_path):
+    with pytest.raises(ParameterError, match="kind"):
+        write_drive(tmp_path / "out", "rosbag3")
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(ParameterError, match="frames: got 0"):
+        next(drive(0))
