@@ -20,6 +20,7 @@ from ldls.errors import (
     TruncatedFileError,
     UnsupportedFormatError,
 )
+from ldls.io.ros.bags import open_bag
 from ldls.stages import project
 
 KINDS = ("rosbag1", "rosbag2", "mcap")
@@ -145,6 +146,7 @@ ROWS = [
     pytest.param({}, {"max_offset_s": -1}, ParameterError, "max_offset_s: got -1", id="negative tolerance"),
     pytest.param({}, {"T_camera_lidar": {"/nope": np.eye(4)}}, ParameterError, "/nope is none of /camera/image_raw",
                  id="transform of no camera"),
+    pytest.param({}, {"fields": {"X": "x"}}, ParameterError, "fields: got X, expected x, y, z", id="no such field"),
     pytest.param({}, {"image_topics": "/camera/image_raw"}, InputError, "put it in brackets", id="topic, not a list"),
 ]  # fmt: skip
 
@@ -245,3 +247,56 @@ def test_what_is_no_bag_is_refused(tmp_path):
     shutil.copy(tmp_path / "text.txt", tmp_path / "text.bag")
     with pytest.raises((CorruptFileError, TruncatedFileError), match="no ROS 1 bag"):
         RosBag(tmp_path / "text.bag")
+
+
+def repacked(path, target, kind, compression):
+    """The same messages in a bag whose chunks are compressed."""
+    from rosbags import rosbag1, rosbag2
+
+    source = open_bag(path)
+    if kind == "rosbag1":
+        writer = rosbag1.Writer(target)
+        writer.set_compression(rosbag1.Writer.CompressionFormat[compression])
+    else:
+        writer = rosbag2.Writer(target, version=8, storage_plugin=rosbag2.StoragePlugin.MCAP)
+        writer.set_compression(rosbag2.CompressionMode.STORAGE, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        connections = {
+            topic.name: writer.add_connection(topic.name, topic.type, typestore=source.types)
+            for topic in source.topics.values()
+        }
+        for message in source.messages(source.topics):
+            writer.write(connections[message.topic], message.received_ns, message.raw)
+    return target
+
+
+PACKED = pytest.mark.parametrize(
+    ("kind", "compression"), [("rosbag1", "BZ2"), ("rosbag1", "LZ4"), ("mcap", "ZSTD")], ids=["bz2", "lz4", "zstd"]
+)
+
+
+@PACKED
+def test_compressed_chunks_are_read_and_recovered(tmp_path, kind, compression):
+    source = written(tmp_path, kind=kind, sweeps=150)
+    path = repacked(source, tmp_path / ("packed.bag" if kind == "rosbag1" else "packed"), kind, compression)
+    assert len(RosBag(path)) == 150
+    content = storage(path).read_bytes()
+    storage(path).write_bytes(content[: int(0.8 * len(content))])
+    with pytest.raises(TruncatedFileError, match="pass recover"):
+        RosBag(path)
+    with pytest.warns(RecoveredFileWarning):
+        bag = RosBag(path, recover=True)
+    assert 50 < len(bag) < 150
+    last = len(bag) - 1
+    np.testing.assert_array_equal(bag[last].images[0].read(), picture(last))
+
+
+@PACKED
+def test_damage_in_the_middle_is_found_when_it_is_read(tmp_path, kind, compression):
+    source = written(tmp_path, kind=kind, sweeps=150)
+    path = repacked(source, tmp_path / ("packed.bag" if kind == "rosbag1" else "packed"), kind, compression)
+    content = bytearray(storage(path).read_bytes())
+    content[len(content) // 3 : len(content) // 3 + 5000] = bytes(5000)
+    storage(path).write_bytes(content)
+    with pytest.raises(FileFormatError, match="packed"):
+        list(RosBag(path))

@@ -30,8 +30,7 @@ class _Edge:
 
     def at(self, stamp_ns: int) -> Matrix:
         """The transform of the nearest time."""
-        distances = [abs(stamp - stamp_ns) for stamp in self.stamps_ns]
-        return self.transforms[distances.index(min(distances))]
+        return self.transforms[int(np.abs(np.array(self.stamps_ns, np.int64) - stamp_ns).argmin())]
 
 
 class TransformTree:

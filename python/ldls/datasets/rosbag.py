@@ -22,7 +22,7 @@ from ldls.errors import CalibrationError, FileFormatError, InputError, Parameter
 from ldls.io.ros.bags import decode, open_bag
 from ldls.io.ros.images import decode_compressed, decode_image
 from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, read_header, seconds
-from ldls.io.ros.point_cloud2 import PointCloud
+from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud
 from ldls.io.ros.point_cloud2 import decode as decode_points
 
 STATIC_TRANSFORMS, MOVING_TRANSFORMS = "/tf_static", "/tf"
@@ -91,12 +91,15 @@ class RosBag:
             TruncatedFileError: The bag's end is missing; the message has the stamp of the last whole message.
             CorruptFileError: It is no bag.
             InputError: A topic is missing or cannot be guessed, or no image is near any sweep in time.
-            ParameterError: `max_offset_s` is negative.
+            ParameterError: `max_offset_s` is negative, or a key of `fields` or `T_camera_lidar` is unknown.
             FileNotFoundError: There is no such file.
             ImportError: The extra `ros` is not installed.
         """
         if not max_offset_s >= 0:
             raise ParameterError(f"max_offset_s: got {max_offset_s!r}, expected 0 or more seconds")
+        unknown = sorted(set(fields or {}) - set(READ_FIELDS))
+        if unknown:
+            raise ParameterError(f"fields: got {', '.join(unknown)}, expected {', '.join(READ_FIELDS)}")
         self.path = Path(path)
         self.max_offset_s = max_offset_s
         self._recover = recover

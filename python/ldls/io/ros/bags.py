@@ -26,7 +26,9 @@ from ldls.io.ros.salvage_db3 import check_size
 from ldls.io.ros.types import standard_types
 
 SUFFIXES = (".bag", ".db3", ".mcap")
-BROKEN = (AssertionError, EOFError, IndexError, KeyError, OverflowError, TypeError, ValueError, struct.error)
+BROKEN = (
+    AssertionError, EOFError, IndexError, KeyError, OverflowError, RuntimeError, TypeError, ValueError, struct.error,
+)  # fmt: skip
 """What readers of storage files raise over bytes that make no sense."""
 
 
@@ -239,10 +241,15 @@ def _plain_errors(path: Path) -> Iterator[None]:
     readers = require("rosbags.highlevel", "ros")
     storages = (require("rosbags.rosbag1", "ros").ReaderError, require("rosbags.rosbag2", "ros").ReaderError)
     typesys = require("rosbags.typesys", "ros").TypesysError
-    sqlite = require("apsw", "ros").Error
+    others = (require("apsw", "ros").Error, require("rosbags.rosbag2.reader", "ros").zstd.ZstdError)
     try:
         yield
     except FileNotFoundError as error:
         raise CorruptFileError(f"{path}: no metadata.yaml; was the recording closed? ({error})") from None
-    except (readers.AnyReaderError, *storages, typesys, sqlite, *BROKEN) as error:
+    except OSError as error:
+        # bz2 says so of data that it cannot decompress, without the number that a disk's errors have
+        if error.errno is not None:
+            raise
+        raise CorruptFileError(f"{path}: cannot be read as a bag ({error})") from None
+    except (readers.AnyReaderError, *storages, typesys, *others, *BROKEN) as error:
         raise CorruptFileError(f"{path}: cannot be read as a bag ({error or type(error).__name__})") from None

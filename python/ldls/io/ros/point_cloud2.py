@@ -17,6 +17,8 @@ from ldls.io.ros.types import make, make_header
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """sensor_msgs/PointField: the number of each type."""
 POSITION = ("x", "y", "z")
+READ_FIELDS = (*POSITION, "intensity")
+"""What `PointCloud.points` has, in this order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,7 @@ class PointCloud:
         Raises:
             FileFormatError: x, y or z is missing or no real number; the message lists the fields there are.
         """
-        called = {name: (names or {}).get(name, name) for name in (*POSITION, "intensity")}
+        called = {name: (names or {}).get(name, name) for name in READ_FIELDS}
         self._check_position([called[name] for name in POSITION])
         chosen = [name for name in called.values() if self._is_number(name)]
         wide = any(self.fields.dtype[called[name]] == np.float64 for name in POSITION)

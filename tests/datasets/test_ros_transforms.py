@@ -1,0 +1,71 @@
+"""Chains of transforms."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ldls.datasets.ros_transforms import TransformTree
+from ldls.errors import CalibrationError
+
+QUARTER = (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5))
+"""A quarter turn to the left about z."""
+
+
+def edge(parent, child, xyz=(0, 0, 0), xyzw=(0, 0, 0, 1), seconds=0):
+    stamp = SimpleNamespace(sec=seconds, nanosec=0)
+    transform = SimpleNamespace(
+        translation=SimpleNamespace(x=xyz[0], y=xyz[1], z=xyz[2]),
+        rotation=SimpleNamespace(x=xyzw[0], y=xyzw[1], z=xyzw[2], w=xyzw[3]),
+    )
+    header = SimpleNamespace(frame_id=parent, stamp=stamp)
+    one = SimpleNamespace(header=header, child_frame_id=child, transform=transform)
+    return SimpleNamespace(transforms=[one])
+
+
+def test_a_chain_goes_up_and_down():
+    tree = TransformTree([edge("base", "mast", (1, 0, 0), QUARTER), edge("mast", "lidar", (0, 2, 0)),
+                          edge("base", "camera", (0, 0, 3))])  # fmt: skip
+    point = np.array([5.0, 0, 0, 1])
+    np.testing.assert_allclose(tree.lookup("base", "lidar", 0) @ point, [-1, 5, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(tree.lookup("camera", "lidar", 0) @ point, [-1, 5, -3, 1], atol=1e-12)
+    back = tree.lookup("lidar", "camera", 0) @ tree.lookup("camera", "lidar", 0)
+    np.testing.assert_allclose(back, np.eye(4), atol=1e-12)
+    np.testing.assert_array_equal(tree.lookup("lidar", "lidar", 0), np.eye(4))
+
+
+def test_a_slash_before_a_frame_means_nothing():
+    tree = TransformTree([edge("/base", "lidar", (1, 0, 0)), edge("base", "/camera")])
+    assert tree.lookup("/camera", "/lidar", 0)[0, 3] == 1
+
+
+def test_moving_frames_are_read_only_where_they_are_needed():
+    read = []
+
+    def moving():
+        read.append(True)
+        return [edge("base", "head", (second, 0, 0), seconds=second) for second in (1, 2, 4)]
+
+    tree = TransformTree([edge("base", "lidar"), edge("base", "fixed"), edge("head", "camera")], moving)
+    tree.lookup("fixed", "lidar", 0)
+    assert not read
+    heights = [tree.lookup("lidar", "camera", ns)[0, 3] for ns in (0, 1_600_000_000, 3_500_000_000, 9_000_000_000)]
+    assert heights == [1, 2, 4, 4] and read == [True]
+
+
+def test_frames_that_nothing_connects_are_listed():
+    tree = TransformTree([edge("base", "lidar"), edge("base", "arm"), edge("arm", "hand"), edge("map", "camera")])
+    with pytest.raises(CalibrationError, match="map <- camera; base <- arm <- hand; base <- lidar"):
+        tree.lookup("camera", "lidar", 0)
+
+
+def test_loops_end():
+    tree = TransformTree([edge("a", "b"), edge("b", "a")])
+    with pytest.raises(CalibrationError, match="nothing connects"):
+        tree.lookup("c", "a", 0)
+
+
+@pytest.mark.parametrize("xyzw", [(0, 0, 0, 0), (1, 1, 0, 0), (0, 0, 0, np.nan)], ids=["zero", "too long", "NaN"])
+def test_rotations_must_be_unit_quaternions(xyzw):
+    with pytest.raises(CalibrationError, match="rotation from base to lidar"):
+        TransformTree([edge("base", "lidar", xyzw=xyzw)])
