@@ -10,14 +10,14 @@ pytest.importorskip("rosbags")
 pytest.importorskip("embreex")
 
 from ldls.datasets import RosBag
-from ldls.simulation import write_drive
+from ldls.simulation import write_robot_drive
 
 GUIDE = (Path(__file__).parents[2] / "docs/ros.md").read_text()
 
 
 def test_from_a_bag_to_a_labelled_bag(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    write_drive("robot", "mcap", frames=2)
+    write_robot_drive("robot", "mcap", frames=2)
     example = next(code for code in re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL) if "import ldls" in code)
     names = {}
     exec(example, names)

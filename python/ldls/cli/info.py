@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -72,13 +72,13 @@ def info(
         raise typer.Exit(1)
 
 
-def parse_options(words: Sequence[str]) -> dict[str, str | int | bool | tuple[int, ...]]:
+def parse_options(words: Sequence[str]) -> dict[str, Any]:
     """Options by name; numbers, lists of numbers such as 2,3, and true and false are taken as such.
 
     Raises:
         ParameterError: One is not NAME=VALUE.
     """
-    options: dict[str, str | int | bool | tuple[int, ...]] = {}
+    options: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")
         if not name or not equals:

@@ -69,7 +69,10 @@ def simulate(
     ] = CameraName.KITTI,
     layout: Annotated[
         Layout,
-        typer.Option(help="Single scenes as KITTI's object data, or one drive through a scene as KITTI's raw data."),
+        typer.Option(
+            help="Single scenes as KITTI's object data, a drive through a scene as KITTI's raw data, or a robot's "
+            "drive through a campus as a ROS bag; --scene, --lidar, --camera and --processes then do not count."
+        ),
     ] = Layout.KITTI,
     suite: Annotated[
         SuitePart | None,
@@ -82,13 +85,6 @@ def simulate(
         typer.Option("--errors/--no-errors", help="Masks, calibration and clocks wrong as in life, or perfect."),
     ] = True,
     processes: Annotated[int, typer.Option(min=1, help="Frames made at a time.")] = 2,
-    layout: Annotated[
-        Layout,
-        typer.Option(
-            help="KITTI's object folders, or the ROS bag of a robot that drives through a campus; --scene, --lidar and "
-            "--camera then do not count."
-        ),
-    ] = Layout.KITTI,
 ) -> None:
     """Make scenes with perfect labels: streets and campuses, seen by a lidar and a camera.
 

@@ -11,8 +11,8 @@ from ldls.datasets.kitti_odometry import KittiOdometrySource
 from ldls.datasets.kitti_raw import KittiRawSource
 from ldls.datasets.nuscenes import NuScenesSource
 from ldls.datasets.nuscenes_frame import Box2d, NuScenesFrameSource, read_boxes_2d
-from ldls.datasets.rosbag import RosBag
 from ldls.datasets.registry import SOURCES, SourceClass, open_source
+from ldls.datasets.rosbag import RosBag
 
 __all__ = [
     "SOURCES",

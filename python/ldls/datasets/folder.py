@@ -16,7 +16,7 @@ from ldls.datasets.files import whole_frames
 from ldls.datasets.folder_description import FILE, CameraDescription, read_description, template
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.truth import of_points
-from ldls.errors import CorruptFileError, ParameterError, SourceError, UnsupportedFormatError
+from ldls.errors import CorruptFileError, ParameterError, SourceError
 from ldls.evaluation import Labeling, read_labeling
 from ldls.io import read_points
 from ldls.io.images import read_image, read_image_size
@@ -83,6 +83,16 @@ class FolderSource:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each image of a frame."""
+        return tuple(self._cameras)
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from."""
+        name = self.names[index]
+        return (self._file, self._points[name], *(files[name] for files in self._images.values()))
+
     def __getitem__(self, index: int) -> Frame:
         name = self.names[index]
         points = read_points(self._points[name], columns=self._described.columns)
@@ -106,7 +116,7 @@ class FolderSource:
         missing = [camera for camera, each in self._cameras.items() if each.masks is None]
         if missing:
             raise SourceError(f'{self._file}: names no masks of {", ".join(missing)}; add masks = "..."')
-        return tuple(_masks_of(self._one(each.masks or "", name)) for each in self._cameras.values())
+        return tuple(InstanceMasks.from_file(self._one(each.masks or "", name)) for each in self._cameras.values())
 
     def _image(self, camera: str, index: int) -> CameraImage:
         name = self.names[index]
@@ -175,11 +185,3 @@ def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:
     if not name or not math.isfinite(seconds):
         raise CorruptFileError(f"{path}, line {number}: expected 'frame seconds', got {line!r}")
     return name.strip(), seconds
-
-
-def _masks_of(path: Path) -> InstanceMasks:
-    if path.suffix == ".json":
-        return InstanceMasks.from_coco(path)
-    if path.suffix == ".npz":
-        return InstanceMasks.from_npz(path)
-    raise UnsupportedFormatError(f"{path}: cannot read {path.suffix!r} masks, expected .json or .npz")

@@ -68,8 +68,17 @@ class Source(Protocol):
     path: Path
     names: tuple[str, ...]
 
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each image of a frame."""
+        ...
+
     def __len__(self) -> int:
         """Number of frames."""
+        ...
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from, found without reading them."""
         ...
 
     def __getitem__(self, index: int) -> Frame:

@@ -79,6 +79,16 @@ class KittiObjectSource:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each image of a frame."""
+        return tuple(f"image_{number}" for number in self.cameras)
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from."""
+        name = self.names[index]
+        return (self._points[name], self._calib[name], *(files[name] for files in self._images.values()))
+
     def __getitem__(self, index: int) -> Frame:
         name = self.names[index]
         points = read_points(self._points[name])

@@ -98,6 +98,15 @@ class NuScenesSource:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each image of a frame."""
+        return CAMERAS
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from."""
+        return tuple(self._file(taken.filename) for taken in self._frames[index].values())
+
     def __getitem__(self, index: int) -> Frame:
         frame = self._frames[index]
         sweep = frame[LIDAR]

@@ -92,6 +92,16 @@ class NuScenesFrameSource:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each image of a frame."""
+        return tuple(image.name for image in self._images)
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from."""
+        images = tuple(image.path for image in self._images if image.path is not None)
+        return (self._file, self._points, *images)
+
     def __getitem__(self, index: int) -> Frame:
         name, stamp = self.names[index], self.stamps[index]
         points = read_points(self._points, columns=self._columns)

@@ -15,6 +15,7 @@ from ldls.datasets.kitti_odometry import KittiOdometrySource
 from ldls.datasets.kitti_raw import KittiRawSource
 from ldls.datasets.nuscenes import NuScenesSource
 from ldls.datasets.nuscenes_frame import NuScenesFrameSource
+from ldls.datasets.rosbag import RosBag
 from ldls.errors import ParameterError, SourceError
 
 
@@ -45,16 +46,24 @@ SOURCES: dict[str, SourceClass] = {
     "nuscenes": NuScenesSource,
     "nuscenes-frame": NuScenesFrameSource,
     "folder": FolderSource,
+    "rosbag": RosBag,
 }
 """Classes of sources by kind."""
 
 
-def open_source(path: str | PathLike[str], *, kind: str | None = None, **options: Any) -> Source:  # noqa: ANN401
+def open_source(
+    path: str | PathLike[str],
+    *,
+    kind: str | None = None,
+    truth: bool = True,
+    **options: Any,  # noqa: ANN401
+) -> Source:
     """The source of frames at a path.
 
     Args:
         path: A folder, or a file such as a bag.
         kind: One of `SOURCES`; by default the only one that recognises the path.
+        truth: Whether frames have their truth, where the source has any; it takes time to read.
         options: Those of the kind's class, as `camera` or `scene`.
 
     Raises:
@@ -68,7 +77,10 @@ def open_source(path: str | PathLike[str], *, kind: str | None = None, **options
     if kind is not None and kind not in SOURCES:
         raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(SOURCES)}{_nearest(kind, list(SOURCES))}")
     source = SOURCES[guess_kind(path) if kind is None else kind]
-    _check_options(source, options)
+    known = _options_of(source)
+    _check_options(source, known, options)
+    if "truth" in known:
+        options["truth"] = truth
     return source(path, **options)
 
 
@@ -88,8 +100,11 @@ def guess_kind(path: Path) -> str:
     raise SourceError(f"{path}: is no source of frames; looked for {what}")
 
 
-def _check_options(source: SourceClass, options: dict[str, Any]) -> None:
-    known = [p.name for p in inspect.signature(source).parameters.values() if p.kind == p.KEYWORD_ONLY]
+def _options_of(source: SourceClass) -> list[str]:
+    return [p.name for p in inspect.signature(source).parameters.values() if p.kind == p.KEYWORD_ONLY]
+
+
+def _check_options(source: SourceClass, known: list[str], options: dict[str, Any]) -> None:
     for name in options:
         if name not in known:
             there = f"expected {', '.join(known)}" if known else "expected none"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from threading import Lock
 from typing import Any, Self
 
 import numpy as np
@@ -19,7 +20,7 @@ from ldls.datasets.ros_topics import RosTopics, choose_topics
 from ldls.datasets.ros_transforms import TransformTree
 from ldls.datasets.transform_files import read_transform
 from ldls.errors import CalibrationError, FileFormatError, InputError, ParameterError
-from ldls.io.ros.bags import decode, open_bag
+from ldls.io.ros.bags import SUFFIXES, decode, open_bag, storage_files
 from ldls.io.ros.images import decode_compressed, decode_image
 from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, read_header, seconds
 from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud
@@ -60,6 +61,7 @@ class RosBag:
     """
 
     kind = "rosbag"
+    looks_for = "a .bag, .db3 or .mcap file, or a folder with the metadata.yaml of ROS 2"
 
     def __init__(
         self,
@@ -111,6 +113,12 @@ class RosBag:
         self._infos = [_some(self.path, topic, entries[topic]) for topic in self.topics.infos]
         self._pair(entries[self.topics.points], [entries[topic] for topic in self.topics.images])
         self._tree: TransformTree | None = None
+        self._reading = Lock()
+
+    @classmethod
+    def recognises(cls, path: Path) -> bool:
+        """Whether `path` looks like a bag."""
+        return (path.suffix in SUFFIXES and path.is_file()) or (path / "metadata.yaml").is_file()
 
     def _index(self) -> dict[str, list[_Entry]]:
         """Headers of the messages of every topic that is read, in the order of their stamps."""
@@ -182,6 +190,20 @@ class RosBag:
         except FileFormatError as error:
             raise type(error)(self._place(sweep, error)) from None
 
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Name of the camera of each image of a frame: its topic."""
+        return self.topics.images
+
+    @property
+    def stamps(self) -> tuple[float, ...]:
+        """Times of the sweeps in seconds."""
+        return tuple(sweep.header.stamp_ns / NANOSECONDS for sweep in self._sweeps)
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from: those of the bag."""
+        return tuple(storage_files(self.path))
+
     def __getitem__(self, index: int) -> Frame:
         """Read a frame; images are decoded when they are asked for.
 
@@ -249,7 +271,9 @@ class RosBag:
         return pixels
 
     def _message(self, entry: _Entry) -> Any:  # noqa: ANN401
-        return decode(self._bag, entry.topic, self._bag.read(entry.topic, entry.received_ns, entry.rank))
+        with self._reading:  # readers of bags seek in one file
+            content = self._bag.read(entry.topic, entry.received_ns, entry.rank)
+        return decode(self._bag, entry.topic, content)
 
     def _place(self, entry: _Entry, error: object) -> str:
         return f"{self.path}: {entry.topic} at {seconds(entry.header.stamp_ns)}: {error}"
@@ -265,11 +289,12 @@ class RosBag:
         self.close()
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_bag", "_tree")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_bag", "_tree", "_reading")}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self._tree = None
+        self._reading = Lock()
         self._bag = open_bag(self.path, recover=self._recover)
 
     def __repr__(self) -> str:

@@ -27,10 +27,10 @@ from ldls.io.ros.types import make, make_header
 from ldls.io.ros.writer import BagWriter
 from ldls.io.whole_file import whole_file
 from ldls.simulation.boxes import annotation_name
-from ldls.simulation.robot_drive import IMAGE_DELAY_S, PERIOD_S, ROBOT, Moment, robot_drive
 from ldls.simulation.errors import SegmenterErrors
 from ldls.simulation.kitti_layout import NOTHING, coco_document
 from ldls.simulation.lenses import LensModel
+from ldls.simulation.robot_drive import IMAGE_DELAY_S, PERIOD_S, ROBOT, Moment, robot_drive
 from ldls.simulation.scanning import Sweep
 
 START_NS = 1_700_000_000 * NANOSECONDS

@@ -125,7 +125,7 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
         raise FileNotFoundError(f"{path}: no such bag")
     if path.is_file() and path.suffix not in SUFFIXES:
         raise UnsupportedFormatError(f"{path}: expected a {', '.join(SUFFIXES)} file or a folder with metadata.yaml")
-    files = _storage_files(path)
+    files = storage_files(path)
     try:
         for file in files:
             if file.suffix == ".db3":
@@ -148,7 +148,7 @@ def _salvaged(path: Path, found: Salvage, damage: str, recover: bool) -> Bag:
     return _SalvagedBag(path, found)
 
 
-def _storage_files(path: Path) -> list[Path]:
+def storage_files(path: Path) -> list[Path]:
     """The storage files of a bag, in the order of their names; none where they are compressed."""
     if path.is_file():
         return [path]

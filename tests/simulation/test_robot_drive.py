@@ -13,9 +13,9 @@ from ldls.datasets import RosBag
 from ldls.errors import CalibrationError, ParameterError
 from ldls.evaluation import read_annotations
 from ldls.io.labelled_bag import LabelledBag
-from ldls.simulation import SegmenterErrors, drive, write_drive
-from ldls.simulation.drive import ROBOT
+from ldls.simulation import SegmenterErrors, robot_drive, write_robot_drive
 from ldls.simulation.lenses import LensModel, distorted, undistorted
+from ldls.simulation.robot_drive import ROBOT
 from ldls.stages import project
 
 KINDS = {"rosbag1": "drive.bag", "rosbag2": "drive", "mcap": "drive"}
@@ -29,14 +29,14 @@ def drive_folder(request, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp(request.param)
     kind = request.param
     errors = SegmenterErrors.none()
-    path = write_drive(folder, kind, frames=FRAMES, seed=SEED, segmenter=errors, compressed=kind == "mcap")
+    path = write_robot_drive(folder, kind, frames=FRAMES, seed=SEED, segmenter=errors, compressed=kind == "mcap")
     assert path == folder / KINDS[kind]
     return folder
 
 
 @pytest.fixture(scope="module")
 def moments():
-    return list(drive(FRAMES, seed=SEED, segmenter=SegmenterErrors.none()))
+    return list(robot_drive(FRAMES, seed=SEED, segmenter=SegmenterErrors.none()))
 
 
 def ious(labels, truth):
@@ -148,13 +148,13 @@ def test_without_its_distortion_the_lens_costs_accuracy(moments):
 def test_the_robot_drives_and_objects_move(moments):
     assert [m.travelled_m for m in moments] == pytest.approx([0, 0.12, 0.24, 0.36])
     assert not np.array_equal(moments[0].image, moments[3].image)
-    again = next(drive(1, seed=SEED, segmenter=SegmenterErrors.none()))
+    again = next(robot_drive(1, seed=SEED, segmenter=SegmenterErrors.none()))
     np.testing.assert_array_equal(again.sweep.points, moments[0].sweep.points)
 
 
 def test_bags_are_refused_before_anything_is_made(tmp_path):
     with pytest.raises(ParameterError, match="kind"):
-        write_drive(tmp_path / "out", "rosbag3")
+        write_robot_drive(tmp_path / "out", "rosbag3")
     assert not (tmp_path / "out").exists()
     with pytest.raises(ParameterError, match="frames: got 0"):
-        next(drive(0))
+        next(robot_drive(0))
