@@ -66,7 +66,7 @@ def test_real_nuscenes_points_have_five_columns(data_folder):
 @pytest.mark.parametrize(
     ("name", "content", "error", "message"),
     [
-        pytest.param("a.xyz", b"", ldls.UnsupportedFormatError, "expected .bin or .npy", id="suffix"),
+        pytest.param("a.obj", b"", ldls.UnsupportedFormatError, "expected .bin, .npy, .pcd", id="suffix"),
         pytest.param("a.npy", b"", ldls.CorruptFileError, "got an empty one", id="empty npy"),
         pytest.param("a.npy", b"\x93NUMPY\1\0", ldls.CorruptFileError, "whole .npy", id="cut npy"),
         pytest.param("a.npy", b"hello there", ldls.FileFormatError, "a.npy", id="no npy"),

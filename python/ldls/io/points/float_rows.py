@@ -1,0 +1,67 @@
+"""Rows of float32 without a header: KITTI's and nuScenes' `.bin`."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.cloud import MAX_COLUMNS
+from ldls.errors import FileFormatError, ParameterError, RecoveredFileWarning, TruncatedFileError
+
+FLOAT_BYTES = 4
+
+
+def read(path: Path, *, columns: int | None = None, recover: bool = False) -> NDArray[np.float32]:
+    """(N, columns) float32: the rows of a `.bin` file; one without a byte is a cloud without a point.
+
+    Args:
+        path: The file.
+        columns: Floats a row; 4, and 5 for `.pcd.bin`, by default.
+        recover: Whether a truncated file yields its whole rows and a warning instead of an error.
+
+    Raises:
+        TruncatedFileError: The size is no whole number of rows.
+        FileFormatError: The rows look as if they had another number of columns.
+        ParameterError: `columns` is out of range.
+    """
+    guessed = columns is None
+    if columns is None:
+        columns = 5 if path.name.endswith(".pcd.bin") else 4
+    if not 3 <= columns <= MAX_COLUMNS:
+        raise ParameterError(f"columns: got {columns}, expected 3 to {MAX_COLUMNS}")
+    content = path.read_bytes()
+    row_bytes = FLOAT_BYTES * columns
+    whole = len(content) // row_bytes * row_bytes
+    if whole != len(content):
+        message = (
+            f"{path.name}: {len(content)} bytes is not a multiple of {row_bytes} ({columns} float32 a point); "
+            f"last whole point ends at {whole}"
+        )
+        if not recover:
+            raise TruncatedFileError(f"{message}; pass columns= or recover=True to read the whole points")
+        warnings.warn(message, RecoveredFileWarning, stacklevel=3)
+    values = np.frombuffer(content, "<f4", count=whole // FLOAT_BYTES)
+    if guessed:
+        _check_guess(path, values, columns)
+    return values.reshape(-1, columns).astype(np.float32, copy=False)
+
+
+def _check_guess(path: Path, values: NDArray[np.float32], columns: int) -> None:
+    """Refuse four columns where the file reads as five whose last is a ring number, and the other way round."""
+    other = 9 - columns
+    if values.size == 0 or values.size % other:
+        return
+    if not _has_ring(values, columns) and _has_ring(values, other):
+        raise FileFormatError(
+            f"{path.name}: guessed {columns} floats a point, but with {other} the last column holds ring numbers; "
+            f"pass columns={other} (or columns={columns} to insist)"
+        )
+
+
+def _has_ring(values: NDArray[np.float32], columns: int) -> bool:
+    ring = values.reshape(-1, columns)[:, -1]
+    whole = (ring == np.floor(ring)) & (ring >= 0) & (ring < 256)
+    return bool(whole.all()) and columns == 5 and bool(ring.any())

@@ -1,0 +1,53 @@
+"""Which of a file's named columns are coordinates and intensity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.cloud import Points
+from ldls.errors import CorruptFileError
+
+INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "remission", "i")
+"""What writers call the intensity; the first that a file has is taken."""
+
+
+@dataclass(frozen=True)
+class NamedColumns:
+    """Positions of x, y, z and, where there is one, intensity among the columns of a file.
+
+    Attributes:
+        positions: Three or four column numbers, from 0.
+    """
+
+    positions: tuple[int, ...]
+
+    @classmethod
+    def find(cls, place: str, names: Sequence[str]) -> NamedColumns:
+        """The columns among `names`, in capitals or not, with CloudCompare's prefix `scalar_` or not.
+
+        Raises:
+            CorruptFileError: x, y or z is missing or stands there twice.
+        """
+        plain = [plain_name(name) for name in names]
+        for axis in "xyz":
+            if plain.count(axis) != 1:
+                found = " ".join(names) or "none"
+                fault = "missing" if axis not in plain else f"there {plain.count(axis)} times"
+                raise CorruptFileError(f"{place}: column {axis} is {fault}; found {found}; expected one each of x y z")
+        intensity = [plain.index(name) for name in INTENSITY_NAMES if name in plain][:1]
+        return cls((*(plain.index(axis) for axis in "xyz"), *intensity))
+
+    def stack(self, columns: Sequence[NDArray[np.number]]) -> Points:
+        """(N, 3 or 4) points from the columns found: float32 where that holds the coordinates exactly, else float64."""
+        exact = np.result_type(np.float32, *(column.dtype for column in columns[:3]))
+        points: Points = np.stack([column.astype(exact) for column in columns], axis=1)
+        return points
+
+
+def plain_name(name: str) -> str:
+    """`name` without what writers add to it."""
+    return name.strip().strip("\"'").lower().removeprefix("scalar_")

@@ -1,0 +1,211 @@
+"""PCD files of the Point Cloud Library: ascii, binary and binary_compressed.
+
+Source: https://pointclouds.org/documentation/tutorials/pcd_file_format.html.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls._optional import require
+from ldls.cloud import Points
+from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
+from ldls.io.points.header_lines import split_header, text_rows, whole_number
+from ldls.io.points.named_columns import NamedColumns
+from ldls.io.points.number_rows import Row, read_rows
+
+ENCODINGS = ("ascii", "binary", "binary_compressed")
+TYPES = {
+    ("F", 4): "<f4", ("F", 8): "<f8", ("U", 1): "u1", ("U", 2): "<u2", ("U", 4): "<u4", ("U", 8): "<u8",
+    ("I", 1): "i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8",
+}  # fmt: skip
+COUNTS = ("POINTS", "WIDTH", "HEIGHT")
+MAX_POINT_BYTES = 1 << 16
+LZF_RATIO = 88
+"""No stream of LZF unpacks to more than this many times its size: three bytes stand for at most 264."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of a point: `count` values of a type."""
+
+    name: str
+    kind: np.dtype[np.number]
+    count: int
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes that it takes in a point."""
+        return self.kind.itemsize * self.count
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a header says, once it does not contradict itself."""
+
+    fields: list[Field]
+    n_points: int
+    encoding: str
+
+    @property
+    def point_bytes(self) -> int:
+        """Bytes of a point in binary."""
+        return sum(field.n_bytes for field in self.fields)
+
+
+def read(path: Path) -> Points:
+    """(N, 3 or 4) points: x y z and, where there is one, intensity; float32 unless the file has doubles.
+
+    Points of a cloud with rows stay in the order of the file; those that are NaN stay, too.
+
+    Raises:
+        TruncatedFileError: The file ends before the points that the header says.
+        CorruptFileError: The header contradicts itself or the bytes; the message names the field.
+        UnsupportedFormatError: The encoding is unknown.
+        ImportError: binary_compressed needs the extra `pcd`.
+    """
+    lines, body = split_header(path, path.read_bytes(), "DATA")
+    header = _parse(path, lines)
+    columns = NamedColumns.find(f"{path}: FIELDS", [field.name for field in header.fields])
+    for field in (header.fields[position] for position in columns.positions):
+        if field.count != 1:
+            raise CorruptFileError(f"{path}: COUNT of {field.name} is {field.count}, expected 1")
+    if header.encoding == "ascii":
+        return _read_ascii(path, header, columns, text_rows(path, body, len(lines)))
+    if header.encoding == "binary":
+        return _read_binary(path, header, columns, body)
+    return _read_compressed(path, header, columns, body)
+
+
+def _read_ascii(path: Path, header: Header, columns: NamedColumns, rows: list[Row]) -> Points:
+    _check_amount(path, header, "lines", header.n_points, len(rows), slack=0)
+    first_cells = np.cumsum([0, *(field.count for field in header.fields)])
+    cells = read_rows(path, rows, [int(first_cells[position]) for position in columns.positions])
+    kinds = [header.fields[position].kind for position in columns.positions]
+    return columns.stack([column.astype(kind) for column, kind in zip(cells.T, kinds, strict=True)])
+
+
+def _read_binary(path: Path, header: Header, columns: NamedColumns, body: bytes) -> Points:
+    size = header.point_bytes
+    _check_amount(path, header, "bytes", header.n_points * size, len(body), slack=size - 1)
+    starts = np.cumsum([0, *(field.n_bytes for field in header.fields)])
+    point = np.dtype(
+        {
+            "names": [f"f{position}" for position in columns.positions],
+            "formats": [header.fields[position].kind for position in columns.positions],
+            "offsets": [int(starts[position]) for position in columns.positions],
+            "itemsize": size,
+        }
+    )
+    points = np.frombuffer(body, point, header.n_points)
+    return columns.stack([points[f"f{position}"] for position in columns.positions])
+
+
+def _read_compressed(path: Path, header: Header, columns: NamedColumns, body: bytes) -> Points:
+    """Fields lie one behind the other, each of all points, packed by LZF as one."""
+    unpacked = _unpack(path, header, body)
+    starts = np.cumsum([0, *(field.n_bytes * header.n_points for field in header.fields)])
+
+    def column(position: int) -> NDArray[np.number]:
+        return np.frombuffer(unpacked, header.fields[position].kind, header.n_points, int(starts[position]))
+
+    return columns.stack([column(position) for position in columns.positions])
+
+
+def _unpack(path: Path, header: Header, body: bytes) -> bytes:
+    expected = header.n_points * header.point_bytes
+    if expected == 0:
+        return b""
+    if len(body) < 8:
+        raise TruncatedFileError(f"{path}: {len(body)} bytes after DATA, expected two sizes of 4 bytes each")
+    packed_size, size = struct.unpack_from("<II", body)
+    if size != expected:
+        raise CorruptFileError(
+            f"{path}: unpacked size {size}, expected {expected}: POINTS {header.n_points} of {header.point_bytes} bytes"
+        )
+    if packed_size > len(body) - 8:
+        raise TruncatedFileError(f"{path}: packed size {packed_size}, the file has {len(body) - 8} bytes left")
+    if size > packed_size * LZF_RATIO:
+        raise CorruptFileError(f"{path}: {packed_size} packed bytes cannot hold {size}")
+    lzf = require("lzf", "pcd")
+    try:
+        unpacked: bytes | None = lzf.decompress(body[8 : 8 + packed_size], size)
+    except ValueError as error:
+        raise CorruptFileError(f"{path}: {error}, expected LZF") from None
+    if unpacked is None or len(unpacked) != size:
+        found = "more" if unpacked is None else str(len(unpacked))
+        raise CorruptFileError(f"{path}: unpacks to {found} bytes, the file says {size}")
+    return unpacked
+
+
+def _check_amount(path: Path, header: Header, unit: str, needed: int, found: int, slack: int) -> None:
+    said = f"{path}: POINTS {header.n_points} need {needed} {unit} after DATA {header.encoding}, the file has {found}"
+    if found < needed:
+        raise TruncatedFileError(said)
+    if found > needed + slack:
+        raise CorruptFileError(f"{said}; mend the header")
+
+
+def _parse(path: Path, lines: list[Row]) -> Header:
+    entries: dict[str, list[str]] = {}
+    for number, line in lines:
+        words = line.partition("#")[0].split()
+        if words and words[0] in entries:
+            raise CorruptFileError(f"{path}, line {number}: {words[0]} stands there twice")
+        entries |= {words[0]: words[1:]} if words else {}
+    n_points = _n_points(path, entries)
+    encoding = " ".join(entries["DATA"])
+    if encoding not in ENCODINGS:
+        raise UnsupportedFormatError(f"{path}: DATA {encoding[:40]!r}, expected one of {', '.join(ENCODINGS)}")
+    header = Header(_fields(path, entries), n_points, encoding)
+    if header.point_bytes > MAX_POINT_BYTES:
+        raise CorruptFileError(
+            f"{path}: SIZE and COUNT make {header.point_bytes} bytes a point, expected at most {MAX_POINT_BYTES}"
+        )
+    return header
+
+
+def _n_points(path: Path, entries: dict[str, list[str]]) -> int:
+    numbers = {key: _one_number(path, key, words) for key, words in entries.items() if key in COUNTS}
+    if not numbers.keys() & {"POINTS", "WIDTH"}:
+        raise CorruptFileError(f"{path}: neither POINTS nor WIDTH in the header; found {' '.join(entries)}")
+    if "WIDTH" not in numbers:
+        return numbers["POINTS"]
+    width, height = numbers["WIDTH"], numbers.get("HEIGHT", 1)
+    points = numbers.get("POINTS", width * height)
+    if points != width * height:
+        raise CorruptFileError(f"{path}: POINTS {points}, WIDTH {width} x HEIGHT {height} is {width * height}")
+    return points
+
+
+def _one_number(path: Path, key: str, words: list[str]) -> int:
+    return whole_number(f"{path}: {key}", " ".join(words))
+
+
+def _fields(path: Path, entries: dict[str, list[str]]) -> list[Field]:
+    names = entries.get("FIELDS", [])
+    entries = {"COUNT": ["1"] * len(names)} | entries
+    for key in ("SIZE", "TYPE", "COUNT"):
+        if len(entries.get(key, [])) != len(names):
+            raise CorruptFileError(
+                f"{path}: {len(names)} FIELDS, {len(entries.get(key, []))} of {key}; expected as many"
+            )
+    rows = zip(names, entries["TYPE"], entries["SIZE"], entries["COUNT"], strict=True)
+    return [_field(path, *row) for row in rows]
+
+
+def _field(path: Path, name: str, kind: str, size: str, count: str) -> Field:
+    place = f"{path}: field {name}"
+    key = (kind, whole_number(f"{place}: SIZE", size))
+    if key not in TYPES:
+        known = ", ".join(f"{letter} {n}" for letter, n in TYPES)
+        raise CorruptFileError(f"{place}: TYPE and SIZE {kind} {size}, expected one of {known}")
+    n_values = whole_number(f"{place}: COUNT", count)
+    if n_values == 0:
+        raise CorruptFileError(f"{place}: COUNT 0, expected 1 or more")
+    return Field(name, np.dtype(TYPES[key]), n_values)

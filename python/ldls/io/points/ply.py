@@ -1,0 +1,131 @@
+"""PLY files, ascii and binary: the vertices.
+
+Source: http://paulbourke.net/dataformats/ply/.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ldls.cloud import Points
+from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
+from ldls.io.points.header_lines import split_header, text_rows, whole_number
+from ldls.io.points.named_columns import NamedColumns
+from ldls.io.points.number_rows import Row, read_rows
+
+BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float32": "f4", "float64": "f8",
+}  # fmt: skip
+
+
+@dataclass
+class Element:
+    """One element of a header: how many there are, and their properties."""
+
+    name: str
+    count: int
+    properties: list[str] = field(default_factory=list)
+    types: list[str] = field(default_factory=list)
+    list_properties: list[str] = field(default_factory=list)
+
+    def dtype(self, order: str) -> np.dtype[np.void]:
+        """One of them in binary."""
+        return np.dtype([(f"f{i}", order + kind) for i, kind in enumerate(self.types)])
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a header says."""
+
+    encoding: str
+    before: list[Element]
+    vertex: Element
+
+
+def read(path: Path) -> Points:
+    """(N, 3 or 4) points: x y z and, where there is one, intensity of the vertices; float32 unless doubles.
+
+    Raises:
+        TruncatedFileError: The file ends before the vertices that the header says.
+        CorruptFileError: The header contradicts itself, or a number is none; the message names the line.
+        UnsupportedFormatError: The vertices, or an element before them, have a list property.
+    """
+    lines, body = split_header(path, path.read_bytes(), "end_header")
+    header = _parse(path, lines)
+    for element in (*header.before, header.vertex):
+        if element.list_properties:
+            raise UnsupportedFormatError(
+                f"{path}: property list {element.list_properties[0]!r} of element {element.name}; expected numbers "
+                "alone in the vertices and whatever stands before them; write it again without"
+            )
+    columns = NamedColumns.find(f"{path}: element vertex", header.vertex.properties)
+    if header.encoding == "ascii":
+        return _read_ascii(path, header, columns, text_rows(path, body, len(lines)))
+    return _read_binary(path, header, columns, body)
+
+
+def _read_binary(path: Path, header: Header, columns: NamedColumns, body: bytes) -> Points:
+    order = BYTE_ORDERS[header.encoding]
+    start = sum(element.count * element.dtype(order).itemsize for element in header.before)
+    kind, count = header.vertex.dtype(order), header.vertex.count
+    needed = start + count * kind.itemsize
+    if needed > len(body):
+        raise TruncatedFileError(
+            f"{path}: element vertex {count} needs {needed} bytes after the header, the file has {len(body)}; "
+            f"last whole vertex is {max(0, len(body) - start) // kind.itemsize}"
+        )
+    vertices = np.frombuffer(body, kind, count, start)
+    return columns.stack([vertices[f"f{position}"] for position in columns.positions])
+
+
+def _read_ascii(path: Path, header: Header, columns: NamedColumns, rows: list[Row]) -> Points:
+    start, count = sum(element.count for element in header.before), header.vertex.count
+    if start + count > len(rows):
+        raise TruncatedFileError(
+            f"{path}: element vertex {count} needs as many lines, the file ends after {max(0, len(rows) - start)}"
+        )
+    cells = read_rows(path, rows[start : start + count], columns.positions)
+    kinds = [np.dtype(header.vertex.types[position]) for position in columns.positions]
+    return columns.stack([column.astype(kind) for column, kind in zip(cells.T, kinds, strict=True)])
+
+
+def _parse(path: Path, lines: list[Row]) -> Header:
+    if lines[0][1] != "ply":
+        raise CorruptFileError(f"{path}: expected 'ply' in the first line, got {lines[0][1][:40]!r}")
+    encoding, elements = "", []
+    for number, line in lines[1:]:
+        place, words = f"{path}, line {number}", line.split()
+        match words:
+            case ["format", encoding, "1.0"] if encoding in BYTE_ORDERS:
+                pass
+            case ["element", name, count]:
+                elements.append(Element(name, whole_number(f"{place}: element {name}", count)))
+            case ["property", *rest] if elements:
+                _add_property(place, elements[-1], rest)
+            case [] | ["comment" | "obj_info" | "end_header", *_]:
+                pass
+            case _:
+                raise CorruptFileError(f"{place}: expected a format, an element or a property, got {line[:80]!r}")
+    if not encoding:
+        raise CorruptFileError(f"{path}: the header names no format, expected one of {', '.join(BYTE_ORDERS)}")
+    at = [i for i, element in enumerate(elements) if element.name == "vertex"]
+    if len(at) != 1:
+        raise CorruptFileError(f"{path}: expected one element vertex, found {len(at)}")
+    return Header(encoding, elements[: at[0]], elements[at[0]])
+
+
+def _add_property(place: str, element: Element, words: list[str]) -> None:
+    match words:
+        case ["list", count, kind, name] if count in TYPES and kind in TYPES:
+            element.list_properties.append(name)
+        case [kind, name] if kind in TYPES:
+            element.properties.append(name)
+            element.types.append(TYPES[kind])
+        case _:
+            raise CorruptFileError(f"{place}: expected a type and a name, got {' '.join(words)[:80]!r}")

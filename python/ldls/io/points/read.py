@@ -1,0 +1,54 @@
+"""Point clouds from files: the suffix chooses the format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+
+from ldls.cloud import Points
+from ldls.errors import ParameterError, UnsupportedFormatError
+from ldls.io.points import float_rows, las, npy, pcd, ply, text
+from ldls.io.regular_file import regular_file
+
+READERS: dict[str, Callable[..., Points]] = {
+    ".bin": float_rows.read,
+    ".npy": npy.read,
+    ".pcd": pcd.read,
+    ".ply": ply.read,
+    ".las": las.read,
+    ".laz": las.read,
+    ".csv": text.read,
+    ".txt": text.read,
+    ".xyz": text.read,
+}
+
+
+def read_points(path: str | PathLike[str], *, columns: int | None = None, recover: bool = False) -> Points:
+    """(N, >= 3) float32 or float64 points, x y z first and intensity fourth where there is one, in metres.
+
+    Args:
+        path: `.bin` (float32 little-endian rows: KITTI x y z reflectance; nuScenes `.pcd.bin` with a fifth column,
+            ring), `.npy`, `.pcd`, `.ply`, `.las` and `.laz`, or text: `.csv`, `.txt` and `.xyz`. docs/formats.md has
+            what each may hold.
+        columns: Floats a row of a `.bin` file; 4, and 5 for `.pcd.bin`, by default.
+        recover: Whether a truncated `.bin` yields its whole rows and a warning instead of an error.
+
+    Raises:
+        TruncatedFileError: The file ends before its header, or the size of its rows, says.
+        CorruptFileError: The file contradicts itself or its format.
+        FileFormatError: It is no regular file, or its rows look as if they had another number of columns.
+        UnsupportedFormatError: No format has this suffix, or the file is of a variant that cannot be read.
+        ParameterError: `columns` or `recover` is given for another format than `.bin`.
+        ImportError: The format needs an extra that is not installed; the message names it.
+        FileNotFoundError: There is no such file.
+    """
+    path = regular_file(path)
+    suffix = path.suffix.lower()
+    if suffix not in READERS:
+        known = ", ".join(READERS)
+        raise UnsupportedFormatError(f"{path}: cannot read {path.suffix!r} files, expected {known}")
+    if suffix == ".bin":
+        return READERS[suffix](path, columns=columns, recover=recover)
+    if columns is not None or recover:
+        raise ParameterError(f"columns, recover: they are for .bin files alone, got {path.name}; leave them out")
+    return READERS[suffix](path)

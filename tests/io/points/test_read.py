@@ -1,0 +1,80 @@
+import os
+import sys
+
+import numpy as np
+import pytest
+
+import ldls
+from ldls.io.points import READERS
+
+SUFFIXES = list(READERS)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_what_is_no_regular_file_is_refused(tmp_path, suffix):
+    folder, pipe, device = (tmp_path / f"{name}{suffix}" for name in ("folder", "pipe", "device"))
+    folder.mkdir()
+    os.mkfifo(pipe)
+    device.symlink_to("/dev/zero")
+    for path, kind in ((folder, "a folder"), (pipe, "a pipe"), (device, "a device")):
+        with pytest.raises(ldls.FileFormatError, match=f"{path.name}: expected a regular file, got {kind}"):
+            ldls.read_points(path)
+
+
+@pytest.mark.parametrize("suffix", [suffix for suffix in SUFFIXES if suffix != ".bin"])
+def test_an_empty_file_is_no_cloud(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    path.touch()
+    with pytest.raises(ldls.FileFormatError, match=f"a{suffix}: "):
+        ldls.read_points(path)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_zeros_and_noise_are_named_errors(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    for content in (bytes(1001), np.random.default_rng(0).bytes(1001)):
+        path.write_bytes(content)
+        with pytest.raises(ldls.FileFormatError, match=f"a{suffix}"):
+            ldls.read_points(path)
+
+
+def test_suffixes_may_be_capitals(tmp_path):
+    (tmp_path / "A.CSV").write_text("1,2,3\n")
+    assert ldls.read_points(tmp_path / "A.CSV").tolist() == [[1, 2, 3]]
+
+
+def test_options_of_bin_files_are_refused_elsewhere(tmp_path):
+    (tmp_path / "a.csv").write_text("1,2,3\n")
+    for options in ({"columns": 4}, {"recover": True}):
+        with pytest.raises(ldls.ParameterError, match="a.csv; leave them out"):
+            ldls.read_points(tmp_path / "a.csv", **options)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "module", "extra"),
+    [
+        pytest.param(".las", "laspy", "las", id="LAS"),
+        pytest.param(".laz", "lazrs", "las", id="LAZ without backend"),
+        pytest.param(".pcd", "lzf", "pcd", id="packed PCD"),
+    ],
+)
+def test_missing_libraries_name_their_extra(tmp_path, monkeypatch, suffix, module, extra):
+    contents = {".las": b"LASF", ".laz": las_header(compressed=True), ".pcd": packed_pcd()}
+    (tmp_path / f"a{suffix}").write_bytes(contents[suffix])
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ImportError, match=rf"ldls\[{extra}\]"):
+        ldls.read_points(tmp_path / f"a{suffix}")
+
+
+def las_header(compressed):
+    header = bytearray(375)
+    header[:4], header[24:26] = b"LASF", bytes([1, 2])
+    header[94:100] = np.array([227], "<u2").tobytes() + np.array([227], "<u4").tobytes()
+    header[104], header[105:107] = 0x80 if compressed else 0, np.array([20], "<u2").tobytes()
+    header[107], header[131:155] = 1, np.ones(3, "<f8").tobytes()
+    return bytes(header)
+
+
+def packed_pcd():
+    header = b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 1\nDATA binary_compressed\n"
+    return header + np.array([2, 12], "<u4").tobytes() + b"ab"

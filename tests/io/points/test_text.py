@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+import ldls
+
+ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        pytest.param("1.5,-2,3e-3\n4,5,6\n", ROWS, id="commas"),
+        pytest.param("1.5;-2;3e-3\n4;5;6", ROWS, id="semicolons, no last line end"),
+        pytest.param("1.5\t-2\t3e-3\n4\t5\t6\n", ROWS, id="tabs"),
+        pytest.param("  1.5   -2 3e-3\n4 5  6 \n\n", ROWS, id="blanks"),
+        pytest.param("1.5, -2, 3e-3\n4, 5, 6\n", ROWS, id="commas and blanks"),
+        pytest.param("\ufeff1.5,-2,3e-3\r\n4,5,6\r\n", ROWS, id="byte order mark, CRLF"),
+        pytest.param("# made by hand\n1.5 -2 3e-3\n// half way\n4 5 6\n", ROWS, id="comments"),
+        pytest.param("x,y,z\n1.5,-2,3e-3\n4,5,6\n", ROWS, id="header"),
+        pytest.param("//X Y Z\n1.5 -2 3e-3\n4 5 6\n", ROWS, id="header of CloudCompare"),
+        pytest.param("# x y z\n1.5 -2 3e-3\n4 5 6\n", ROWS, id="header behind a comment sign"),
+        pytest.param("name;Z;Y;X\ncar;3e-3;-2;1.5\n;6;5;4\n", ROWS, id="header in another order"),
+        pytest.param('"x","y","z"\n"1.5","-2","3e-3"\n4,5,6\n', ROWS, id="quotes"),
+        pytest.param("intensity x y z ring\n9 1 2 3 7\n", [[1, 2, 3, 9]], id="intensity comes fourth"),
+        pytest.param("1 2 3 0.5 7\n", [[1, 2, 3, 0.5, 7]], id="more columns without names"),
+        pytest.param("nan 2 inf\n", [[np.nan, 2, np.inf]], id="not finite"),
+        pytest.param("x,y,z\n", np.zeros((0, 3)), id="header alone"),
+        pytest.param("500000.123456 5000000.654321 1\n", [[500000.123456, 5000000.654321, 1]], id="UTM"),
+    ],
+)
+def test_rows_of_text_are_points(tmp_path, text, expected):
+    path = tmp_path / "a.txt"
+    path.write_bytes(text.encode())
+    points = ldls.read_points(path)
+    np.testing.assert_array_equal(points, np.array(expected))
+    assert points.dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "message"),
+    [
+        pytest.param("1 2 3\n4 oops 6\n", ldls.CorruptFileError, "line 2: .* column 2, got 'oops'", id="word"),
+        pytest.param(
+            "1 2 3\n\n4 5\n6 7 8\n", ldls.CorruptFileError, "line 3: expected at least 3 cells, got 2", id="short"
+        ),
+        pytest.param("1 2 3\n4 5", ldls.TruncatedFileError, "line 2: expected at least 3 cells, got 2", id="cut"),
+        pytest.param("1,5;2;3\n", ldls.CorruptFileError, "line 1: .* decimal point .* '1,5'", id="decimal comma"),
+        pytest.param("1,,3\n", ldls.CorruptFileError, "line 1: .* column 2, got ''", id="empty cell"),
+        pytest.param(
+            "17\n1 2 3\n", ldls.CorruptFileError, "line 1: expected x y z or their names, got '17'", id="count"
+        ),
+        pytest.param(
+            "x y z\n1 2\n3 4 5\n", ldls.CorruptFileError, "line 2: expected at least 3 cells", id="header, short"
+        ),
+        pytest.param("x y z X\n", ldls.CorruptFileError, "column x is there 2 times", id="name twice"),
+        pytest.param("# nothing\n", ldls.TruncatedFileError, "only comments", id="comments"),
+        pytest.param("\n \n", ldls.TruncatedFileError, "empty", id="blank"),
+        pytest.param("1 " * 65, ldls.UnsupportedFormatError, "65 columns, expected at most 64", id="wide"),
+    ],
+)
+def test_faults_of_text_are_named_with_their_line(tmp_path, text, error, message):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(error, match=f"a.csv.*{message}"):
+        ldls.read_points(path)
+
+
+def test_text_that_is_none_is_refused(tmp_path):
+    (tmp_path / "a.xyz").write_bytes(b"1 2 3\n\xff\xfe\n")
+    with pytest.raises(ldls.CorruptFileError, match="not a text file"):
+        ldls.read_points(tmp_path / "a.xyz")
