@@ -126,13 +126,17 @@ class Segmentation:
         )
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the labels; the suffix chooses the format.
+        """Write the labels; the ending of the name chooses the format.
 
-        `.npz` has all fields, `.label` is SemanticKITTI's, `.ply` a binary point cloud with label, instance,
-        confidence and colour. The file appears only when it is whole.
+        `.npz` has all fields, `.label` is SemanticKITTI's, `_lidarseg.bin` and `_panoptic.npz` are nuScenes'. `.ply`,
+        `.pcd`, `.las` and `.laz` are point clouds with labels, confidence and colour; `.parquet` and `.csv` tables with
+        a row a point. docs/formats.md says what is in each. The file appears only when it is whole.
 
         Raises:
-            UnsupportedFormatError: No format has this suffix.
+            UnsupportedFormatError: No format has this ending.
+            LimitError: The format cannot hold so many instances, so wide a cloud or so large a category id.
+            NonFiniteError: The format cannot hold points that are not finite.
+            ImportError: The format needs an extra that is not installed; the message names it.
         """
         results.write(path, self)
 

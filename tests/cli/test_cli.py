@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 
 import ldls
 from ldls.cli import app
+from ldls.cli.outputs import Output
+from ldls.io.results import WRITERS
 
 run = CliRunner().invoke
 
@@ -128,3 +130,11 @@ def test_help_teaches_and_comes_at_once():
 
 def test_version():
     assert run(app, ["--version"]).output == f"ldls {ldls.__version__}\n"
+
+
+def test_every_format_can_be_asked_for(demo, tmp_path):
+    words = [word for output in Output for word in ("--format", output.value)]
+    outcome = run(app, [*arguments(demo[0], tmp_path), *words])
+    assert outcome.exit_code == 0, outcome.output
+    endings = {*WRITERS, ".png"}
+    assert {path.name for path in tmp_path.iterdir()} == {f"points{ending}" for ending in endings}

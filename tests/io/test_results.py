@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ldls
+from ldls.io.results import WRITERS
 
 
 @pytest.fixture
@@ -56,11 +57,13 @@ def test_ply_files_hold_points_labels_and_colours(result, tmp_path):
 def test_unknown_suffixes_are_refused(result, tmp_path):
     with pytest.raises(ldls.UnsupportedFormatError, match="expected .npz, .label, .ply"):
         result.save(tmp_path / "a.xyz")
+    with pytest.raises(ldls.UnsupportedFormatError, match="cannot write '.bin' files"):
+        result.save(tmp_path / "a.bin")
 
 
 def test_nothing_is_left_behind_where_writing_fails(result, tmp_path, monkeypatch):
     monkeypatch.setattr("os.fsync", lambda _: (_ for _ in ()).throw(OSError(28, "No space left")))
-    for suffix in ("npz", "label", "ply"):
+    for ending in WRITERS:
         with pytest.raises(OSError, match="No space left"):
-            result.save(tmp_path / f"a.{suffix}")
+            result.save(tmp_path / f"a{ending}")
     assert list(tmp_path.iterdir()) == []

@@ -13,7 +13,7 @@ from rich.table import Table
 
 import ldls
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
-from ldls.cli.outputs import Output, write_outputs
+from ldls.cli.outputs import DEFAULT_OUTPUTS, write_outputs
 from ldls.simulation import SimulatedFrame, street_scene
 
 
@@ -39,7 +39,7 @@ def demo(
     )
     camera = ldls.Camera(projection=frame.projection, T_camera_lidar=frame.T_camera_lidar)
     result = ldls.segment(frame.points, masks, camera)
-    written = write_outputs(out, "demo", result, frame.image, list(Output))
+    written = write_outputs(out, "demo", result, frame.image, DEFAULT_OUTPUTS)
     command = write_inputs(out, frame, masks)
 
     screen = console()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 
@@ -24,6 +25,22 @@ class Output(StrEnum):
     LABEL = "label"
     PLY = "ply"
     PNG = "png"
+    LIDARSEG = "lidarseg"
+    PANOPTIC = "panoptic"
+    PCD = "pcd"
+    LAS = "las"
+    LAZ = "laz"
+    PARQUET = "parquet"
+    CSV = "csv"
+
+    @property
+    def ending(self) -> str:
+        """How the names of such files end."""
+        return NUSCENES_ENDINGS.get(self, f".{self}")
+
+
+NUSCENES_ENDINGS: dict[Output, str] = {Output.LIDARSEG: "_lidarseg.bin", Output.PANOPTIC: "_panoptic.npz"}
+DEFAULT_OUTPUTS = (Output.NPZ, Output.LABEL, Output.PLY, Output.PNG)
 
 
 def write_outputs(
@@ -31,17 +48,17 @@ def write_outputs(
     name: str,
     result: Segmentation,
     image: NDArray[np.uint8] | None,
-    formats: list[Output],
+    formats: Sequence[Output],
 ) -> list[Path]:
     """Write `result` to `folder` in every one of `formats`; the files written."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"{name}.{output}" for output in dict.fromkeys(formats)]
-    for path in paths:
-        if path.suffix == ".png":
+    paths = {output: folder / f"{name}{output.ending}" for output in formats}
+    for output, path in paths.items():
+        if output is Output.PNG:
             _write_picture(path, result, image)
         else:
             result.save(path)
-    return paths
+    return list(paths.values())
 
 
 def _write_picture(path: Path, result: Segmentation, image: NDArray[np.uint8] | None) -> None:

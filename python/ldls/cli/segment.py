@@ -15,7 +15,7 @@ from ldls.cli.mask_options import (
     masks_of,
 )
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
-from ldls.cli.outputs import Output, write_outputs
+from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
 from ldls.io import read_image, read_points
 from ldls.label_diffusion import segment as segment_cloud
 from ldls.params import Params
@@ -25,7 +25,10 @@ EXISTING = {"exists": True, "dir_okay": False, "readable": True}
 
 @speaks_plainly
 def segment(
-    points: Annotated[Path, typer.Option(help="Lidar sweep: KITTI .bin, nuScenes .pcd.bin or .npy.", **EXISTING)],
+    points: Annotated[
+        Path,
+        typer.Option(help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, .csv, .txt or .xyz.", **EXISTING),
+    ],
     calib: Annotated[Path, typer.Option(help="KITTI calibration of the frame.", **EXISTING)],
     out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
     masks: Annotated[
@@ -55,7 +58,7 @@ def segment(
     image_id: Annotated[int | None, typer.Option(help="Which image of a COCO file that holds several.")] = None,
     formats: Annotated[
         list[Output] | None,
-        typer.Option("--format", help="What to write; may be repeated.", show_default="all"),
+        typer.Option("--format", help="What to write; may be repeated.", show_default="npz, label, ply, png"),
     ] = None,
     neighbors: Annotated[int, typer.Option(help="K: nearest neighbours a point.")] = 10,
     sigma: Annotated[float, typer.Option(help="Reach of point edges exp(-d^2/sigma), in square metres.")] = 1.0,
@@ -75,7 +78,7 @@ def segment(
     """Label the points of one lidar sweep by the instance masks of one image.
 
     Prints the objects found and the time of each stage, and writes to the folder --out, named after the sweep:
-    .npz (all fields), .label (SemanticKITTI), .ply (coloured cloud) and .png (picture).
+    .npz (all fields), .label (SemanticKITTI), .ply (coloured cloud) and .png (picture), or what --format says.
 
     Masks come from a file (--masks) or from a segmenter that runs on the image (--segmenter); KITTI's 2D boxes are
     enough to begin with.
@@ -108,8 +111,8 @@ def segment(
     if save_masks is not None:
         chosen.save(save_masks)
     result = segment_cloud(read_points(points), chosen, Camera.from_kitti(calib, camera=camera), params=params)
-    name = points.name.removesuffix(".bin").removesuffix(".pcd").removesuffix(".npy")
-    written = write_outputs(out, name, result, pixels, formats or list(Output))
+    name = points.stem.removesuffix(".pcd")
+    written = write_outputs(out, name, result, pixels, formats or DEFAULT_OUTPUTS)
     screen = console()
     screen.print(object_table(result.objects))
     screen.print(timing_table(result.timings))

@@ -11,8 +11,7 @@ from ldls.errors import CorruptFileError, InputError
 from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.vocabularies import NUSCENES
 from ldls.io.npz import read_npz
-
-INSTANCES_A_CLASS = 1000
+from ldls.io.nuscenes_labels import INSTANCES_A_CLASS
 
 
 def read_lidarseg(path: str | PathLike[str]) -> Labeling:

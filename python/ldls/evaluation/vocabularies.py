@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ldls.io.nuscenes_labels import CLASS_NAMES
+
 BACKGROUND = "background"
 
 KITTI: tuple[str, ...] = (
@@ -20,16 +22,7 @@ SEMANTIC_KITTI: dict[int, str] = {
     257: "moving-bus", 258: "moving-truck", 259: "moving-other-vehicle",
 }  # fmt: skip
 
-NUSCENES: dict[int, str] = dict(enumerate((
-    "noise", "animal", "human.pedestrian.adult", "human.pedestrian.child", "human.pedestrian.construction_worker",
-    "human.pedestrian.personal_mobility", "human.pedestrian.police_officer", "human.pedestrian.stroller",
-    "human.pedestrian.wheelchair", "movable_object.barrier", "movable_object.debris",
-    "movable_object.pushable_pullable", "movable_object.trafficcone", "static_object.bicycle_rack",
-    "vehicle.bicycle", "vehicle.bus.bendy", "vehicle.bus.rigid", "vehicle.car", "vehicle.construction",
-    "vehicle.emergency.ambulance", "vehicle.emergency.police", "vehicle.motorcycle", "vehicle.trailer",
-    "vehicle.truck", "flat.driveable_surface", "flat.other", "flat.sidewalk", "flat.terrain", "static.manmade",
-    "static.other", "static.vegetation", "vehicle.ego",
-)))  # fmt: skip
+NUSCENES: dict[int, str] = dict(enumerate(CLASS_NAMES))
 """The 32 general classes of nuScenes lidarseg."""
 
 VOID: tuple[str, ...] = ("unlabeled", "outlier", "noise", "vehicle.ego")

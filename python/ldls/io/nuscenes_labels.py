@@ -1,0 +1,82 @@
+"""nuScenes' labels: lidarseg (uint8 a point) and panoptic (uint16 a point, class * 1000 + instance).
+
+Source: https://github.com/nutonomy/nuscenes-devkit/blob/master/docs/instructions_lidarseg.md.
+"""
+
+from __future__ import annotations
+
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import LimitError
+from ldls.io.npz import write_npz
+from ldls.io.whole_file import whole_file
+
+if TYPE_CHECKING:
+    from ldls.segmentation import Segmentation
+
+INSTANCES_A_CLASS = 1000
+
+CLASS_NAMES: tuple[str, ...] = (
+    "noise", "animal", "human.pedestrian.adult", "human.pedestrian.child", "human.pedestrian.construction_worker",
+    "human.pedestrian.personal_mobility", "human.pedestrian.police_officer", "human.pedestrian.stroller",
+    "human.pedestrian.wheelchair", "movable_object.barrier", "movable_object.debris",
+    "movable_object.pushable_pullable", "movable_object.trafficcone", "static_object.bicycle_rack",
+    "vehicle.bicycle", "vehicle.bus.bendy", "vehicle.bus.rigid", "vehicle.car", "vehicle.construction",
+    "vehicle.emergency.ambulance", "vehicle.emergency.police", "vehicle.motorcycle", "vehicle.trailer",
+    "vehicle.truck", "flat.driveable_surface", "flat.other", "flat.sidewalk", "flat.terrain", "static.manmade",
+    "static.other", "static.vegetation", "vehicle.ego",
+)  # fmt: skip
+"""The 32 general classes by their numbers."""
+
+OTHER_OBJECT = "static.other"
+COCO_CLASSES: dict[str, str] = {
+    "person": "human.pedestrian.adult", "bicycle": "vehicle.bicycle", "car": "vehicle.car",
+    "motorcycle": "vehicle.motorcycle", "bus": "vehicle.bus.rigid", "truck": "vehicle.truck",
+    **dict.fromkeys(
+        ("bird", "cat", "dog", "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe"), "animal"
+    ),
+    **dict.fromkeys(("traffic light", "fire hydrant", "stop sign", "parking meter", "bench"), "static.manmade"),
+    "potted plant": "static.vegetation",
+}  # fmt: skip
+"""Class of a COCO category; anything else is `OTHER_OBJECT`. Background and points out of view are 0, noise."""
+
+
+def write_lidarseg(path: Path, result: Segmentation) -> None:
+    """Write the class of each point in the order of the cloud, one byte a point."""
+    with whole_file(path) as file:
+        file.write(_by_label(_classes(result))[result.labels].astype(np.uint8).tobytes())
+
+
+def write_panoptic(path: Path, result: Segmentation) -> None:
+    """Write class * 1000 + instance of each point in the order of the cloud; instances count from 1 in each class.
+
+    Raises:
+        LimitError: A class has more than 999 instances.
+    """
+    classes = _classes(result)
+    counters = {one: count(1) for one in classes.tolist()}
+    numbers = np.array([next(counters[one]) for one in classes.tolist()], np.int64)
+    if numbers.max(initial=0) >= INSTANCES_A_CLASS:
+        crowded = CLASS_NAMES[classes[numbers.argmax()]]
+        raise LimitError(
+            f"{path}: {numbers.max()} instances of {crowded}, expected at most {INSTANCES_A_CLASS - 1}; "
+            "save .npz, .label or .ply instead"
+        )
+    codes = _by_label(classes * INSTANCES_A_CLASS + numbers)[result.labels]
+    write_npz(path, {"data": codes.astype(np.uint16)})
+
+
+def _classes(result: Segmentation) -> NDArray[np.int64]:
+    names = [COCO_CLASSES.get(instance.name, instance.name) for instance in result.instances]
+    known = [name if name in CLASS_NAMES else OTHER_OBJECT for name in names]
+    return np.array([CLASS_NAMES.index(name) for name in known], np.int64)
+
+
+def _by_label(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    # label -1, out of view, picks the last entry
+    return np.concatenate([[0], values, [0]])

@@ -1,0 +1,45 @@
+"""Parquet: one row a point."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ldls import _ldls
+from ldls._optional import require
+from ldls.io.labeled_points import instances, names, positions
+from ldls.io.whole_file import whole_file
+
+if TYPE_CHECKING:
+    from ldls.segmentation import Segmentation
+
+
+def write(path: Path, result: Segmentation) -> None:
+    """Write x y z (and intensity), `label`, `instance`, `category`, `name` and `confidence` of each point.
+
+    `label` is -1 out of view, where `instance` is 0; `name` is null for background and out of view. The metadata has
+    version, parameters and report as JSON under the key `ldls`.
+
+    Raises:
+        ImportError: The extra `arrow` is not installed.
+    """
+    pyarrow = require("pyarrow", "arrow")
+    parquet = require("pyarrow.parquet", "arrow")
+    by_label = names(result)
+    codes = result.labels % len(by_label)  # label -1, out of view, picks the last entry
+    columns = {name: pyarrow.array(np.ascontiguousarray(column)) for name, column in positions(result).items()}
+    columns |= {
+        "label": pyarrow.array(result.labels),
+        "instance": pyarrow.array(instances(result)),
+        "category": pyarrow.array(result.categories),
+        "name": pyarrow.array(by_label, pyarrow.string()).take(pyarrow.array(codes)).dictionary_encode(),
+        "confidence": pyarrow.array(result.confidence),
+    }
+    about = {"version": _ldls.__version__, "params": asdict(result.params), "report": asdict(result.report)}
+    table = pyarrow.table(columns, metadata={"ldls": json.dumps(about)})
+    with whole_file(path) as file:
+        parquet.write_table(table, file)
