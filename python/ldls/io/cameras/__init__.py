@@ -1,0 +1,1 @@
+"""Cameras from calibration files and messages: one module a source."""

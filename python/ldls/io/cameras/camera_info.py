@@ -1,0 +1,121 @@
+"""CameraInfo messages of ROS 1 and ROS 2, and dicts and YAML with the same names.
+
+Source: https://docs.ros.org/en/api/sensor_msgs/html/msg/CameraInfo.html.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.distortion import Distortion
+from ldls.errors import CalibrationError
+from ldls.io.cameras.fields import Fields
+from ldls.io.cameras.found import FoundCamera
+from ldls.io.cameras.opencv_yaml import image_size
+from ldls.io.cameras.rigid import from_parts, rigid
+from ldls.io.cameras.yaml_file import read_yaml
+
+MESSAGE_FIELDS = (
+    "height", "width", "distortion_model", "D", "d", "K", "k", "R", "r", "P", "p", "binning_x", "binning_y", "roi",
+)  # fmt: skip
+ROI_FIELDS = ("x_offset", "y_offset", "height", "width")
+UNCALIBRATED = "calibrate the camera, or wait until its driver sends the calibration"
+
+
+def read(message: object, T_camera_lidar: NDArray[np.float64], *, rectified: bool) -> FoundCamera:
+    """The camera that a message describes.
+
+    Region of interest and binning change the full image that the matrices are of: first it is cut, then it shrinks.
+
+    Args:
+        message: A message by its attributes, a dict, or the path of a YAML file.
+        T_camera_lidar: (4, 4) from lidar to the coordinates of the camera as it is mounted.
+        rectified: Whether masks are of the rectified image (P and R) instead of the raw one (K and D).
+
+    Raises:
+        CalibrationError: The camera is not calibrated, or a field is missing or cannot be a camera's.
+    """
+    fields = as_fields(message)
+    crop = _Crop.of(fields)
+    if rectified:
+        rotation = np.eye(3)
+        if fields.find("R", "rectification_matrix") is not None:
+            rotation = fields.matrix((3, 3), "R", "rectification_matrix")
+        return FoundCamera(
+            place=fields.place,
+            projection=crop.apply(_not_zero(fields, (3, 4), "P", "projection_matrix")),
+            T_camera_lidar=rigid(f"{fields.place}: R", from_parts(rotation)) @ T_camera_lidar,
+            image_size=crop.image_size,
+        )
+    return FoundCamera(
+        place=fields.place,
+        projection=crop.apply(_not_zero(fields, (3, 3), "K", "camera_matrix")),
+        T_camera_lidar=T_camera_lidar,
+        distortion=_distortion(fields),
+        image_size=crop.image_size,
+    )
+
+
+def as_fields(message: object) -> Fields:
+    """The fields of a message, whatever it comes as."""
+    if isinstance(message, str | PathLike):
+        return read_yaml(message)
+    if isinstance(message, Mapping):
+        return Fields("camera_info", message)
+    return Fields("camera_info", _attributes(message, MESSAGE_FIELDS))
+
+
+def _attributes(message: object, names: tuple[str, ...]) -> dict[str, object]:
+    return {name: getattr(message, name) for name in names if hasattr(message, name)}
+
+
+def _not_zero(fields: Fields, shape: tuple[int, int], *spellings: str) -> NDArray[np.float64]:
+    matrix = fields.matrix(shape, *spellings, mend=UNCALIBRATED)
+    if not matrix.any():
+        raise CalibrationError(f"{fields.place}: {spellings[0]}: all zeros, expected focal lengths; {UNCALIBRATED}")
+    return matrix
+
+
+def _distortion(fields: Fields) -> Distortion:
+    coefficients = fields.numbers("D", "distortion_coefficients", mend="make it [] where there is no distortion")
+    model = str(fields.find("distortion_model") or "")
+    if not model and coefficients.any():
+        raise CalibrationError(
+            f"{fields.place}: distortion_model is missing beside D {coefficients.tolist()}, "
+            "expected plumb_bob, rational_polynomial or equidistant"
+        )
+    return fields.distortion(model, coefficients)
+
+
+class _Crop:
+    """What became of the full image: cut to a region, then shrunk by binning."""
+
+    def __init__(self, offset: NDArray[np.float64], binning: NDArray[np.float64], size: tuple[int, int] | None) -> None:
+        self.offset, self.binning, self.image_size = offset, binning, size
+
+    @classmethod
+    def of(cls, fields: Fields) -> _Crop:
+        roi = fields.find("roi")
+        region = roi if isinstance(roi, Mapping) else _attributes(roi, ROI_FIELDS)
+        roi_fields = Fields(f"{fields.place}: roi", region)
+        offset = np.array([roi_fields.whole_number(name) or 0 for name in ("x_offset", "y_offset")])
+        binning = np.array([fields.whole_number(name) or 1 for name in ("binning_x", "binning_y")])
+        full, cut = image_size(fields), image_size(roi_fields)
+        kept = cut or full
+        if full and cut and not (offset[::-1] + cut <= full).all():
+            raise CalibrationError(
+                f"{roi_fields.place}: {cut} (height, width) at x {offset[0]}, y {offset[1]} is not inside {full}"
+            )
+        size = (kept[0] // int(binning[1]), kept[1] // int(binning[0])) if kept else None
+        return cls(offset.astype(np.float64), binning.astype(np.float64), size)
+
+    def apply(self, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+        """`matrix`, (3, 3) or (3, 4), to pixels of what is left of the full image."""
+        cropped = matrix.copy()
+        cropped[:2] -= self.offset[:, None] * matrix[2]
+        cropped[:2] /= self.binning[:, None]
+        return cropped

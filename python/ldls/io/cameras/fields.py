@@ -1,0 +1,129 @@
+"""Entries of a calibration file or message, each checked when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.distortion import Distortion
+from ldls.errors import CalibrationError
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Named entries, found in capitals or not.
+
+    Attributes:
+        place: File or message that they are from, for errors.
+        entries: The entries by name.
+    """
+
+    place: str
+    entries: Mapping[str, object]
+
+    def find(self, *spellings: str) -> object | None:
+        """The first entry under one of `spellings`; None where there is none."""
+        found = {str(name).lower(): value for name, value in self.entries.items()}
+        return next((found[name.lower()] for name in spellings if name.lower() in found), None)
+
+    def get(self, *spellings: str, mend: str = "") -> object:
+        """The first entry under one of `spellings`.
+
+        Raises:
+            CalibrationError: There is none; the message says what there is, what was expected, and `mend`.
+        """
+        value = self.find(*spellings)
+        if value is None:
+            found = " ".join(map(str, self.entries)) or "none"
+            others = f", expected that or {', '.join(spellings[1:])}" if len(spellings) > 1 else ""
+            hint = f"; {mend}" if mend else ""
+            raise CalibrationError(f"{self.place}: key '{spellings[0]}' missing; found {found}{others}{hint}")
+        return value
+
+    def section(self, name: str) -> Fields:
+        """The entries of the entry `name`.
+
+        Raises:
+            CalibrationError: There is none, or it has no entries.
+        """
+        entries = self.get(name)
+        if not isinstance(entries, Mapping):
+            raise CalibrationError(f"{self.place}: {name} is {_short(entries)}, expected keys with values")
+        return Fields(f"{self.place}: {name}", entries)
+
+    def numbers(self, *spellings: str, mend: str = "") -> NDArray[np.float64]:
+        """The numbers of an entry as they stand: a list, a list of rows, or `rows`, `cols` and `data`.
+
+        Raises:
+            CalibrationError: There is no such entry, or it holds something else, or a number is not finite.
+        """
+        return self._numbers(spellings[0], self.get(*spellings, mend=mend))
+
+    def matrix(self, shape: tuple[int, ...], *spellings: str, mend: str = "") -> NDArray[np.float64]:
+        """The numbers of an entry in `shape`.
+
+        Raises:
+            CalibrationError: As `numbers`, or there are more or fewer of them.
+        """
+        values = self.numbers(*spellings, mend=mend)
+        expected = int(np.prod(shape))
+        if values.size != expected or (values.ndim == 2 and values.shape != shape and 1 not in values.shape):
+            size = " x ".join(map(str, shape))
+            found = f"{values.size} as {' x '.join(map(str, values.shape))}" if values.ndim > 1 else str(values.size)
+            raise CalibrationError(f"{self.place}: {spellings[0]}: expected {expected} numbers ({size}), got {found}")
+        return values.reshape(shape)
+
+    def whole_number(self, *spellings: str) -> int | None:
+        """A whole number from 0; None where there is no such entry.
+
+        Raises:
+            CalibrationError: It is something else.
+        """
+        value = self.find(*spellings)
+        if value is None:
+            return None
+        number = self.matrix((1,), *spellings)[0]
+        if not (number >= 0 and number == np.floor(number)):
+            raise CalibrationError(f"{self.place}: {spellings[0]}: expected a whole number from 0, got {_short(value)}")
+        return int(number)
+
+    def distortion(self, model: str, coefficients: NDArray[np.float64]) -> Distortion:
+        """Distortion by the `model` and `coefficients` that stand here.
+
+        Raises:
+            CalibrationError: The model is unknown or has another number of coefficients.
+        """
+        try:
+            return Distortion(model, tuple(coefficients.ravel().tolist()))
+        except CalibrationError as error:
+            raise CalibrationError(f"{self.place}: {error}") from None
+
+    def _numbers(self, name: str, value: object) -> NDArray[np.float64]:
+        if isinstance(value, Mapping):
+            return self._rows_and_columns(Fields(f"{self.place}: {name}", value))
+        try:
+            values = np.array(value, np.float64)
+        except (TypeError, ValueError):
+            raise CalibrationError(
+                f"{self.place}: {name}: expected numbers with a decimal point, got {_short(value)}"
+            ) from None
+        if not np.isfinite(values).all():
+            raise CalibrationError(f"{self.place}: {name}: expected finite numbers, got {_short(value)}")
+        return values
+
+    def _rows_and_columns(self, matrix: Fields) -> NDArray[np.float64]:
+        values = matrix.numbers("data")
+        rows, columns = matrix.whole_number("rows"), matrix.whole_number("cols")
+        if rows is None or columns is None:
+            return values
+        if values.size != rows * columns:
+            raise CalibrationError(f"{matrix.place}: {rows} rows x {columns} cols, got {values.size} numbers")
+        return values.reshape(rows, columns)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -1,0 +1,96 @@
+"""Camera chains of Kalibr.
+
+Source: https://github.com/ethz-asl/kalibr/wiki/yaml-formats.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import CalibrationError
+from ldls.io.cameras.fields import Fields
+from ldls.io.cameras.found import FoundCamera
+from ldls.io.cameras.rigid import rigid
+from ldls.io.cameras.yaml_file import read_yaml
+
+LIDAR = ("T_cam_lidar", "T_camera_lidar")
+IMU = ("T_cam_imu",)
+PREVIOUS = "T_cn_cnm1"
+
+
+def read(
+    path: str | PathLike[str],
+    camera: str,
+    T_camera_lidar: NDArray[np.float64] | None,
+    T_imu_lidar: NDArray[np.float64] | None,
+) -> FoundCamera:
+    """The camera `camera`, with the raw image's distortion.
+
+    Args:
+        path: The file.
+        camera: Key of the camera.
+        T_camera_lidar: (4, 4) from lidar to camera coordinates; None for what the file says.
+        T_imu_lidar: (4, 4) from lidar to IMU coordinates, for a file that has the IMU's place alone.
+
+    Raises:
+        CalibrationError: It is not YAML, a key is missing, the model is not a pinhole, or nothing leads to the lidar.
+    """
+    chain = read_yaml(path)
+    fields = chain.section(camera)
+    model = fields.get("camera_model")
+    if model != "pinhole":
+        raise CalibrationError(f"{fields.place}: camera_model is {model!r}, expected 'pinhole'; calibrate with that")
+    fx, fy, cx, cy = fields.matrix((4,), "intrinsics")
+    distortion_model = str(fields.get("distortion_model"))
+    coefficients = np.zeros(0) if distortion_model == "none" else fields.numbers("distortion_coeffs")
+    width, height = (_side(fields, side) for side in fields.matrix((2,), "resolution"))
+    return FoundCamera(
+        place=fields.place,
+        projection=np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]),
+        T_camera_lidar=_from_lidar(chain, camera, T_imu_lidar) if T_camera_lidar is None else T_camera_lidar,
+        distortion=fields.distortion(distortion_model, coefficients),
+        image_size=(height, width),
+    )
+
+
+def _side(fields: Fields, pixels: float) -> int:
+    if not (pixels >= 1 and pixels == int(pixels)):
+        raise CalibrationError(f"{fields.place}: resolution: expected whole numbers of pixels, got {pixels}")
+    return int(pixels)
+
+
+def _from_lidar(chain: Fields, camera: str, T_imu_lidar: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    direct = _extrinsic(chain, camera, LIDAR)
+    if direct is not None:
+        return direct
+    by_imu = None if T_imu_lidar is None else _extrinsic(chain, camera, IMU)
+    if by_imu is None or T_imu_lidar is None:
+        raise CalibrationError(
+            f"{chain.place}: {camera}: no {LIDAR[0]}, or {IMU[0]} together with T_imu_lidar=, on the way to the lidar; "
+            "pass T_camera_lidar="
+        )
+    return by_imu @ rigid("T_imu_lidar", T_imu_lidar)
+
+
+def _extrinsic(chain: Fields, camera: str, keys: tuple[str, ...]) -> NDArray[np.float64] | None:
+    """Transform to `camera` of what `keys` name, by way of the cameras before it where it has none itself."""
+    from_there = np.eye(4)
+    for name in _back_from(camera):
+        if chain.find(name) is None:
+            return None
+        fields = chain.section(name)
+        if fields.find(*keys) is not None:
+            return from_there @ rigid(f"{fields.place}: {keys[0]}", fields.matrix((4, 4), *keys))
+        if fields.find(PREVIOUS) is None:
+            return None
+        from_there = from_there @ rigid(f"{fields.place}: {PREVIOUS}", fields.matrix((4, 4), PREVIOUS))
+    return None
+
+
+def _back_from(camera: str) -> list[str]:
+    """`camera` and those before it in the chain: cam2, cam1, cam0."""
+    number = camera.removeprefix("cam")
+    return [f"cam{i}" for i in range(int(number), -1, -1)] if number.isdecimal() else [camera]

@@ -1,0 +1,64 @@
+"""Rigid transforms between frames of reference: (4, 4), column vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import CalibrationError
+
+Matrix = NDArray[np.float64]
+
+ROTATION_LIMIT = 1e-3
+"""How far a rotation may be from orthonormal; calibration files round to 7 digits."""
+
+
+def rigid(place: str, matrix: Matrix) -> Matrix:
+    """`matrix` (4, 4), which turns and shifts and does nothing else.
+
+    Raises:
+        CalibrationError: It does something else; the message has the deviation.
+    """
+    rotation = matrix[:3, :3]
+    deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if not deviation <= ROTATION_LIMIT:
+        raise CalibrationError(
+            f"{place}: R^T R deviates by {deviation:.3g} from the identity, expected a rotation to {ROTATION_LIMIT}"
+        )
+    if not np.linalg.det(rotation) > 0:
+        raise CalibrationError(f"{place}: the determinant is -1, a mirror; expected a rotation")
+    if matrix[3].tolist() != [0, 0, 0, 1]:
+        raise CalibrationError(f"{place}: the last row is {matrix[3].tolist()}, expected [0, 0, 0, 1]; transposed?")
+    return matrix
+
+
+def from_parts(rotation: Matrix, translation: Matrix | None = None) -> Matrix:
+    """The transform that turns by `rotation` (3, 3), then shifts by `translation` (3,) in metres."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation
+    matrix[:3, 3] = 0 if translation is None else translation
+    return matrix
+
+
+def inverse(matrix: Matrix) -> Matrix:
+    """The transform back."""
+    return from_parts(matrix[:3, :3].T, -matrix[:3, :3].T @ matrix[:3, 3])
+
+
+def from_quaternion(place: str, wxyz: Matrix) -> Matrix:
+    """(3, 3) rotation of a quaternion w x y z.
+
+    Raises:
+        CalibrationError: Its length is not 1.
+    """
+    length = float(np.linalg.norm(wxyz))
+    if not abs(length - 1) <= ROTATION_LIMIT:
+        raise CalibrationError(f"{place}: quaternion {wxyz.tolist()} has length {length:.6g}, expected 1 (w x y z)")
+    w, x, y, z = wxyz / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
