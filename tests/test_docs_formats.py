@@ -1,0 +1,22 @@
+"""docs/formats.md names every format there is."""
+
+from pathlib import Path
+
+import ldls
+from ldls.cli.outputs import Output
+from ldls.io.points import READERS
+from ldls.io.results import WRITERS
+
+PAGE = (Path(__file__).parents[1] / "docs/formats.md").read_text()
+POINTS, RESULTS, CAMERAS = PAGE.split("\n## ")[1:]
+
+
+def test_every_format_has_its_row():
+    assert [suffix for suffix in READERS if f"`{suffix}`" not in POINTS] == []
+    assert [ending for ending in WRITERS if f"`{ending}`" not in RESULTS] == []
+    assert [output for output in Output if f"`{output}`" not in RESULTS] == []
+
+
+def test_every_source_of_a_camera_has_its_row():
+    sources = [name for name in vars(ldls.Camera) if name.startswith("from_")]
+    assert [name for name in sources if f"Camera.{name}(" not in CAMERAS] == []
