@@ -36,7 +36,7 @@ def change(path, at, layout, *values):
 
 @pytest.mark.parametrize(
     ("point_format", "version"),
-    [(0, "1.2"), (1, "1.2"), (2, "1.2"), (3, "1.2"), (6, "1.4"), (7, "1.4"), (8, "1.4")],
+    [(0, "1.2"), (1, "1.2"), (2, "1.2"), (3, "1.2"), (4, "1.3"), (6, "1.4"), (7, "1.4"), (8, "1.4"), (9, "1.4")],
 )
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
 def test_coordinates_of_utm_size_stay_exact(tmp_path, point_format, version, suffix):
@@ -94,6 +94,24 @@ def test_a_number_of_chunks_that_lies_asks_for_no_memory(tmp_path, point_format)
     (offset,) = struct.unpack_from("<I", content, 96)
     change(tmp_path / "a.laz", struct.unpack_from("<q", content, offset)[0] + 4, "I", 2**32 - 1)
     with pytest.raises(ldls.CorruptFileError, match="4294967295 chunks do not fit"):
+        ldls.read_points(tmp_path / "a.laz")
+
+
+@pytest.mark.parametrize(
+    ("at", "layout", "value", "message"),
+    [
+        pytest.param(
+            375 + 54 + 32, "H", 0, r"items are \[\] \(kind, bytes\), expected known ones of 30 bytes", id="none"
+        ),
+        pytest.param(375 + 54 + 34, "H", 6, "LASzip's items are", id="of another point format"),
+        pytest.param(375 + 54 + 36, "H", 7, "LASzip's items are", id="size"),
+        pytest.param(375 + 2, "4s", b"none", "without a record of LASzip", id="no record"),
+    ],
+)
+def test_a_record_of_laszip_that_lies(tmp_path, at, layout, value, message):
+    cloud().write(tmp_path / "a.laz")
+    change(tmp_path / "a.laz", at, layout, value)
+    with pytest.raises(ldls.CorruptFileError, match=f"a.laz.*{message}"):
         ldls.read_points(tmp_path / "a.laz")
 
 

@@ -18,10 +18,13 @@ TABLE_HEAD = struct.Struct("<4xI")
 """Version, number of chunks."""
 ITEMS_AT = 32
 LAYERED = 3
+ITEM_BYTES = {6: 20, 7: 8, 8: 6, 9: 29, 10: 30, 11: 6, 12: 8, 13: 29}
+"""Size of each item of a point: core, time, colour and wave packet of point formats 0 to 5; core, colour, colour with
+infrared and wave packet of formats 6 to 10."""
+EXTRA_BYTES = (0, 14)
+"""Items of any size, of the older formats and of the newer."""
 LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
-"""Layers of each item of a point: points of formats 6 to 10, colour, colour with infrared, wave packets."""
-EXTRA_BYTES = 14
-"""Item with a layer for each of its bytes."""
+"""Layers of each item of formats 6 to 10; extra bytes have one a byte."""
 
 
 def check_chunks(path: Path, vlrs: bytes, offset: int, record_bytes: int, n_points: int) -> None:
@@ -42,23 +45,30 @@ def check_chunks(path: Path, vlrs: bytes, offset: int, record_bytes: int, n_poin
             is no record of LASzip.
     """
     laszip = _laszip_record(path, vlrs)
+    items = _items(path, laszip, record_bytes)
     table = _table_offset(path, offset, record_bytes)
-    (compressor,), (n_items,) = struct.unpack_from("<H", laszip), struct.unpack_from("<H", laszip, ITEMS_AT)
-    if compressor != LAYERED:
+    if struct.unpack_from("<H", laszip) != (LAYERED,):
         return
-    items = list(struct.iter_unpack("<HHH", laszip[ITEMS_AT + 2 :][: 6 * n_items]))
-    sizes = [size for _, size, _ in items]
-    if sum(sizes) != record_bytes or not all(kind in LAYERS or kind == EXTRA_BYTES for kind, _, _ in items):
-        raise CorruptFileError(
-            f"{path}: LASzip items {items}, expected those of point formats 6 to 10 with {record_bytes} bytes"
-        )
-    n_layers = sum(size if kind == EXTRA_BYTES else LAYERS[kind] for kind, size, _ in items)
+    n_layers = sum(LAYERS.get(kind, size) for kind, size in items)
     head = struct.Struct(f"<{record_bytes}x{1 + n_layers}I")
     found, end = _walk(path, head, offset + TABLE_POINTER.size, n_points)
     if found != n_points:
         raise CorruptFileError(f"{path}: the header says {n_points} points, the chunks {found}")
     if end != table:
         raise CorruptFileError(f"{path}: the chunks end at byte {end}, their table begins at {table}")
+
+
+def _items(path: Path, laszip: bytes, record_bytes: int) -> list[tuple[int, int]]:
+    """Kind and size of each item of a point."""
+    (n_items,) = struct.unpack_from("<H", laszip, ITEMS_AT)
+    content = laszip[ITEMS_AT + 2 :][: 6 * n_items]
+    items = [(kind, size) for kind, size, _ in struct.iter_unpack("<HHH", content[: len(content) // 6 * 6])]
+    right = all(kind in EXTRA_BYTES or ITEM_BYTES.get(kind) == size for kind, size in items)
+    if not right or sum(size for _, size in items) != record_bytes:
+        raise CorruptFileError(
+            f"{path}: LASzip's items are {items} (kind, bytes), expected known ones of {record_bytes} bytes together"
+        )
+    return items
 
 
 def _walk(path: Path, head: struct.Struct, start: int, n_points: int) -> tuple[int, int]:
