@@ -22,7 +22,6 @@ from ldls.errors import CorruptFileError, SourceError
 from ldls.evaluation import read_annotations
 from ldls.io import read_points
 from ldls.io.images import read_image
-from ldls.io.kitti_raw import read_raw_calibration, read_raw_image_size
 from ldls.io.text import read_lines
 
 LIDAR = "velodyne_points"
@@ -70,7 +69,7 @@ class KittiRawSource:
         self.path = _drive(Path(path), drive)
         folders = {f"image_{n:02d}": n for n in camera_numbers(camera)}
         check_folders(self.path, [LIDAR, *folders])
-        self._cameras = {name: _read_camera(self.path.parent, n) for name, n in folders.items()}
+        self._cameras = {name: Camera.from_kitti_raw(self.path.parent, camera=n) for name, n in folders.items()}
         self._points = find_files(self.path / LIDAR / "data", POINT_SUFFIXES)
         self._images = {name: find_files(self.path / name / "data", IMAGE_SUFFIXES) for name in folders}
         frames = whole_frames(self.path, {LIDAR: self._points, **self._images})
@@ -132,12 +131,6 @@ def _drive(path: Path, wanted: str | None) -> Path:
     if wanted is None and ((path / LIDAR).is_dir() or not drives):
         return path.absolute()  # the calibration lies in its parent
     return path / choose(path, "drive", drives, wanted)
-
-
-def _read_camera(day: Path, number: int) -> Camera:
-    projection, transform = read_raw_calibration(day, camera=number)
-    size = read_raw_image_size(day, camera=number)
-    return Camera(projection=projection, T_camera_lidar=transform, image_size=size)
 
 
 def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:

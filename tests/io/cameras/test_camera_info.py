@@ -82,13 +82,13 @@ def test_raw_and_rectified_see_the_same():
         ),
         pytest.param(
             {"binning_x": 2, "binning_y": 4},
-            [240, 0, 155, -48, 0, 120, 57.5, 0, 0, 0, 1, 0],
+            [240, 0, 154.75, -48, 0, 120, 57.125, 0, 0, 0, 1, 0],
             (120, 320),
             id="binning",
         ),
         pytest.param(
             {"roi": FULL | {"x_offset": 100, "width": 200, "height": 120}, "binning_x": 2, "binning_y": 2},
-            [240, 0, 105, -48, 0, 240, 115, 0, 0, 0, 1, 0],
+            [240, 0, 104.75, -48, 0, 240, 114.75, 0, 0, 0, 1, 0],
             (60, 100),
             id="cut, then shrunk",
         ),
