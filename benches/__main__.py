@@ -227,6 +227,31 @@ def masks(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
     return table
 
 
+def cameras(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
+    """A ring of six cameras against each of them alone, by the time a point in view takes."""
+    from benches import rings
+
+    name, points, views = rings.ring()
+    params = ldls.Params(threads=threads)
+
+    def run(some: list[ldls.View]) -> Callable[[], ldls.Segmentation]:
+        return lambda: ldls.segment(points, some, params=params)
+
+    sides = {view.name: run([view]) for view in views} | {"ring": run(views)}
+    found = medians(sides, runs=runs)
+    in_view = {side: len(call().in_view) for side, call in sides.items()}
+    alone = sum(found[view.name] for view in views) / sum(in_view[view.name] for view in views)
+    table = _table(
+        name,
+        ["cameras", "points in view", "ms", "us a point", "over the six alone"],
+        f"{threads} threads; the six alone take {alone * 1e6:.2f} us a point and camera",
+    )
+    for side, seconds in found.items():
+        each = seconds / in_view[side]
+        table.add_row(side, f"{in_view[side]:,}", f"{seconds * 1e3:.1f}", f"{each * 1e6:.2f}", f"{each / alone:.2f} x")
+    return table
+
+
 SECTIONS = {
     "scipy": against_scipy,
     "learners": against_learners,
@@ -236,6 +261,7 @@ SECTIONS = {
     "threads": thread_scaling,
     "batch": batch,
     "masks": masks,
+    "cameras": cameras,
 }
 
 
