@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("rosbags")
 
 from datasets.ros_samples import START_NS, STEP_NS, Recording, picture
-from ldls.datasets import RosBag
+from ldls.datasets import RosBag, open_source
 from ldls.errors import (
     CalibrationError,
     CorruptFileError,
@@ -59,6 +59,13 @@ def test_frames_hold_clouds_images_and_cameras(tmp_path, kind):
 def test_bare_storage_files_are_bags(tmp_path, kind, suffix):
     bag = RosBag(written(tmp_path, kind=kind) / f"small{suffix}")
     np.testing.assert_array_equal(bag[2].images[0].read(), picture(2))
+
+
+def test_a_bag_is_recognised_and_names_its_camera_and_files(tmp_path):
+    source = open_source(written(tmp_path), truth=False)
+    assert source.kind == "rosbag"
+    assert source.camera_names == tuple(image.name for image in source[0].images)
+    assert all(path.is_file() for path in source.files(0))
 
 
 def test_a_source_travels_between_processes(tmp_path):

@@ -43,6 +43,16 @@ def test_a_source_yields_frames_with_points_camera_and_image(tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", WRITERS)
+def test_a_source_names_cameras_and_files_without_reading_a_frame(tmp_path, kind):
+    source = open_source(WRITERS[kind](tmp_path))
+    for index, frame in enumerate(source):
+        assert source.camera_names == tuple(image.name for image in frame.images)
+        files = source.files(index)
+        assert all(path.is_file() for path in files)
+        assert {image.path for image in frame.images} < set(files)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
 def test_frames_are_read_only_when_they_are_asked_for(tmp_path, kind):
     path = WRITERS[kind](tmp_path)
     source = open_source(path)

@@ -192,8 +192,8 @@ class RosBag:
 
     @property
     def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame: its topic."""
-        return self.topics.images
+        """Name of the camera of each image of a frame: its topic, fit for a file name."""
+        return tuple(_camera_name(topic) for topic in self.topics.images)
 
     @property
     def stamps(self) -> tuple[float, ...]:
@@ -237,7 +237,7 @@ class RosBag:
         except CalibrationError as error:
             raise CalibrationError(self._place(info, error)) from None
         return CameraImage(
-            name=topic.strip("/").replace("/", "_"),
+            name=_camera_name(topic),
             camera=model,
             read=partial(self._pixels, entry, model.image_size),
             stamp=entry.header.stamp_ns / NANOSECONDS,
@@ -299,6 +299,10 @@ class RosBag:
 
     def __repr__(self) -> str:
         return f"RosBag({str(self.path)!r}, {len(self)} frames, {self.topics})"
+
+
+def _camera_name(topic: str) -> str:
+    return topic.strip("/").replace("/", "_")
 
 
 def _some(path: Path, topic: str, entries: list[_Entry]) -> list[_Entry]:
