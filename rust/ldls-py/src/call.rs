@@ -40,6 +40,24 @@ pub fn run<T: Send>(
         let pool = shared_pool(py, threads)?;
         on_pool(py, &pool, work)
     };
+    unwrapped(py, outcome)
+}
+
+/// Runs `work`, which is short and knows nothing of threads, here and now, with the GIL released.
+pub fn run_here<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> ldls_core::Result<T> + Send,
+) -> PyResult<T> {
+    let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
+    unwrapped(py, outcome)
+}
+
+/// Runs `work`, which takes microseconds, with the GIL held: giving it away and waiting for it would take longer.
+pub fn run_at_once<T>(py: Python<'_>, work: impl FnOnce() -> ldls_core::Result<T>) -> PyResult<T> {
+    unwrapped(py, catch_unwind(AssertUnwindSafe(work)))
+}
+
+fn unwrapped<T>(py: Python<'_>, outcome: std::thread::Result<ldls_core::Result<T>>) -> PyResult<T> {
     match outcome {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(error)) => Err(to_python(py, &error)),
@@ -99,7 +117,8 @@ pub fn remember_panics() {
     }));
 }
 
-fn checked_threads(py: Python<'_>, threads: Option<usize>) -> PyResult<usize> {
+/// The number of threads asked for, if a pool may have so many.
+pub fn checked_threads(py: Python<'_>, threads: Option<usize>) -> PyResult<usize> {
     match threads {
         Some(threads @ 1..=MAX_THREADS) => Ok(threads),
         Some(threads) => {

@@ -1,7 +1,7 @@
 //! Masks as Python objects.
 
 use crate::arrays::{matrix, slice};
-use crate::call::run;
+use crate::call::{run, run_at_once, run_here};
 use crate::errors::raise;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray3,
@@ -26,7 +26,7 @@ impl Rle {
         runs: PyReadonlyArray1<'_, u32>,
     ) -> PyResult<Self> {
         let runs = slice(py, "counts", &runs)?.to_vec();
-        run(py, None, || ldls_core::Rle::from_runs(height, width, runs)).map(Self)
+        run_at_once(py, || ldls_core::Rle::from_runs(height, width, runs)).map(Self)
     }
 
     #[staticmethod]
@@ -36,7 +36,7 @@ impl Rle {
         width: usize,
         counts: &[u8],
     ) -> PyResult<Self> {
-        run(py, None, || {
+        run_at_once(py, || {
             ldls_core::Rle::from_compressed(height, width, counts)
         })
         .map(Self)
@@ -49,7 +49,7 @@ impl Rle {
         width: usize,
         polygons: Vec<Vec<f64>>,
     ) -> PyResult<Self> {
-        run(py, None, || {
+        run_here(py, || {
             ldls_core::Rle::from_polygons(height, width, &polygons)
         })
         .map(Self)
@@ -59,10 +59,7 @@ impl Rle {
     fn from_pixels(py: Python<'_>, pixels: PyReadonlyArray2<'_, bool>) -> PyResult<Self> {
         let [height, width] = [pixels.shape()[0], pixels.shape()[1]];
         let pixels = slice(py, "mask", &pixels)?;
-        run(py, None, || {
-            ldls_core::Rle::from_pixels(height, width, pixels)
-        })
-        .map(Self)
+        run_here(py, || ldls_core::Rle::from_pixels(height, width, pixels)).map(Self)
     }
 
     #[getter]
@@ -90,19 +87,19 @@ impl Rle {
     }
 
     fn grow(&self, py: Python<'_>, radius: usize) -> PyResult<Self> {
-        run(py, None, || Ok(self.0.grow(radius))).map(Self)
+        run_here(py, || Ok(self.0.grow(radius))).map(Self)
     }
 
     fn shrink(&self, py: Python<'_>, radius: usize) -> PyResult<Self> {
-        run(py, None, || Ok(self.0.shrink(radius))).map(Self)
+        run_here(py, || Ok(self.0.shrink(radius))).map(Self)
     }
 
     fn union(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
-        run(py, None, || Ok(self.0.union(&other.0))).map(Self)
+        run_here(py, || Ok(self.0.union(&other.0))).map(Self)
     }
 
     fn difference(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
-        run(py, None, || Ok(self.0.difference(&other.0))).map(Self)
+        run_here(py, || Ok(self.0.difference(&other.0))).map(Self)
     }
 
     fn runs(&self, py: Python<'_>) -> Py<PyArray1<u32>> {
@@ -117,7 +114,7 @@ impl Rle {
         height: usize,
         width: usize,
     ) -> PyResult<Py<PyArray2<bool>>> {
-        let pixels = run(py, None, || self.0.crop([top, left, height, width]))?;
+        let pixels = run_here(py, || self.0.crop([top, left, height, width]))?;
         if width == 0 {
             return Ok(PyArray2::zeros(py, [height, width], false).unbind());
         }
@@ -139,10 +136,7 @@ impl Masks {
         masks: Vec<PyRef<'_, Rle>>,
     ) -> PyResult<Self> {
         let masks = masks.iter().map(|mask| mask.0.clone()).collect();
-        run(py, None, || {
-            ldls_core::InstanceMasks::new(height, width, masks)
-        })
-        .map(Self)
+        run_here(py, || ldls_core::InstanceMasks::new(height, width, masks)).map(Self)
     }
 
     #[getter]

@@ -1,7 +1,7 @@
 //! The whole method for Python.
 
 use crate::arrays::{Points, matrix};
-use crate::call::run;
+use crate::call::{checked_threads, run, run_at_once};
 use crate::camera::Camera;
 use crate::masks::Masks;
 use crate::memory::StreamMemory;
@@ -158,7 +158,8 @@ fn arrays(
 /// Refuses parameters outside their range.
 #[pyfunction]
 pub fn check_params(py: Python<'_>, params: ParamsTuple, threads: Option<usize>) -> PyResult<()> {
-    run(py, threads, || params.params().check())
+    checked_threads(py, threads)?;
+    run_at_once(py, || params.params().check())
 }
 
 fn report(py: Python<'_>, report: &ldls_core::Report) -> PyResult<Py<PyDict>> {
