@@ -225,7 +225,7 @@ def replaced(path, old, new):
         pytest.param("nuscenes", replaced("v1.0-mini/sample_data.json", "samples/CAM_BACK/", "../CAM_BACK/"),
                      ldls.UnsafePathError, "leads out of", id="nuscenes with a path that climbs out"),
         pytest.param("nuscenes", replaced("v1.0-mini/calibrated_sensor.json", "0.5", "0.7"), ldls.CalibrationError,
-                     "expected w x y z of 1", id="nuscenes with a rotation that is none"),
+                     "has length 1.4, expected 1", id="nuscenes with a rotation that is none"),
         pytest.param("folder", with_text("ldls.toml", "points = 3 4"), ldls.CorruptFileError, "not a TOML file",
                      id="folder with broken TOML"),
         pytest.param("folder", replaced("ldls.toml", "images =", "image ="), ldls.ParameterError,

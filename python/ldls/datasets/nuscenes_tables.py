@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ldls.datasets.files import choose, some
 from ldls.errors import CalibrationError, CorruptFileError, SourceError
+from ldls.io.cameras.rigid import from_parts, from_quaternion
 from ldls.io.json_rows import read_json_rows
 
 TABLES = ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")
-UNIT_SLACK = 1e-3
-"""How far the length of a rotation's quaternion may be from 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,34 +171,14 @@ def read_truth_files(tables: Path, name: str, tokens: set[str]) -> dict[str, str
     return {row["sample_data_token"]: row["filename"] for row in rows if row["sample_data_token"] in tokens}
 
 
-def rotation_matrix(place: str, quaternion: ArrayLike) -> NDArray[np.float64]:
-    """(3, 3) rotation of a unit quaternion w x y z.
-
-    Raises:
-        CalibrationError: Its length is not 1.
-    """
-    numbers = np.asarray(quaternion, np.float64)
-    length = float(np.linalg.norm(numbers))
-    if numbers.shape != (4,) or not abs(length - 1) <= UNIT_SLACK:
-        raise CalibrationError(f"{place}: rotation {numbers.tolist()} has length {length:.4g}, expected w x y z of 1")
-    w, x, y, z = numbers / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def _transform(place: str, row: Mapping[str, Any]) -> NDArray[np.float64]:
     translation = np.asarray(row["translation"], np.float64)
     if translation.shape != (3,) or not np.isfinite(translation).all():
         raise CalibrationError(f"{place}: translation {row['translation']}, expected three finite numbers")
-    transform = np.eye(4)
-    transform[:3, :3] = rotation_matrix(place, row["rotation"])
-    transform[:3, 3] = translation
-    return transform
+    quaternion = np.asarray(row["rotation"], np.float64)
+    if quaternion.shape != (4,):
+        raise CalibrationError(f"{place}: rotation {row['rotation']}, expected a quaternion w x y z")
+    return from_parts(from_quaternion(place, quaternion), translation)
 
 
 def _rows(tables: Path, name: str, keys: tuple[str, ...]) -> Iterator[dict[str, Any]]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import CalibrationError
+from ldls.io.cameras.rigid import from_parts, from_quaternion
 from ldls.io.ros.messages import RigidMessage, TransformsMessage, nanoseconds
 
 Matrix = NDArray[np.float64]
@@ -105,16 +106,5 @@ def _plain(frame_id: str) -> str:
 def _matrix(message: RigidMessage, name: str) -> Matrix:
     """(4, 4) from translation in metres and unit quaternion."""
     q, t = message.rotation, message.translation
-    x, y, z, w = np.array([q.x, q.y, q.z, q.w], np.float64)
-    length = x * x + y * y + z * z + w * w
-    if not abs(length - 1) < 1e-3:
-        raise CalibrationError(f"transforms: the rotation from {name} has length {np.sqrt(length)}, expected 1")
-    s = 2 / length
-    matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-        [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
-        [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
-    ]
-    matrix[:3, 3] = (t.x, t.y, t.z)
-    return matrix
+    rotation = from_quaternion(f"transforms: from {name}", np.array([q.w, q.x, q.y, q.z], np.float64))
+    return from_parts(rotation, np.array([t.x, t.y, t.z], np.float64))
