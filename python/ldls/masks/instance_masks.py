@@ -333,10 +333,12 @@ class InstanceMasks:
         """
         if not 0 <= min_score <= 1:
             raise ParameterError(f"min_score: got {min_score!r}, expected 0 to 1")
-        wanted = set(self.names) if categories is None else set(find_categories(categories, self.names))
-        areas = np.array([mask.area for mask in self], np.int64)
-        kept = (self.scores >= np.float32(min_score)) & np.isin(self.categories, list(wanted)) & (areas >= min_area)
-        return self.select(kept)
+        kept = self.scores >= np.float32(min_score)
+        if categories is not None:
+            kept &= np.isin(self.categories, find_categories(categories, self.names))
+        if min_area > 0:
+            kept &= np.array([mask.area >= min_area for mask in self], np.bool_)
+        return self if kept.all() else self.select(kept)
 
     def resolve_overlaps(self, by: Literal["score", "area", "order"] = "score") -> Self:
         """These masks, each pixel left to one of them; a mask may become empty.
