@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -14,7 +14,9 @@ from rich.table import Table
 import ldls
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.outputs import DEFAULT_OUTPUTS, write_outputs
-from ldls.simulation import SimulatedFrame, street_scene
+
+if TYPE_CHECKING:
+    from ldls.simulation import SimulatedFrame
 
 
 @speaks_plainly
@@ -30,6 +32,8 @@ def demo(
     find, segments the sweep, and holds direct projection and the method against the scene's true labels. Writes the
     results as `ldls segment` does, and the frame itself so that you can run that command on it.
     """
+    from ldls.simulation import street_scene
+
     frame = street_scene(seed)
     masks = ldls.InstanceMasks.from_array(
         frame.masks,

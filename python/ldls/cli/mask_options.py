@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ldls.cli.options import words
 from ldls.errors import InputError
 from ldls.masks import InstanceMasks
-from ldls.segmenters import open_segmenter
 
 SegmenterOption = Annotated[
     str | None,
@@ -55,6 +54,8 @@ def masks_of(
         size = None if image is None else (image.shape[0], image.shape[1])
         found = InstanceMasks.from_file(masks, image_id=image_id, image_size=size)
         return wanted(found, min_score=min_score, categories=categories)
+    from ldls.segmenters import open_segmenter
+
     assert segmenter is not None
     opened = open_segmenter(segmenter, min_score=min_score)
     if image is None:
