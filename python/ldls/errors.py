@@ -6,6 +6,7 @@ Messages name the argument or file, what was found, what was expected, and how t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 
@@ -103,6 +104,21 @@ class LimitError(LdlsError):
     """Input that exceeds a stated limit."""
 
     code = "limit"
+
+
+class BatchError(LdlsError):
+    """A run over many frames that cannot begin, go on or end well.
+
+    Attributes:
+        failures: What went wrong with which frame, where it was frames.
+    """
+
+    code = "batch"
+
+    def __init__(self, message: str, failures: Sequence[object] = ()) -> None:
+        """An error with its `message`, and the failures of frames."""
+        super().__init__(message)
+        self.failures = tuple(failures)
 
 
 class InternalError(LdlsError):

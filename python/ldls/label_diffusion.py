@@ -88,8 +88,10 @@ class LabelDiffusion:
         ...     labels = diffusion.segment(points, masks).labels
     """
 
-    def __init__(self, camera: Camera | Sequence[Camera], params: Params | None = None) -> None:
+    def __init__(self, camera: Camera | Sequence[Camera] = (), params: Params | None = None) -> None:
         """Prepare for the images of a camera or of several; the parameters are the paper's by default.
+
+        Without a camera, each frame brings its own: `segment(points, [View(masks, camera), ...])`.
 
         Raises:
             InputError: `camera` or `params` is of another type.
@@ -107,37 +109,41 @@ class LabelDiffusion:
     def segment(
         self,
         points: ArrayLike,
-        masks: InstanceMasks | Sequence[InstanceMasks],
+        masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View],
         *,
         nonfinite: Literal["drop", "raise"] = "drop",
         keep_origin: bool = False,
         same_object: float = SAME_OBJECT,
     ) -> Segmentation:
-        """Segment the next frame: points, and masks for each camera.
+        """Segment the next frame: points, and masks for each camera, or views.
 
         Options, result and errors are those of `ldls.segment`.
         """
+        views = self._views(masks) if self._cameras else _views(masks, None)
+        return _segment(points, views, self.params, nonfinite, keep_origin, same_object, self._memory)
+
+    def _views(self, masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View]) -> tuple[View, ...]:
         each = (masks,) if isinstance(masks, InstanceMasks) else tuple(masks)
         if len(each) != len(self._cameras):
             raise InputError(f"masks: got those of {len(each)} images, expected {len(self._cameras)}, one a camera")
-        views = tuple(View(own, camera) for own, camera in zip(each, self._cameras, strict=True))
-        return _segment(points, views, self.params, nonfinite, keep_origin, same_object, self._memory)
+        # a View refuses what is no InstanceMasks
+        return tuple(View(own, camera) for own, camera in zip(each, self._cameras, strict=True))  # type: ignore[arg-type]
 
     def __repr__(self) -> str:
         return f"LabelDiffusion({self.camera!r}, {self.params!r})"
 
 
-def _views(masks: InstanceMasks | Sequence[View], camera: Camera | None) -> tuple[View, ...]:
+def _views(masks: object, camera: Camera | None) -> tuple[View, ...]:
     if isinstance(masks, Sequence):
         if camera is not None:
             raise InputError("camera: expected None beside views, which have cameras of their own")
         for view in masks:
             if not isinstance(view, View):
                 raise InputError(f"masks: expected InstanceMasks or a list of View, got {type(view).__name__} in it")
-        return tuple(masks)
+        return tuple(view for view in masks if isinstance(view, View))
     check_camera(camera)
-    assert camera is not None
-    return (View(masks, camera),)
+    # a View refuses what is no InstanceMasks
+    return (View(masks, camera),)  # type: ignore[arg-type]
 
 
 def _segment(

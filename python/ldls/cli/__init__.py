@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ldls.cli import annotate, demo, evaluate, info, masks, reproduce, segment, simulate
+from ldls.cli import annotate, demo, evaluate, info, masks, reproduce, run, segment, simulate
 
 app = typer.Typer(
     name="ldls",
@@ -16,6 +16,7 @@ app = typer.Typer(
 )
 app.command(name="segment")(segment.segment)
 app.command(name="info")(info.info)
+app.command(name="run")(run.run)
 app.add_typer(masks.app, name="masks")
 app.command(name="demo")(demo.demo)
 app.command(name="simulate")(simulate.simulate)

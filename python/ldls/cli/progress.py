@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -17,3 +18,34 @@ def progress(items: Iterable[T], total: int, title: str) -> Iterator[T]:
     yield from track(
         items, total=total, description=title, console=screen, transient=True, disable=not screen.is_terminal
     )
+
+
+@contextmanager
+def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
+    """What to call with the frames finished, failed and in all: shows a bar, frames a second, time left, failures."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failed]}"),
+    )
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(title, total=None, rate="", failed="")
+
+        def update(finished: int, failed: int, total: int) -> None:
+            speed = bar.tasks[0].speed
+            bar.update(
+                task,
+                completed=finished,
+                total=total,
+                rate=f"{speed:.1f} frames/s" if speed else "",
+                failed=f"{failed} failed" if failed else "",
+            )
+
+        yield update

@@ -3,29 +3,49 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import IO
 
+UNFINISHED = ".ldls-part"
+"""How the names of files end that are being written."""
+
 
 @contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails."""
     target = Path(path)
-    handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+    # beside the target, for only within one file system is a file renamed at a stroke
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}{UNFINISHED}")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with temporary.open("xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        # mkstemp makes files private; results are as public as the umask lets any new file be
-        umask = os.umask(0)
-        os.umask(umask)
-        Path(temporary).chmod(0o666 & ~umask)
-        Path(temporary).replace(target)
+        temporary.replace(target)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
+
+
+def sync_folder(folder: str | PathLike[str]) -> None:
+    """Wait until the names of files in `folder` are on the disk: those renamed before then survive a power cut."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except PermissionError:  # Windows opens no folders
+        return
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def sweep(folder: str | PathLike[str]) -> int:
+    """Remove what killed processes left unfinished in `folder`; how many files that were."""
+    left = list(Path(folder).glob(f".*{UNFINISHED}"))
+    for path in left:
+        path.unlink(missing_ok=True)
+    return len(left)

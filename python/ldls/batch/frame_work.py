@@ -1,0 +1,219 @@
+"""What is done with one frame: read, masks, segment, write. Every engine does it so."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ldls.batch.mask_files import MaskFiles
+from ldls.batch.outcome import Outcome
+from ldls.batch.settings import RunSettings
+from ldls.datasets import CameraImage, Frame, Source
+from ldls.errors import BatchError
+from ldls.label_diffusion import LabelDiffusion
+from ldls.masks import InstanceMasks
+from ldls.segmentation import Segmentation
+from ldls.segmenters import Segmenter, open_segmenter
+from ldls.view import View
+
+STAGES = ("read", "masks", "segment", "write")
+
+
+class StageError(Exception):
+    """An error of one frame, and the stage at which it happened."""
+
+    def __init__(self, stage: str, error: Exception) -> None:
+        """The `error` of `stage`."""
+        super().__init__(str(error))
+        self.stage = stage
+        self.error = error
+
+
+@dataclass(eq=False)
+class Work:
+    """A frame on its way through the stages.
+
+    Attributes:
+        index: Its number in the source.
+        name: Its name.
+        frame: What was read.
+        masks: Stored masks of each image.
+        result: What came of it.
+        record: Its line for the journal.
+        seconds: Time that each stage took.
+    """
+
+    index: int
+    name: str
+    frame: Frame | None = None
+    masks: tuple[InstanceMasks, ...] | None = None
+    result: Segmentation | None = None
+    record: Mapping[str, Any] | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def outcome(self) -> Outcome:
+        """What became of it, all stages done."""
+        assert self.record is not None
+        return Outcome(self.record, self.seconds)
+
+    def failed(self, error: StageError) -> Outcome:
+        """What became of it, one stage failed."""
+        cause = error.error
+        record = {
+            "stage": error.stage,
+            "code": getattr(cause, "code", type(cause).__name__),
+            "message": str(cause) or type(cause).__name__,
+        }
+        return Outcome({"frame": self.name, "error": record}, self.seconds)
+
+
+class FrameWork:
+    """Does the stages of frames; several threads may do so at a time."""
+
+    def __init__(self, source: Source, settings: RunSettings, out: Path) -> None:
+        """Prepare for the frames of `source`: the segmenter is opened here, and told to keep to one thread.
+
+        Raises:
+            LdlsError: The segmenter, or the place of the masks, cannot be used.
+        """
+        self._source = source
+        self._settings = settings
+        self._out = out
+        self._diffusion = LabelDiffusion(params=replace(settings.params, threads=1))
+        self._files = None if settings.masks is None else MaskFiles(settings.masks)
+        self._segmenter = None if settings.segmenter is None else _segmenters(settings.segmenter, settings.min_score)
+
+    def read(self, work: Work) -> None:
+        """Read points and stored masks."""
+        with _stage(work, "read"):
+            work.frame = self._source[work.index]
+        if self._files is not None:
+            with _stage(work, "masks"):
+                images = work.frame.images
+                read = (self._files.read(work.name, image, len(images) == 1) for image in images)
+                work.masks = tuple(self._wanted(masks) for masks in read)
+
+    def segment(self, work: Work) -> None:
+        """Make masks, unless they are stored, and label the points."""
+        frame = work.frame
+        assert frame is not None
+        if work.masks is None:
+            with _stage(work, "masks"):
+                work.masks = tuple(self._make(work.name, image) for image in frame.images)
+        with _stage(work, "segment"):
+            pairs = zip(work.masks, frame.images, strict=True)
+            views = [View(masks, image.camera, image.name) for masks, image in pairs]
+            work.result = self._diffusion.segment(frame.points, views, same_object=self._settings.same_object)
+        work.frame = work.masks = None
+
+    def write(self, work: Work) -> None:
+        """Write the files of the frame, and what the journal says of it."""
+        result = work.result
+        assert result is not None
+        with _stage(work, "write"):
+            # times differ from run to run; files must not
+            quiet = replace(result, timings={})
+            sizes = {}
+            for ending in self._settings.formats:
+                path = self._out / file_name(work.name, ending)
+                quiet.save(path)
+                sizes[path.name] = path.stat().st_size
+            work.record = {
+                "frame": work.name,
+                "files": sizes,
+                "inputs": self._inputs(work.index),
+                "objects": _objects(result),
+            }
+        work.result = None
+
+    def do(self, work: Work) -> Outcome:
+        """All stages of a frame, one after the other."""
+        try:
+            for stage in (self.read, self.segment, self.write):
+                stage(work)
+        except StageError as error:
+            return work.failed(error)
+        return work.outcome()
+
+    def is_done(self, index: int, record: Mapping[str, Any] | None) -> bool:
+        """Whether a frame was finished by an earlier run and its files are still there.
+
+        Raises:
+            BatchError: Its input was changed since.
+        """
+        if record is None or "error" in record:
+            return False
+        inputs = self._inputs(index)
+        changed = [path for path in inputs if record["inputs"].get(path) != inputs[path]]
+        if changed:
+            raise BatchError(
+                f"{self._out}: {changed[0]}, of which frame {record['frame']} was made, was changed since; choose "
+                "another folder"
+            )
+        return all(_has_size(self._out / file, size) for file, size in record["files"].items())
+
+    def _inputs(self, index: int) -> dict[str, list[int]]:
+        """Size and time of change of the files that a frame is made of, where the source knows them."""
+        name = self._source.names[index]
+        files = [*self._source.files(index)]
+        if self._files is not None:
+            cameras = self._source.camera_names
+            files += [self._files.path(name, camera, len(cameras) == 1) for camera in cameras]
+        return {str(path): [stat.st_size, stat.st_mtime_ns] for path in files for stat in [path.stat()]}
+
+    def _wanted(self, masks: InstanceMasks) -> InstanceMasks:
+        return masks.filter(min_score=self._settings.min_score or 0.0, categories=self._settings.categories)
+
+    def _make(self, frame: str, image: CameraImage) -> InstanceMasks:
+        assert self._segmenter is not None
+        return self._wanted(self._segmenter(frame, image)(image.read()))
+
+
+def file_name(frame: str, ending: str) -> str:
+    """Name of the file of a frame with this ending: 000001.label, 000001_lidarseg.bin."""
+    return f"{frame}{ending}" if ending.startswith("_") else f"{frame}.{ending}"
+
+
+def _segmenters(spec: str, min_score: float | None) -> Callable[[str, CameraImage], Segmenter]:
+    """What gives the segmenter of an image: one for all, or one for each where files name frames."""
+    if "{frame}" in spec or "{camera}" in spec:
+        return lambda frame, image: open_segmenter(
+            spec.replace("{frame}", frame).replace("{camera}", image.name), min_score=min_score
+        )
+    # every worker runs it, each on a core of its own
+    options = {"threads": 1} if spec.startswith("onnx:") else {}
+    opened = open_segmenter(spec, min_score=min_score, **options)
+    return lambda frame, image: opened
+
+
+def _objects(result: Segmentation) -> dict[str, int]:
+    points = np.bincount(result.labels[result.in_view], minlength=len(result.instances) + 1)
+    return dict(Counter(instance.name for instance in result.instances if points[instance.label] > 0))
+
+
+def _has_size(path: Path, size: int) -> bool:
+    return path.is_file() and path.stat().st_size == size
+
+
+@contextmanager
+def _stage(work: Work, stage: str) -> Iterator[None]:
+    start = time.perf_counter()
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error, MemoryError):
+            raise
+        if stage == "write" and isinstance(error, OSError):
+            # a full disk is no fault of the frame
+            hint = f"{error.strerror or error} while writing frame {work.name}; mend it and give the same command again"
+            raise OSError(error.errno, hint, error.filename) from error
+        raise StageError(stage, error) from error
+    finally:
+        work.seconds[stage] = work.seconds.get(stage, 0.0) + time.perf_counter() - start

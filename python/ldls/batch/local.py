@@ -1,0 +1,118 @@
+"""The engine of one machine: reading, segmenting and writing overlap, each in threads of its own.
+
+As many threads segment as there are cores, each a frame on one core, which labels more frames a second than all
+cores on one frame; the core of the package works without Python's lock meanwhile. Reading and writing wait for the
+disk most of the time and take little of a core. Queues are short, so that memory does not grow with the frames.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from queue import Empty, Queue
+
+from ldls.batch.frame_work import FrameWork, StageError, Work
+from ldls.batch.outcome import Outcome
+
+READERS = 2
+WRITERS = 2
+SWITCH_INTERVAL_S = 0.0005
+"""How long a thread keeps Python's lock when others want it: the default, 5 ms, is a third of a frame."""
+POLL_S = 0.1
+"""How often waiting threads look whether the run was stopped."""
+
+
+def run_local(work: FrameWork, frames: Sequence[tuple[int, str]], workers: int) -> Iterator[Outcome]:
+    """What became of each of `frames`, in the order in which they are finished.
+
+    Args:
+        work: What is done with a frame.
+        frames: Number and name of each frame.
+        workers: Frames that are segmented at a time.
+    """
+    pipeline = _Pipeline(workers)
+    with _eager_switching():
+        try:
+            pipeline.start(
+                [(work.read, READERS), (work.segment, workers), (work.write, WRITERS)],
+                (Work(index, name) for index, name in frames),
+            )
+            for _ in frames:
+                yield pipeline.next_outcome()
+        finally:
+            pipeline.stop()
+
+
+class _Pipeline:
+    """Stages that hand works on to one another; a work that fails goes to the end at once."""
+
+    def __init__(self, workers: int) -> None:
+        self._stopped = threading.Event()
+        self._outcomes: Queue[Outcome | BaseException] = Queue()
+        # works between reading and the end: enough that nobody waits, few enough to bound the memory
+        self._room = threading.Semaphore(2 * workers + READERS + WRITERS)
+        self._threads: list[threading.Thread] = []
+
+    def start(self, stages: Sequence[tuple[Callable[[Work], None], int]], works: Iterator[Work]) -> None:
+        queues: list[Queue[Work]] = [Queue() for _ in stages]
+        outlets: list[Callable[[Work], None]] = [queue.put for queue in queues[1:]]
+        outlets.append(lambda work: self._outcomes.put(work.outcome()))
+        self._spawn(self._feed, works, queues[0])
+        for (stage, count), inbox, outlet in zip(stages, queues, outlets, strict=True):
+            for _ in range(count):
+                self._spawn(self._do, stage, inbox, outlet)
+
+    def next_outcome(self) -> Outcome:
+        outcome = self._outcomes.get()
+        if isinstance(outcome, BaseException):
+            raise outcome
+        self._room.release()
+        return outcome
+
+    def stop(self) -> None:
+        self._stopped.set()
+        for thread in self._threads:
+            thread.join()
+
+    def _spawn(self, target: Callable[..., None], *arguments: object) -> None:
+        thread = threading.Thread(target=self._guarded, args=(target, *arguments), daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _guarded(self, target: Callable[..., None], *arguments: object) -> None:
+        try:
+            target(*arguments)
+        except BaseException as error:  # whatever it is, whoever waits for outcomes must hear of it
+            self._outcomes.put(error)
+
+    def _feed(self, works: Iterator[Work], first: Queue[Work]) -> None:
+        for work in works:
+            while not self._room.acquire(timeout=POLL_S):
+                if self._stopped.is_set():
+                    return
+            first.put(work)
+
+    def _do(self, stage: Callable[[Work], None], inbox: Queue[Work], outlet: Callable[[Work], None]) -> None:
+        while not self._stopped.is_set():
+            try:
+                work = inbox.get(timeout=POLL_S)
+            except Empty:
+                continue
+            try:
+                stage(work)
+            except StageError as error:
+                self._outcomes.put(work.failed(error))
+            else:
+                outlet(work)
+
+
+@contextmanager
+def _eager_switching() -> Iterator[None]:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)

@@ -1,0 +1,138 @@
+"""A run over the frames of a source, from the first frame to the summary."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from os import PathLike
+from pathlib import Path
+
+from ldls import _ldls
+from ldls.batch.engines import Engine, open_engine
+from ldls.batch.frame_work import FrameWork
+from ldls.batch.journal import Journal, Record
+from ldls.batch.lock import only_run
+from ldls.batch.outcome import Outcome
+from ldls.batch.plan import check_names
+from ldls.batch.settings import RunSettings, source_record
+from ldls.batch.summary import Summary, count_objects, failures_of, write_failures
+from ldls.datasets import Source, open_source
+from ldls.errors import ParameterError
+from ldls.io.whole_file import sweep
+
+GROUP_S = 0.5
+"""Frames finished within this time share a wait for the disk."""
+MAX_WORKERS = 1024
+
+Progress = Callable[[int, int, int], None]
+"""Called with the frames done, those of them that failed, and all frames."""
+
+
+def run(
+    source: Source | str | PathLike[str],
+    out: str | PathLike[str],
+    settings: RunSettings,
+    *,
+    frames: slice = slice(None),
+    workers: int | None = None,
+    engine: str | Engine = "local",
+    on_progress: Progress | None = None,
+) -> Summary:
+    """Label the frames of a source, and write the files of each to the folder `out`.
+
+    Files appear under their name only when they are whole. A journal in `out` knows what is done: a run that was
+    interrupted, however it was, goes on where it stopped when it is called again in the same way. A frame that fails
+    is recorded and passed over, and tried again by the next call.
+
+    Args:
+        source: A source of `ldls.datasets`, or a path that one is guessed from.
+        out: Folder for the results; made if need be.
+        settings: How frames are treated.
+        frames: Which frames of the source.
+        workers: Frames segmented at a time; as many as the process may use cores by default.
+        engine: Where they are segmented: a key of `ldls.batch.engines.ENGINES`, or an engine.
+        on_progress: Called after each frame.
+
+    Returns:
+        What came of it; frames that failed are in its `failures`.
+
+    Raises:
+        BatchError: Another run is at work in `out`, or `out` holds a run of other settings, source or version.
+        UnsafePathError: A frame's name is no file name.
+        OSError: The results cannot be written, as on a full disk; what is written stays, and the run can go on.
+    """
+    opened = open_source(source, truth=False) if isinstance(source, str | PathLike) else source
+    runner = open_engine(engine, _checked_workers(workers))
+    chosen = list(zip(range(len(opened))[frames], opened.names[frames], strict=True))
+    names = [name for _, name in chosen]
+    check_names(names)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    with only_run(folder):
+        sweep(folder)
+        work = FrameWork(opened, settings, folder)
+        header = {
+            "settings": settings.record(),
+            "source": source_record(opened.kind, str(Path(opened.path).resolve()), names),
+        }
+        journal = Journal(folder, header)
+        try:
+            # what an earlier run did must still be there, and of the same input
+            pending = [frame for frame in chosen if not work.is_done(frame[0], journal.records.get(frame[1]))]
+            n_earlier = len(chosen) - len(pending)
+            start = time.perf_counter()
+            seconds: Counter[str] = Counter()
+            n_finished, n_failed = n_earlier, 0
+            for outcome in _recorded(runner(work, pending), journal):
+                seconds.update(outcome.seconds)
+                n_finished += 1
+                n_failed += "error" in outcome.record
+                if on_progress is not None:
+                    on_progress(n_finished, n_failed, len(names))
+        finally:
+            journal.close()
+        elapsed = time.perf_counter() - start
+        journal.finish(names)
+        records = [journal.records[name] for name in names]
+        failures = failures_of(records)
+        write_failures(folder, failures)
+    return Summary(
+        n_frames=len(names),
+        n_done=len(names) - len(failures),
+        n_earlier=n_earlier,
+        failures=failures,
+        objects=count_objects(records),
+        seconds=dict(seconds),
+        elapsed=elapsed,
+    )
+
+
+def _checked_workers(workers: int | None) -> int:
+    if workers is None:
+        return _ldls.default_threads()
+    if not 1 <= workers <= MAX_WORKERS:
+        raise ParameterError(f"workers: got {workers}, expected 1 to {MAX_WORKERS}")
+    return workers
+
+
+def _recorded(outcomes: Iterator[Outcome], journal: Journal) -> Iterator[Outcome]:
+    """The outcomes, their records in the journal within `GROUP_S` or by the end, however it comes."""
+    waiting: list[Record] = []
+    since = time.monotonic()
+    try:
+        for outcome in outcomes:
+            waiting.append(outcome.record)
+            if time.monotonic() - since > GROUP_S:
+                _flush(journal, waiting)
+                since = time.monotonic()
+            yield outcome
+    finally:
+        _flush(journal, waiting)
+
+
+def _flush(journal: Journal, waiting: list[Record]) -> None:
+    records: Sequence[Record] = tuple(waiting)
+    waiting.clear()
+    if records:
+        journal.add(records)

@@ -1,0 +1,63 @@
+"""What a run is made of: whatever changes its outputs, so that a run goes on only as what it began."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from ldls import _ldls
+from ldls.errors import ParameterError
+from ldls.params import Params
+
+DEFAULT_FORMATS = ("label",)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSettings:
+    """How every frame of a run is treated.
+
+    Attributes:
+        masks: Where stored masks lie: a folder, or a path with {frame} and, for several cameras, {camera}.
+        segmenter: What makes masks instead, as "onnx:model.onnx".
+        min_score: Lowest score of a mask that counts; the segmenter's own, or 0 of stored masks, without one.
+        categories: Categories that count, by name or id; all without them.
+        params: Parameters of the method; their number of threads does not matter to the result.
+        formats: Endings of the files written for each frame.
+        same_object: See `ldls.segment`.
+
+    Raises:
+        ParameterError: Neither or both of `masks` and `segmenter` are given, or there is no format.
+    """
+
+    masks: str | None = None
+    segmenter: str | None = None
+    min_score: float | None = None
+    categories: tuple[int | str, ...] | None = None
+    params: Params = field(default_factory=Params)
+    formats: tuple[str, ...] = DEFAULT_FORMATS
+    same_object: float = 0.5
+
+    def __post_init__(self) -> None:
+        if (self.masks is None) == (self.segmenter is None):
+            given = "neither" if self.masks is None else "both"
+            raise ParameterError(f"masks, segmenter: give one of them, got {given}")
+        if not self.formats:
+            raise ParameterError("formats: expected at least one, as label")
+
+    def record(self) -> dict[str, Any]:
+        """What a journal remembers of these settings."""
+        settings = asdict(self)
+        # the same bits for any number of threads
+        del settings["params"]["threads"]
+        settings["version"] = _ldls.__version__
+        recorded: dict[str, Any] = json.loads(json.dumps(settings))
+        return recorded
+
+
+def source_record(kind: str, path: str, names: Sequence[str]) -> dict[str, Any]:
+    """What a journal remembers of a source: where it lies and which frames it has."""
+    digest = hashlib.sha256("\n".join(names).encode()).hexdigest()
+    return {"kind": kind, "path": path, "frames": len(names), "names_sha256": digest}

@@ -1,0 +1,83 @@
+"""What came of a run."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ldls.io.whole_file import whole_file
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A frame that yielded nothing.
+
+    Attributes:
+        frame: Its name.
+        stage: Where it failed: "read", "masks", "segment" or "write".
+        code: Stable code of the error, as "corrupt_file".
+        message: What was wrong.
+    """
+
+    frame: str
+    stage: str
+    code: str
+    message: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What came of a run, earlier parts of it included.
+
+    Attributes:
+        n_frames: Frames wanted.
+        n_done: Frames whose files are written.
+        n_earlier: Of these, those of earlier runs that were interrupted.
+        failures: Frames that failed, in their order.
+        objects: Objects with points, by category name.
+        seconds: Time of each stage, added up over the frames of this run.
+        elapsed: Time of this run in seconds.
+    """
+
+    n_frames: int
+    n_done: int
+    n_earlier: int
+    failures: tuple[Failure, ...]
+    objects: Mapping[str, int]
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    elapsed: float = 0.0
+
+    @property
+    def frames_per_second(self) -> float:
+        """Frames of this run a second."""
+        return (self.n_done - self.n_earlier) / self.elapsed if self.elapsed > 0 else 0.0
+
+
+FAILURES_NAME = "failures.jsonl"
+
+
+def failures_of(records: Iterable[Mapping[str, Any]]) -> tuple[Failure, ...]:
+    """The frames that failed."""
+    return tuple(Failure(record["frame"], **record["error"]) for record in records if "error" in record)
+
+
+def write_failures(folder: Path, failures: Sequence[Failure]) -> None:
+    """Write a line of JSON for each failure to `folder`; no file where there is none."""
+    path = folder / FAILURES_NAME
+    if not failures:
+        path.unlink(missing_ok=True)
+        return
+    with whole_file(path) as file:
+        file.writelines(json.dumps(asdict(failure)).encode() + b"\n" for failure in failures)
+
+
+def count_objects(records: Iterable[Mapping[str, Any]]) -> dict[str, int]:
+    """Objects with points of all frames, by category name, the most frequent first."""
+    total: Counter[str] = Counter()
+    for record in records:
+        total.update(record.get("objects", {}))
+    return dict(total.most_common())

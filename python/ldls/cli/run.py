@@ -1,0 +1,132 @@
+"""`ldls run`: all frames of a source."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, names_or_ids
+from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import words
+from ldls.cli.progress import frame_progress
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ldls.batch import Summary
+
+FRAMES_FAILED = 2
+"""Exit status where frames failed and the rest is done."""
+MOST_LISTED = 10
+
+
+@speaks_plainly
+def run(
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="SOURCE", help="Data set, drive, bag or folder; `ldls info SOURCE` says what it holds."),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
+    masks: Annotated[
+        str | None,
+        typer.Option(
+            help="Stored masks: a folder with a file a frame, or a path such as masks/{frame}.json; for several "
+            "cameras masks/{camera}/{frame}.json.",
+            show_default=False,
+        ),
+    ] = None,
+    segmenter: SegmenterOption = None,
+    min_score: MinScoreOption = None,
+    categories: CategoriesOption = None,
+    formats: Annotated[
+        str, typer.Option(help="Files to write for each frame, by their endings: label,ply,npz.")
+    ] = "label",
+    frames: Annotated[
+        str | None,
+        typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
+    ] = None,
+    dataset: Annotated[
+        str | None, typer.Option(help="Kind of the source, where the path leaves it open.", show_default="guessed")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Frames at a time, one a core.", min=1, show_default="all cores")
+    ] = None,
+) -> None:
+    """Label all frames of a source; a run that was interrupted goes on where it stopped.
+
+    Files appear in --out only when they are whole, and a journal there knows which frames are done: give the same
+    command again to go on. A frame that fails is listed in failures.jsonl and passed over; the exit status is then 2.
+
+    Examples:
+    ldls run kitti/training --masks kitti/training/masks --out labels
+
+    ldls run 2011_09_26/2011_09_26_drive_0064_sync --segmenter onnx:yolo11n-seg.onnx --out labels --formats label,ply
+    """
+    from ldls import batch
+    from ldls.batch.plan import parse_frames
+    from ldls.datasets import open_source
+
+    settings = batch.RunSettings(
+        masks=masks,
+        segmenter=segmenter,
+        min_score=min_score,
+        categories=None if categories is None else tuple(names_or_ids(words(categories))),
+        formats=words(formats),
+    )
+    opened = open_source(source, kind=dataset, truth=False)
+    with frame_progress("labelling") as on_progress:
+        summary = batch.run(
+            opened, out, settings, frames=parse_frames(frames), workers=workers, on_progress=on_progress
+        )
+    show(summary, out)
+    if summary.failures:
+        raise typer.Exit(FRAMES_FAILED)
+
+
+def show(summary: Summary, out: Path) -> None:
+    """Print what came of a run."""
+    screen = console()
+    if summary.objects:
+        screen.print(object_counts(summary))
+    if summary.seconds:
+        screen.print(stage_times(summary))
+    for failure in summary.failures[:MOST_LISTED]:
+        screen.print(f"{failure.frame} failed ({failure.stage}): {failure.message}", highlight=False, soft_wrap=True)
+    more = len(summary.failures) - MOST_LISTED
+    if more > 0:
+        screen.print(f"and {more} more; {out / 'failures.jsonl'} has all", highlight=False, soft_wrap=True)
+    counts = [f"{summary.n_done:,} of {summary.n_frames:,} frames done"]
+    if summary.n_earlier:
+        counts.append(f"{summary.n_earlier:,} of them by earlier runs")
+    if summary.failures:
+        counts.append(f"{len(summary.failures):,} failed")
+    if summary.seconds:
+        counts.append(f"{summary.frames_per_second:.1f} frames a second")
+    screen.print(f"{', '.join(counts)}; results in {out}", highlight=False, soft_wrap=True)
+
+
+def object_counts(summary: Summary) -> Table:
+    """Objects with points of each category."""
+    from rich.table import Table
+
+    table = Table(title="objects found")
+    table.add_column("category")
+    table.add_column("objects", justify="right")
+    for name, count in summary.objects.items():
+        table.add_row(name, f"{count:,}")
+    return table
+
+
+def stage_times(summary: Summary) -> Table:
+    """Milliseconds a frame that each stage took in a worker."""
+    from rich.table import Table
+
+    n_frames = max(summary.n_frames - summary.n_earlier, 1)
+    table = Table(title="time a frame")
+    table.add_column("stage")
+    table.add_column("ms", justify="right")
+    for stage, seconds in summary.seconds.items():
+        table.add_row(stage, f"{seconds / n_frames * 1e3:.1f}")
+    return table
