@@ -161,3 +161,38 @@ def plain_folder(folder, description=FOLDER_TOML, frames=("a", "b")):
         write_points(folder / f"lidar/{name}.bin")
         write_image(folder / f"front/{name}.png")
     return folder
+
+
+def many_frames(folder, n_frames=300, cameras=(2,)):
+    """KITTI's object layout with a cloud of its own for each frame, masks for each camera, and boxes."""
+    generator = np.random.default_rng(5)
+    rows = {f"P{camera}": P for camera in cameras} | {"R0_rect": np.eye(3), "Tr_velo_to_cam": T[:3]}
+    calib = "".join(f"{key}: {row(m)}\n" for key, m in rows.items())
+    for number in range(n_frames):
+        name = f"{number:06d}"
+        points = np.ones((200, 4), "<f4")
+        points[:, :3] = generator.uniform([8, -4, -2], [14, 4, 2], (200, 3))
+        write_points(folder / f"velodyne/{name}.bin", points)
+        write_text(folder / f"calib/{name}.txt", calib)
+        left = int(generator.integers(10, 40))
+        box = f"{left}.00 20.00 {left + 20}.00 40.00"
+        write_text(folder / f"label_2/{name}.txt", f"Car 0.00 0 -1.5 {box} 1.5 1.6 3.9 1.0 1.7 20.0 -1.6\n")
+        for camera in cameras:
+            write_image(folder / f"image_{camera}/{name}.png")
+            place = f"image_{camera}/{name}" if len(cameras) > 1 else name
+            write_text(folder / f"masks/{place}.json", json.dumps(_coco(left + camera)))
+    return folder
+
+
+def _coco(left):
+    """Two objects as polygons."""
+    segments = [[x, 20, x + 20, 20, x + 20, 40, x, 40] for x in (left, left + 22)]
+    annotations = [
+        {"id": k, "image_id": 1, "category_id": category, "segmentation": [segment], "score": 0.9, "iscrowd": 0}
+        for k, (category, segment) in enumerate(zip((1, 3), segments, strict=True), start=1)
+    ]
+    return {
+        "images": [{"id": 1, "height": SIZE[0], "width": SIZE[1], "file_name": "image.png"}],
+        "categories": [{"id": 1, "name": "person"}, {"id": 3, "name": "car"}],
+        "annotations": annotations,
+    }

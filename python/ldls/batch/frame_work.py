@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +14,8 @@ import numpy as np
 
 from ldls.batch.mask_files import MaskFiles
 from ldls.batch.outcome import Outcome
-from ldls.batch.settings import RunSettings
+from ldls.batch.plan import file_name
+from ldls.batch.settings import RunSettings, fill
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.errors import BatchError
 from ldls.label_diffusion import LabelDiffusion
@@ -45,6 +46,7 @@ class Work:
         name: Its name.
         frame: What was read.
         masks: Stored masks of each image.
+        inputs: Size and time of change of the files that it is made of, by path.
         result: What came of it.
         record: Its line for the journal.
         seconds: Time that each stage took.
@@ -54,6 +56,7 @@ class Work:
     name: str
     frame: Frame | None = None
     masks: tuple[InstanceMasks, ...] | None = None
+    inputs: dict[str, list[int] | None] = field(default_factory=dict)
     result: Segmentation | None = None
     record: Mapping[str, Any] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -85,20 +88,23 @@ class FrameWork:
         """
         self._source = source
         self._settings = settings
-        self._out = out
+        self.out = out
         self._diffusion = LabelDiffusion(params=replace(settings.params, threads=1))
         self._files = None if settings.masks is None else MaskFiles(settings.masks)
         self._segmenter = None if settings.segmenter is None else _segmenters(settings.segmenter, settings.min_score)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """In another process all is opened anew."""
+        return FrameWork, (self._source, self._settings, self.out)
+
     def read(self, work: Work) -> None:
-        """Read points and stored masks."""
+        """Read points and stored masks; what they are read from is looked at before, lest a change be missed."""
         with _stage(work, "read"):
+            work.inputs.update(_states(self._source.files(work.index)))
             work.frame = self._source[work.index]
         if self._files is not None:
             with _stage(work, "masks"):
-                images = work.frame.images
-                read = (self._files.read(work.name, image, len(images) == 1) for image in images)
-                work.masks = tuple(self._wanted(masks) for masks in read)
+                work.masks = tuple(self._stored(work, image) for image in work.frame.images)
 
     def segment(self, work: Work) -> None:
         """Make masks, unless they are stored, and label the points."""
@@ -106,7 +112,7 @@ class FrameWork:
         assert frame is not None
         if work.masks is None:
             with _stage(work, "masks"):
-                work.masks = tuple(self._make(work.name, image) for image in frame.images)
+                work.masks = tuple(self._make(work, image) for image in frame.images)
         with _stage(work, "segment"):
             pairs = zip(work.masks, frame.images, strict=True)
             views = [View(masks, image.camera, image.name) for masks, image in pairs]
@@ -122,13 +128,13 @@ class FrameWork:
             quiet = replace(result, timings={})
             sizes = {}
             for ending in self._settings.formats:
-                path = self._out / file_name(work.name, ending)
+                path = self.out / file_name(work.name, ending)
                 quiet.save(path)
                 sizes[path.name] = path.stat().st_size
             work.record = {
                 "frame": work.name,
                 "files": sizes,
-                "inputs": self._inputs(work.index),
+                "inputs": work.inputs,
                 "objects": _objects(result),
             }
         work.result = None
@@ -142,51 +148,44 @@ class FrameWork:
             return work.failed(error)
         return work.outcome()
 
-    def is_done(self, index: int, record: Mapping[str, Any] | None) -> bool:
-        """Whether a frame was finished by an earlier run and its files are still there.
+    def is_done(self, record: Mapping[str, Any] | None) -> bool:
+        """Whether a frame was finished by an earlier run, as `record` says, and its files are still there.
 
         Raises:
             BatchError: Its input was changed since.
         """
         if record is None or "error" in record:
             return False
-        inputs = self._inputs(index)
-        changed = [path for path in inputs if record["inputs"].get(path) != inputs[path]]
-        if changed:
-            raise BatchError(
-                f"{self._out}: {changed[0]}, of which frame {record['frame']} was made, was changed since; choose "
-                "another folder"
-            )
-        return all(_has_size(self._out / file, size) for file, size in record["files"].items())
+        for path, state in record["inputs"].items():
+            if _state(Path(path)) != state:
+                raise BatchError(
+                    f"{self.out}: {path}, of which frame {record['frame']} was made, was changed since; choose another "
+                    "folder"
+                )
+        return all(_has_size(self.out / file, size) for file, size in record["files"].items())
 
-    def _inputs(self, index: int) -> dict[str, list[int]]:
-        """Size and time of change of the files that a frame is made of, where the source knows them."""
-        name = self._source.names[index]
-        files = [*self._source.files(index)]
-        if self._files is not None:
-            cameras = self._source.camera_names
-            files += [self._files.path(name, camera, len(cameras) == 1) for camera in cameras]
-        return {str(path): [stat.st_size, stat.st_mtime_ns] for path in files for stat in [path.stat()]}
+    def _stored(self, work: Work, image: CameraImage) -> InstanceMasks:
+        assert self._files is not None
+        assert work.frame is not None
+        path = self._files.path(work.name, image.name, len(work.frame.images) == 1)
+        work.inputs.update(_states([path]))
+        return self._wanted(InstanceMasks.from_file(path, image_size=image.camera.image_size))
 
     def _wanted(self, masks: InstanceMasks) -> InstanceMasks:
         return masks.filter(min_score=self._settings.min_score or 0.0, categories=self._settings.categories)
 
-    def _make(self, frame: str, image: CameraImage) -> InstanceMasks:
+    def _make(self, work: Work, image: CameraImage) -> InstanceMasks:
         assert self._segmenter is not None
-        return self._wanted(self._segmenter(frame, image)(image.read()))
-
-
-def file_name(frame: str, ending: str) -> str:
-    """Name of the file of a frame with this ending: 000001.label, 000001_lidarseg.bin."""
-    return f"{frame}{ending}" if ending.startswith("_") else f"{frame}.{ending}"
+        path = self._settings.segmenter_file(work.name, image.name)
+        if path is not None:
+            work.inputs.update(_states([path]))
+        return self._wanted(self._segmenter(work.name, image)(image.read()))
 
 
 def _segmenters(spec: str, min_score: float | None) -> Callable[[str, CameraImage], Segmenter]:
     """What gives the segmenter of an image: one for all, or one for each where files name frames."""
     if "{frame}" in spec or "{camera}" in spec:
-        return lambda frame, image: open_segmenter(
-            spec.replace("{frame}", frame).replace("{camera}", image.name), min_score=min_score
-        )
+        return lambda frame, image: open_segmenter(fill(spec, frame, image.name), min_score=min_score)
     # every worker runs it, each on a core of its own
     options = {"threads": 1} if spec.startswith("onnx:") else {}
     opened = open_segmenter(spec, min_score=min_score, **options)
@@ -196,6 +195,19 @@ def _segmenters(spec: str, min_score: float | None) -> Callable[[str, CameraImag
 def _objects(result: Segmentation) -> dict[str, int]:
     points = np.bincount(result.labels[result.in_view], minlength=len(result.instances) + 1)
     return dict(Counter(instance.name for instance in result.instances if points[instance.label] > 0))
+
+
+def _states(paths: Iterable[Path]) -> dict[str, list[int] | None]:
+    return {str(path.absolute()): _state(path) for path in paths}
+
+
+def _state(path: Path) -> list[int] | None:
+    """Size and time of change of a file; None where there is none."""
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return None
+    return [found.st_size, found.st_mtime_ns]
 
 
 def _has_size(path: Path, size: int) -> bool:

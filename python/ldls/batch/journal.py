@@ -10,23 +10,20 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any
 
 from ldls.errors import BatchError, CorruptFileError
-from ldls.io.whole_file import sync_folder, whole_file
+from ldls.io.whole_file import names_file, sync_folder, whole_file
 
 JOURNAL_NAME = "journal.jsonl"
 Record = Mapping[str, Any]
 
 
 class Journal:
-    """The journal of a folder.
-
-    Attributes:
-        records: What is known of each frame, by its name.
-    """
+    """The journal of a folder. Only where each line stands is kept in memory, for runs may have very many frames."""
 
     def __init__(self, folder: Path, header: Record) -> None:
         """Begin a journal, or go on with the one there is.
@@ -38,59 +35,107 @@ class Journal:
         self._folder = folder
         self._path = folder / JOURNAL_NAME
         self._header = header
-        self.records: dict[str, Record] = {}
-        whole = 0
-        if self._path.exists():
-            whole = self._read()
-        self._file: IO[bytes] = self._path.open("ab")
-        # a line that was cut off makes room for whole ones
-        self._file.truncate(whole)
-        if whole == 0:
-            self._append([header])
-            sync_folder(folder)
+        self._places: dict[str, int] = {}
+        self._file = self._path.open("ab+", buffering=0)
+        try:
+            self._end = self._read()
+            # a line that was cut off makes room for whole ones
+            self._file.truncate(self._end)
+            if self._end == 0:
+                self._append([header])
+                sync_folder(folder)
+        except BaseException:
+            self._file.close()
+            raise
+
+    def get(self, frame: str) -> Record | None:
+        """What became of a frame; None if nothing did."""
+        place = self._places.get(frame)
+        if place is None:
+            return None
+        with self._path.open("rb") as file:
+            return _record_at(file, place)
+
+    def records(self, frames: Sequence[str]) -> Iterator[Record]:
+        """What became of `frames`, one after the other; those of which nothing is known are passed over."""
+        with self._path.open("rb") as file:
+            for frame in frames:
+                if frame in self._places:
+                    yield _record_at(file, self._places[frame])
 
     def add(self, records: Sequence[Record]) -> None:
         """Append what became of frames; their files and these lines are on the disk afterwards."""
-        sync_folder(self._folder)
-        self._append(records)
-        self.records.update((record["frame"], record) for record in records)
+        try:
+            sync_folder(self._folder)
+            places = self._append(records)
+        except OSError as error:
+            # a full disk takes half a line
+            self._file.truncate(self._end)
+            frames = " to ".join(dict.fromkeys([records[0]["frame"], records[-1]["frame"]]))
+            hint = f"{error.strerror or error} while recording frame {frames}; mend it and give the same command again"
+            raise OSError(error.errno, hint, str(self._path)) from error
+        self._places.update(zip((record["frame"] for record in records), places, strict=True))
 
     def close(self) -> None:
         """Let go of the file."""
         self._file.close()
 
-    def finish(self, names: Sequence[str]) -> None:
-        """Put the lines in the order of the frames `names`; nothing is appended any more."""
+    def finish(self, frames: Sequence[str]) -> None:
+        """Put the lines in the order of `frames`; nothing is appended any more."""
         self.close()
-        ordered = [self._header, *(self.records[name] for name in names if name in self.records)]
+        places: dict[str, int] = {}
         with whole_file(self._path) as file:
-            file.writelines(_line(record) for record in ordered)
+            file.write(_line(self._header))
+            for record in self.records(frames):
+                places[record["frame"]] = file.tell()
+                file.write(_line(record))
+        self._places = places
         sync_folder(self._folder)
 
-    def _append(self, records: Iterable[Record]) -> None:
-        self._file.write(b"".join(_line(record) for record in records))
-        self._file.flush()
-        os.fsync(self._file.fileno())
+    def _append(self, records: Iterable[Record]) -> list[int]:
+        """Where the line of each record stands."""
+        lines = [_line(record) for record in records]
+        places = list(accumulate((len(line) for line in lines), initial=self._end))
+        rest = memoryview(b"".join(lines))
+        with names_file(self._path):
+            while rest:
+                rest = rest[self._file.write(rest) :]
+            os.fsync(self._file.fileno())
+        self._end = places.pop()
+        return places
 
     def _read(self) -> int:
-        """Read what there is; the number of bytes up to the end of the last whole line."""
-        content = self._path.read_bytes()
-        whole = content.rfind(b"\n") + 1
-        lines = content[:whole].splitlines()
-        if not lines:
-            return 0
-        try:
-            header, *records = [json.loads(line) for line in lines]
-            self.records = {record["frame"]: record for record in records}
-        except (ValueError, KeyError, TypeError) as error:
-            raise CorruptFileError(f"{self._path}: not a journal of ldls ({error}); choose another folder") from None
+        """Find the lines there are; the number of bytes up to the end of the last whole one."""
+        whole = 0
+        with self._path.open("rb") as file:
+            for line in file:
+                if not line.endswith(b"\n"):
+                    break
+                try:
+                    record = json.loads(line)
+                    if whole > 0:
+                        self._places[record["frame"]] = whole
+                except (ValueError, KeyError, TypeError) as error:
+                    message = f"{self._path}: not a journal of ldls ({error}); choose another folder"
+                    raise CorruptFileError(message) from None
+                if whole == 0:
+                    self._check(record)
+                whole += len(line)
+        return whole
+
+    def _check(self, header: Record) -> None:
         differences = list(_differences(header, self._header))
         if differences:
             raise BatchError(
                 f"{self._folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go "
                 "on with it, or choose another folder"
             )
-        return whole
+
+
+def _record_at(file: IO[bytes], place: int) -> Record:
+    file.seek(place)
+    record: Record = json.loads(file.readline())
+    return record
 
 
 def _line(record: Record) -> bytes:

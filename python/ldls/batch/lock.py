@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from ldls.errors import BatchError
+from ldls.io.whole_file import names_file
 
 LOCK_NAME = ".ldls-lock"
 
@@ -27,9 +28,10 @@ def only_run(folder: Path) -> Iterator[None]:
     file = _locked(path)
     try:
         holder = {"pid": os.getpid(), "host": socket.gethostname()}
-        file.truncate(0)
-        file.write(json.dumps(holder))
-        file.flush()
+        with names_file(path):
+            # past Python's buffers: on a full disk nothing is left over for close to trip on
+            os.ftruncate(file.fileno(), 0)
+            os.write(file.fileno(), json.dumps(holder).encode())
         yield
     finally:
         path.unlink(missing_ok=True)

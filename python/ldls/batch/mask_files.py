@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ldls.datasets import CameraImage
+from ldls.batch.settings import fill
 from ldls.errors import InputError
-from ldls.masks import InstanceMasks
 
 SUFFIXES = (".json", ".npz", ".png", ".npy", ".txt")
 """What is looked for in a folder of masks, in this order."""
@@ -40,7 +39,7 @@ class MaskFiles:
             InputError: The folder has none.
         """
         if "{frame}" in self.place:
-            return Path(self.place.replace("{frame}", frame).replace("{camera}", camera))
+            return Path(fill(self.place, frame, camera))
         folders = [Path(self.place) / camera, *([Path(self.place)] if only_camera else [])]
         for folder in folders:
             for suffix in SUFFIXES:
@@ -48,7 +47,3 @@ class MaskFiles:
                     return folder / f"{frame}{suffix}"
         looked = " or ".join(str(folder) for folder in folders)
         raise InputError(f"masks: no file {frame} with one of {' '.join(SUFFIXES)} in {looked}")
-
-    def read(self, frame: str, image: CameraImage, only_camera: bool) -> InstanceMasks:
-        """The masks of an image of a frame."""
-        return InstanceMasks.from_file(self.path(frame, image.name, only_camera), image_size=image.camera.image_size)

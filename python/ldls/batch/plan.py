@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Sequence
 from pathlib import PureWindowsPath
 
 from ldls.errors import ParameterError, UnsafePathError
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+
+LONGEST_NAME_BYTES = 200
+"""Most file systems allow 255 bytes; ending and what marks unfinished files need some."""
 
 
 def parse_frames(text: str | None) -> slice:
@@ -26,8 +30,12 @@ def parse_frames(text: str | None) -> slice:
     return slice(*(int(part) if part else None for part in text.split(":")))
 
 
-def check_names(names: Sequence[str]) -> None:
+def check_names(names: Sequence[str], formats: Sequence[str]) -> None:
     """Refuse frames that would be written outside the folder or over one another.
+
+    Args:
+        names: Names of the frames.
+        formats: Endings of the files of each.
 
     Raises:
         UnsafePathError: A name is no plain file name, or two are the same on some file systems.
@@ -38,15 +46,25 @@ def check_names(names: Sequence[str]) -> None:
             raise UnsafePathError(
                 f"frame {name!r}: expected a plain file name without separators, '..', drive or control characters"
             )
-        other = seen.setdefault(name.casefold(), name)
-        if other is not name:
-            raise UnsafePathError(f"frames {other!r} and {name!r}: would be written to one file; rename one of them")
+        for ending in formats:
+            # some file systems take upper and lower case, or an accent and its letter written in two ways, for one
+            file = unicodedata.normalize("NFC", file_name(name, ending).casefold())
+            if file in seen:
+                raise UnsafePathError(
+                    f"frames {seen[file]!r} and {name!r}: would be written to one file; rename one of them"
+                )
+            seen[file] = name
+
+
+def file_name(frame: str, ending: str) -> str:
+    """Name of the file of a frame with this ending: 000001.label, 000001_lidarseg.bin."""
+    return f"{frame}{ending}" if ending.startswith("_") else f"{frame}.{ending}"
 
 
 def _is_plain(name: str) -> bool:
     return (
-        0 < len(name) <= 200
-        and name.isprintable()
+        name.isprintable()
+        and 0 < len(name.encode()) <= LONGEST_NAME_BYTES
         and not name.startswith(".")
         and not set(name) & set('/\\:*?"<>|')
         and PureWindowsPath(name).name == name

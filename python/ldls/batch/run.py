@@ -66,7 +66,7 @@ def run(
     runner = open_engine(engine, _checked_workers(workers))
     chosen = list(zip(range(len(opened))[frames], opened.names[frames], strict=True))
     names = [name for _, name in chosen]
-    check_names(names)
+    check_names(names, settings.formats)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     with only_run(folder):
@@ -79,7 +79,7 @@ def run(
         journal = Journal(folder, header)
         try:
             # what an earlier run did must still be there, and of the same input
-            pending = [frame for frame in chosen if not work.is_done(frame[0], journal.records.get(frame[1]))]
+            pending = [frame for frame in chosen if not work.is_done(journal.get(frame[1]))]
             n_earlier = len(chosen) - len(pending)
             start = time.perf_counter()
             seconds: Counter[str] = Counter()
@@ -94,15 +94,16 @@ def run(
             journal.close()
         elapsed = time.perf_counter() - start
         journal.finish(names)
-        records = [journal.records[name] for name in names]
-        failures = failures_of(records)
+        failures = failures_of(journal.records(names))
         write_failures(folder, failures)
+        # workers of a killed run may have outlived it for a moment
+        sweep(folder)
     return Summary(
         n_frames=len(names),
         n_done=len(names) - len(failures),
         n_earlier=n_earlier,
         failures=failures,
-        objects=count_objects(records),
+        objects=count_objects(journal.records(names)),
         seconds=dict(seconds),
         elapsed=elapsed,
     )

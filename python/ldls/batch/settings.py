@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ldls import _ldls
@@ -47,14 +48,26 @@ class RunSettings:
         if not self.formats:
             raise ParameterError("formats: expected at least one, as label")
 
+    def segmenter_file(self, frame: str, camera: str) -> Path | None:
+        """The file that the segmenter of an image is made of, as a model or boxes; None where there is none."""
+        path = Path(fill(self.segmenter or "", frame, camera).partition(":")[2])
+        return path if path.is_file() else None
+
     def record(self) -> dict[str, Any]:
         """What a journal remembers of these settings."""
         settings = asdict(self)
         # the same bits for any number of threads
         del settings["params"]["threads"]
+        if self.masks is not None:
+            settings["masks"] = str(Path(self.masks).absolute())
         settings["version"] = _ldls.__version__
         recorded: dict[str, Any] = json.loads(json.dumps(settings))
         return recorded
+
+
+def fill(pattern: str, frame: str, camera: str) -> str:
+    """The pattern with the names of a frame and a camera in the places of {frame} and {camera}."""
+    return pattern.replace("{frame}", frame).replace("{camera}", camera)
 
 
 def source_record(kind: str, path: str, names: Sequence[str]) -> dict[str, Any]:

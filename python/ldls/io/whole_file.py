@@ -15,13 +15,24 @@ UNFINISHED = ".ldls-part"
 
 
 @contextmanager
+def names_file(path: str | PathLike[str]) -> Iterator[None]:
+    """Gives errors of the system the name of the file, which those of writing and syncing lack."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None:
+            error.filename = str(path)
+        raise
+
+
+@contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails."""
     target = Path(path)
     # beside the target, for only within one file system is a file renamed at a stroke
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}{UNFINISHED}")
     try:
-        with temporary.open("xb") as file:
+        with names_file(target), temporary.open("xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -38,7 +49,8 @@ def sync_folder(folder: str | PathLike[str]) -> None:
     except PermissionError:  # Windows opens no folders
         return
     try:
-        os.fsync(handle)
+        with names_file(folder):
+            os.fsync(handle)
     finally:
         os.close(handle)
 

@@ -1,0 +1,63 @@
+"""Runs of `ldls run` in processes of their own, to be killed."""
+
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+from ldls.batch.lock import LOCK_NAME
+
+KILLED_AT = Path(__file__).with_name("killed_at.py")
+PATIENCE_S = 60
+
+
+def arguments(source, out, *more):
+    return ["run", str(source), "--masks", str(source / "masks"), "--out", str(out), *map(str, more)]
+
+
+@contextmanager
+def process(arguments, program=("-m", "ldls")):
+    """A run that is at work, and no more when the block ends."""
+    command = [sys.executable, *program, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        try:
+            yield running
+        finally:
+            running.kill()
+
+
+def finished(arguments, program=("-m", "ldls")):
+    """A run's process after its end."""
+    return subprocess.run([sys.executable, *program, *arguments], capture_output=True, text=True, check=False)
+
+
+def has_begun(running, out):
+    """Wait until a run holds its folder; False if it ended before."""
+    patience = time.monotonic() + PATIENCE_S
+    while running.poll() is None:
+        if (out / LOCK_NAME).exists():
+            return True
+        assert time.monotonic() < patience
+        time.sleep(0.001)
+    return False
+
+
+def killed_after(arguments, out, seconds):
+    """Kill a run so long after it took hold of its folder; whether it was still at work."""
+    (out / LOCK_NAME).unlink(missing_ok=True)
+    with process(arguments) as running:
+        if has_begun(running, out):
+            time.sleep(seconds)
+        at_work = running.poll() is None
+        running.kill()
+    return at_work
+
+
+def contents(folder):
+    """All files of a folder, hidden ones included."""
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def without_journal(folder):
+    return {name: content for name, content in contents(folder).items() if name != "journal.jsonl"}

@@ -1,0 +1,65 @@
+"""A run that was killed goes on, and its folder equals that of a run that was not, byte for byte."""
+
+import random
+import signal
+import time
+
+import pytest
+
+from batch import killed_at, runs
+
+AT_STEPS = [
+    pytest.param(step, n, id=f"{step}, {n}")
+    for step, times in {
+        "file written, not synced": (1, 2, 3, 170),
+        "file synced, not renamed": (1, 150),
+        "file renamed": (1, 150),
+        "folder not synced": (1, 2),
+        "line half written": (1, 2),
+        "line written": (1, 2),
+        "journal not put in order": (1,),
+        "journal in order, not renamed": (1,),
+        "journal renamed, lock not let go": (1,),
+    }.items()
+    for n in times
+]
+
+
+def test_every_step_of_a_write_is_killed_once():
+    assert {case.values[0] for case in AT_STEPS} == set(killed_at.STEPS)
+
+
+@pytest.mark.parametrize(("step", "n"), AT_STEPS)
+def test_killed_at_a_step(source, undisturbed, tmp_path, step, n):
+    words = runs.arguments(source, tmp_path)
+    killed = runs.finished([step, str(n), *words], program=[str(runs.KILLED_AT)])
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    assert runs.finished(words).returncode == 0
+    assert runs.contents(tmp_path) == undisturbed
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_killed_twice_at_random_moments(source, undisturbed, tmp_path, seed):
+    words = runs.arguments(source, tmp_path)
+    moments = random.Random(seed)
+    assert sum(runs.killed_after(words, tmp_path, moments.uniform(0, 0.3)) for _ in range(2)) >= 1
+    outcome = runs.finished(words)
+    assert outcome.returncode == 0, outcome.stderr
+    assert runs.contents(tmp_path) == undisturbed
+
+
+def test_interrupted_by_ctrl_c(source, undisturbed, tmp_path):
+    words = runs.arguments(source, tmp_path)
+    with runs.process(words) as running:
+        assert runs.has_begun(running, tmp_path)
+        time.sleep(0.2)
+        running.send_signal(signal.SIGINT)
+        _, complaint = running.communicate()
+    assert running.returncode == 130, complaint
+    assert "Traceback" not in complaint
+    left = runs.contents(tmp_path)
+    assert all(not name.startswith(".") for name in left)
+    assert 0 < len(left) < 301
+    resumed = runs.finished(words)
+    assert "by earlier runs" in resumed.stdout
+    assert runs.contents(tmp_path) == undisturbed

@@ -1,0 +1,455 @@
+"""Runs over whole sources in this process: what they write, refuse, survive and go on with."""
+
+import errno
+import json
+import os
+import resource
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import ldls
+from batch import runs
+from datasets import layouts
+from ldls import batch
+from ldls.batch import lock
+from ldls.batch.plan import check_names, parse_frames
+from ldls.cli import app
+from ldls.datasets import open_source
+from ldls.errors import BatchError, CorruptFileError, InputError, ParameterError, UnsafePathError
+from ldls.io import whole_file
+
+STORED = batch.RunSettings(masks="unused")
+
+
+def command(*words):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def run(source, out, **options):
+    settings = replace(STORED, masks=str(Path(source) / "masks"), **options.pop("settings", {}))
+    return batch.run(source, out, settings, **options)
+
+
+@pytest.fixture
+def few(tmp_path):
+    """A source of twelve frames that a test may change."""
+    return layouts.many_frames(tmp_path / "source", 12)
+
+
+def test_outputs_are_those_of_segment_frame_by_frame(source, undisturbed, tmp_path):
+    frame = open_source(source)[7]
+    masks = ldls.InstanceMasks.from_file(source / "masks/000007.json")
+    ldls.segment(frame.points, masks, frame.images[0].camera).save(tmp_path / "one.label")
+    assert undisturbed["000007.label"] == (tmp_path / "one.label").read_bytes()
+    assert len({undisturbed[f"{number:06d}.label"] for number in range(300)}) > 250
+    assert set(undisturbed) == {"journal.jsonl", *(f"{number:06d}.label" for number in range(300))}
+
+
+@pytest.mark.parametrize("workers", [1, 2, 7])
+def test_any_number_of_workers_yields_the_same_bytes(source, undisturbed, tmp_path, workers):
+    assert run(source, tmp_path, workers=workers).n_done == 300
+    assert runs.contents(tmp_path) == undisturbed
+
+
+@pytest.mark.parametrize("workers", [0, -1, 5000])
+def test_workers_out_of_range(few, tmp_path, workers):
+    with pytest.raises(ParameterError, match=f"workers: got {workers}"):
+        run(few, tmp_path / "out", workers=workers)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        pytest.param("2:9:3", ["000002", "000005", "000008"], id="with a step"),
+        pytest.param("10:", ["000010", "000011"], id="to the end"),
+        pytest.param(":2", ["000000", "000001"], id="from the start"),
+        pytest.param("4", ["000004"], id="one"),
+        pytest.param("11:500", ["000011"], id="past the end"),
+    ],
+)
+def test_frames_and_formats(few, tmp_path, text, expected):
+    out = tmp_path / "out"
+    outcome = command("run", few, "--masks", few / "masks", "--out", out, "--frames", text, "--formats", "label,ply")
+    assert outcome.exit_code == 0, outcome.output
+    assert f"{len(expected)} of {len(expected)} frames done" in outcome.output
+    made = {path.name for path in out.iterdir()} - {"journal.jsonl"}
+    assert made == {f"{name}.{ending}" for name in expected for ending in ("label", "ply")}
+
+
+@pytest.mark.parametrize("text", ["1:2:0", "-3:", "a:b", "1:2:3:4", ""])
+def test_frames_that_are_no_slice(text):
+    with pytest.raises(ParameterError, match="START:STOP:STEP"):
+        parse_frames(text)
+
+
+def test_boxes_of_each_frame(few, tmp_path):
+    out = tmp_path / "out"
+    spec = f"boxes:{few}/label_2/{{frame}}.txt"
+    outcome = command("run", few, "--segmenter", spec, "--out", out)
+    assert outcome.exit_code == 0, outcome.output
+    assert "12 of 12 frames done" in outcome.output
+    boxes = few / "label_2/000003.txt"
+    boxes.write_text(boxes.read_text().replace("20.00", "18.00"))
+    outcome = command("run", few, "--segmenter", spec, "--out", out)
+    assert outcome.exit_code == 1
+    assert "label_2/000003.txt, of which frame 000003 was made, was changed since" in outcome.output
+
+
+def test_rings_with_masks_of_each_camera(tmp_path):
+    source = layouts.many_frames(tmp_path / "source", 3, cameras=(2, 3))
+    ring = open_source(source, camera=(2, 3))
+    for number, place in enumerate([source / "masks", f"{source}/masks/{{camera}}/{{frame}}.json"]):
+        out = tmp_path / f"out {number}"
+        summary = batch.run(ring, out, batch.RunSettings(masks=str(place)))
+        assert summary.n_done == 3
+        frame = ring[1]
+        masks = [ldls.InstanceMasks.from_file(source / f"masks/image_{camera}/000001.json") for camera in (2, 3)]
+        views = [ldls.View(own, image.camera) for own, image in zip(masks, frame.images, strict=True)]
+        ldls.segment(frame.points, views).save(tmp_path / "one.label")
+        assert (out / "000001.label").read_bytes() == (tmp_path / "one.label").read_bytes()
+
+
+def test_one_corrupt_frame_of_a_thousand(tmp_path):
+    source = layouts.many_frames(tmp_path / "source", 1000)
+    sound = (source / "velodyne/000417.bin").read_bytes()
+    (source / "velodyne/000417.bin").write_bytes(sound[:-3])
+    out = tmp_path / "out"
+    words = runs.arguments(source, out)
+    outcome = command(*words)
+    assert outcome.exit_code == 2, outcome.output
+    assert "999 of 1,000 frames done, 1 failed" in outcome.output
+    assert "000417 failed (read)" in outcome.output
+    (line,) = (out / "failures.jsonl").read_text().splitlines()
+    failure = json.loads(line)
+    assert (failure["frame"], failure["stage"], failure["code"]) == ("000417", "read", "truncated_file")
+    assert "000417.bin" in failure["message"]
+    assert len(list(out.glob("*.label"))) == 999
+    (source / "velodyne/000417.bin").write_bytes(sound)
+    outcome = command(*words)
+    assert outcome.exit_code == 0, outcome.output
+    assert "1,000 of 1,000 frames done, 999 of them by earlier runs" in outcome.output
+    assert not (out / "failures.jsonl").exists()
+    assert len(list(out.glob("*.label"))) == 1000
+
+
+@pytest.mark.parametrize(
+    ("break_it", "stage", "code"),
+    [
+        pytest.param(lambda s: (s / "masks/000002.json").unlink(), "masks", "input", id="no masks"),
+        pytest.param(lambda s: (s / "masks/000002.json").write_text("{"), "masks", "corrupt_file", id="half a file"),
+        pytest.param(lambda s: (s / "calib/000002.txt").write_text(""), "read", None, id="empty calibration"),
+        pytest.param(lambda s: (s / "velodyne/000002.bin").write_bytes(b"x" * 17), "read", None, id="corrupt cloud"),
+    ],
+)  # fmt: skip
+def test_a_bad_frame_is_passed_over(few, tmp_path, break_it, stage, code):
+    break_it(few)
+    summary = run(few, tmp_path / "out")
+    (failure,) = summary.failures
+    assert (failure.frame, failure.stage, summary.n_done) == ("000002", stage, 11)
+    assert code is None or failure.code == code
+    assert not (tmp_path / "out/000002.label").exists()
+
+
+def test_a_cut_off_line_of_the_journal_is_dropped(source, undisturbed, tmp_path):
+    run(source, tmp_path)
+    journal = tmp_path / "journal.jsonl"
+    for cut in (10, 3000, len(journal.read_bytes()) - 1):
+        journal.write_bytes(undisturbed["journal.jsonl"][:cut])
+        run(source, tmp_path)
+        assert runs.contents(tmp_path) == undisturbed
+
+
+def test_what_is_no_journal_is_refused(few, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/journal.jsonl").write_text("a diary\n")
+    with pytest.raises(CorruptFileError, match="not a journal of ldls"):
+        run(few, tmp_path / "out")
+    assert (tmp_path / "out/journal.jsonl").read_text() == "a diary\n"
+
+
+def test_files_that_went_missing_or_shrank_are_made_again(source, undisturbed, tmp_path):
+    run(source, tmp_path)
+    (tmp_path / "000003.label").unlink()
+    (tmp_path / "000004.label").write_bytes(b"")
+    assert run(source, tmp_path).n_earlier == 298
+    assert runs.contents(tmp_path) == undisturbed
+
+
+def test_left_over_parts_are_swept(few, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / f".000001.label.0123{whole_file.UNFINISHED}").write_bytes(b"half")
+    (out / "notes.txt").write_text("the user's own")
+    run(few, out)
+    assert not list(out.glob(".*"))
+    assert (out / "notes.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        pytest.param({"settings": {"params": ldls.Params(sigma=2.0)}}, "params.sigma was 1.0, is 2.0", id="sigma"),
+        pytest.param({"settings": {"formats": ("label", "ply")}}, "settings.formats was", id="formats"),
+        pytest.param({"settings": {"min_score": 0.5}}, "settings.min_score was None, is 0.5", id="score"),
+        pytest.param({"frames": slice(0, 5)}, "source.frames was 12, is 5", id="frames"),
+    ],
+)  # fmt: skip
+def test_a_run_of_other_settings_is_refused(few, tmp_path, options, named):
+    run(few, tmp_path / "out")
+    before = runs.contents(tmp_path / "out")
+    with pytest.raises(BatchError, match="holds a run of other settings") as caught:
+        run(few, tmp_path / "out", **options)
+    assert named in str(caught.value)
+    assert runs.contents(tmp_path / "out") == before
+
+
+def test_a_run_of_another_source_is_refused(few, tmp_path):
+    run(few, tmp_path / "out")
+    other = layouts.many_frames(tmp_path / "other", 12)
+    with pytest.raises(BatchError, match=r"source\.path was '.*source', is '.*other'"):
+        batch.run(other, tmp_path / "out", replace(STORED, masks=str(few / "masks")))
+
+
+def test_a_run_of_another_version_is_refused(few, tmp_path):
+    run(few, tmp_path / "out")
+    journal = tmp_path / "out/journal.jsonl"
+    journal.write_text(journal.read_text().replace(f'"version":"{ldls.__version__}"', '"version":"0.0.1"'))
+    with pytest.raises(BatchError, match=rf"settings\.version was '0\.0\.1', is '{ldls.__version__}'"):
+        run(few, tmp_path / "out")
+
+
+@pytest.mark.parametrize("kind", ["velodyne/000004.bin", "calib/000004.txt", "masks/000004.json"])
+@pytest.mark.parametrize("change", [lambda path: path.touch(), lambda path: path.unlink()], ids=["written", "removed"])
+def test_a_changed_input_is_refused(few, tmp_path, kind, change):
+    run(few, tmp_path / "out", frames=slice(0, 5))
+    source = open_source(few)
+    change(few / kind)
+    with pytest.raises(BatchError, match=f"{kind}, of which frame 000004 was made, was changed since"):
+        settings = replace(STORED, masks=str(few / "masks"))
+        batch.run(source, tmp_path / "out", settings, frames=slice(0, 5))
+
+
+def test_threads_of_params_do_not_matter(few, tmp_path):
+    run(few, tmp_path / "out")
+    assert run(few, tmp_path / "out", settings={"params": ldls.Params(threads=2)}).n_earlier == 12
+
+
+def test_a_second_run_is_refused_while_the_first_lives(few, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    hold = "import sys, time; from pathlib import Path; from ldls.batch.lock import only_run\n"
+    hold += "with only_run(Path(sys.argv[1])): print('held', flush=True); time.sleep(60)"
+    with runs.process([str(out)], program=["-c", hold]) as holder:
+        assert holder.stdout.readline() == "held\n"
+        outcome = command(*runs.arguments(few, out))
+        assert outcome.exit_code == 1
+        assert f"another run is at work here (process {holder.pid} on " in outcome.output
+        assert [path.name for path in out.iterdir()] == [lock.LOCK_NAME]
+    outcome = command(*runs.arguments(few, out))
+    assert outcome.exit_code == 0, outcome.output
+    assert not (out / lock.LOCK_NAME).exists()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """What mounts a file system of so many KiB."""
+    place = tmp_path / "small"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(place)]
+    if sys.platform != "linux" or os.geteuid() != 0 or subprocess.run(mount, check=False).returncode != 0:
+        pytest.skip("only root may mount a small file system")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def test_full_disk(source, undisturbed, small_disk):
+    words = runs.arguments(source, small_disk)
+    for _ in range(2):
+        outcome = command(*words)
+        assert outcome.exit_code == 1
+        assert "No space left on device while" in outcome.output
+        assert "ing frame 000" in outcome.output
+        left = runs.contents(small_disk)
+        assert 10 < len(left) < 150
+        assert {name for name in left if name.startswith(".")} == set()
+        assert all(content == undisturbed[name] for name, content in left.items() if name != "journal.jsonl")
+        assert left["journal.jsonl"].endswith(b"\n")
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    outcome = command(*words)
+    assert outcome.exit_code == 0, outcome.output
+    assert runs.contents(small_disk) == undisturbed
+
+
+@pytest.mark.parametrize("n", [1, 2, 40, 301], ids=lambda n: f"sync {n}")
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EROFS], ids=errno.errorcode.get)
+def test_disk_trouble_of_every_kind(source, undisturbed, tmp_path, monkeypatch, n, code):
+    calls = iter(range(1, 10_000))
+    sync = os.fsync
+
+    def failing(handle):
+        if next(calls) >= n:
+            raise OSError(code, os.strerror(code))
+        sync(handle)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", failing)
+        with pytest.raises(OSError, match=os.strerror(code)) as caught:
+            run(source, tmp_path)
+    assert caught.value.errno == code
+    assert str(tmp_path) in caught.value.filename
+    assert n <= 2 or "frame 000" in caught.value.strerror
+    assert all(content == undisturbed[name] for name, content in runs.without_journal(tmp_path).items())
+    run(source, tmp_path)
+    assert runs.contents(tmp_path) == undisturbed
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        pytest.param(["../../etc/passwd"], id="parent"),
+        pytest.param(["/etc/passwd"], id="absolute"),
+        pytest.param(["a/b"], id="separator"),
+        pytest.param(["a\\b"], id="Windows separator"),
+        pytest.param(["C:x"], id="drive"),
+        pytest.param(["a\0b"], id="NUL"),
+        pytest.param(["a\nb"], id="line break"),
+        pytest.param(["nul"], id="device"),
+        pytest.param([".hidden"], id="hidden"),
+        pytest.param([""], id="empty"),
+        pytest.param(["\udcff"], id="not UTF-8"),
+        pytest.param(["é" * 101], id="too many bytes"),
+        pytest.param(["a", "A"], id="cases"),
+        pytest.param(["caf\u00e9", "cafe\u0301"], id="two ways to write an accent"),
+        pytest.param(["a", "a"], id="twice"),
+    ],
+)
+def test_names_that_cannot_be_files(names):
+    with pytest.raises(UnsafePathError):
+        check_names(names, ["label"])
+
+
+def test_names_that_meet_by_their_endings():
+    check_names(["a", "a_panoptic"], ["npz"])
+    with pytest.raises(UnsafePathError, match="one file"):
+        check_names(["a", "a_panoptic"], ["npz", "_panoptic.npz"])
+
+
+class Renamed:
+    """A source whose frames have other names."""
+
+    def __init__(self, source, names):
+        self.source, self.names = source, tuple(names)
+        self.kind, self.path, self.camera_names = source.kind, source.path, source.camera_names
+
+    def __len__(self):
+        return len(self.names)
+
+    def __getitem__(self, index):
+        return self.source[index]
+
+    def files(self, index):
+        return self.source.files(index)
+
+
+def test_unsafe_names_are_refused_before_anything_is_written(few, tmp_path):
+    renamed = Renamed(open_source(few), ["a", "../a"])
+    with pytest.raises(UnsafePathError, match=r"'\.\./a'"):
+        batch.run(renamed, tmp_path / "out", replace(STORED, masks=str(few / "masks")))
+    assert not (tmp_path / "out").exists()
+
+
+def test_frames_of_unicode_names(tmp_path):
+    names = ["Straße 1", "東京", "🚗"]
+    source = layouts.plain_folder(tmp_path / "Ünï", frames=names)
+    (source / "masks").mkdir()
+    for name in names:
+        (source / f"masks/{name}.json").write_text(json.dumps(layouts._coco(20)))
+    assert run(source, tmp_path / "öut").n_done == 3
+    assert {path.stem for path in (tmp_path / "öut").glob("*.label")} == set(names)
+    assert run(source, tmp_path / "öut").n_earlier == 3
+
+
+@pytest.fixture
+def read_only(tmp_path):
+    place = tmp_path / "sealed"
+    place.mkdir()
+    if os.geteuid() != 0:
+        place.chmod(0o500)
+        yield place
+        place.chmod(0o700)
+        return
+    # root writes where others may not, save on a file system that is read-only
+    mount = ["mount", "-t", "tmpfs", "-o", "ro,size=64k", "none", str(place)]
+    if subprocess.run(mount, check=False).returncode != 0:
+        pytest.skip("nothing is read-only here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+@pytest.mark.parametrize("below", ["", "new/folder"], ids=["itself", "a folder in it"])
+def test_a_read_only_folder(few, read_only, below):
+    outcome = command(*runs.arguments(few, read_only / below))
+    assert outcome.exit_code == 1
+    assert str(read_only) in outcome.output
+    assert not list(read_only.iterdir())
+
+
+def test_memory_stays_flat(tmp_path):
+    source = layouts.many_frames(tmp_path / "source", 600)
+    used = {}
+
+    def measure(finished, _failed, _total):
+        if finished in (200, 600):
+            pages = int(Path("/proc/self/statm").read_text().split()[1])
+            used[finished] = pages * resource.getpagesize()
+
+    run(source, tmp_path / "out", on_progress=measure)
+    assert (used[600] - used[200]) / 400 < 2048
+
+
+def test_masks_that_are_nowhere(few, tmp_path):
+    with pytest.raises(InputError, match="no folder and has no"):
+        batch.run(few, tmp_path / "out", batch.RunSettings(masks=str(tmp_path / "none")))
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        pytest.param({}, "got neither", id="neither"),
+        pytest.param({"masks": "a", "segmenter": "torchvision"}, "got both", id="both"),
+        pytest.param({"masks": "a", "formats": ()}, "formats", id="no format"),
+    ],
+)
+def test_settings_that_contradict_themselves(options, named):
+    with pytest.raises(ParameterError, match=named):
+        batch.RunSettings(**options)
+
+
+def test_unknown_engine(few, tmp_path):
+    with pytest.raises(ParameterError, match="engine: got 'slurm', expected one of local"):
+        run(few, tmp_path / "out", engine="slurm")
+
+
+def test_warnings_of_frames_are_said_once(few, tmp_path):
+    for number in range(12):
+        layouts.write_points(few / f"velodyne/{number:06d}.bin", np.full((10, 4), np.nan, "<f4"))
+    outcome = command(*runs.arguments(few, tmp_path / "out"))
+    assert outcome.exit_code == 0, outcome.output
+    assert outcome.output.count("0 of 10 rows are finite") == 1
+
+
+def test_records_reach_the_journal_while_the_run_lasts(few, tmp_path, monkeypatch):
+    # the function of that name hides the module
+    monkeypatch.setattr(sys.modules["ldls.batch.run"], "GROUP_S", 0.0)
+    seen = []
+    journal = tmp_path / "out/journal.jsonl"
+    run(few, tmp_path / "out", on_progress=lambda *_: seen.append(journal.read_text().count("\n")))
+    assert seen == sorted(seen)
+    assert seen[5] >= 6
