@@ -192,6 +192,32 @@ def batch(measured: Frame, threads: int, runs: int, _most: int) -> Table:
     return table
 
 
+def whole_runs(measured: Frame, threads: int, _runs: int, most: int) -> Table:
+    """`ldls run` over many frames from the disk, against LabelDiffusion in a loop on one core."""
+    import tempfile
+    from pathlib import Path
+
+    from benches import runs
+    from ldls import batch
+
+    count, one_core = min(2000, most), ldls.Params(threads=1)
+    table = _table(
+        f"{count:,} frames, {measured.name}",
+        ["round", "loop on one core, frames/s", f"run on {threads}, frames/s", "share of loop x workers"],
+        "points, calibration and masks from the disk, labels to the disk",
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        training, stored = runs.write_frames(Path(folder), measured, count)
+        settings = batch.RunSettings(masks=str(stored))
+        for number in range(1, 4):
+            seconds = medians({"loop": lambda: runs.loop(measured, 50, one_core)}, runs=3)["loop"]
+            summary = batch.run(training, Path(folder) / f"out{number}", settings, workers=threads)
+            own = 50 / seconds
+            share = summary.frames_per_second / own / threads
+            table.add_row(str(number), f"{own:.1f}", f"{summary.frames_per_second:.1f}", f"{share:.0%}")
+    return table
+
+
 def masks(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
     """Masks of 1920 x 1080 pixels from and to COCO's run lengths, against pycocotools."""
     import warnings
@@ -260,6 +286,7 @@ SECTIONS = {
     "instances": instances,
     "threads": thread_scaling,
     "batch": batch,
+    "runs": whole_runs,
     "masks": masks,
     "cameras": cameras,
 }
