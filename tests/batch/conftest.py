@@ -1,3 +1,7 @@
+import os
+import subprocess
+import sys
+
 import pytest
 
 from batch import runs
@@ -17,3 +21,21 @@ def undisturbed(source, tmp_path_factory):
     outcome = runs.finished(runs.arguments(source, out))
     assert outcome.returncode == 0, outcome.stderr
     return runs.contents(out)
+
+
+@pytest.fixture
+def few(tmp_path):
+    """A source of twelve frames that a test may change."""
+    return layouts.many_frames(tmp_path / "source", 12)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """What mounts a file system of so many KiB."""
+    place = tmp_path / "small"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(place)]
+    if sys.platform != "linux" or os.geteuid() != 0 or subprocess.run(mount, check=False).returncode != 0:
+        pytest.skip("only root may mount a small file system")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)

@@ -36,12 +36,6 @@ def run(source, out, **options):
     return batch.run(source, out, settings, **options)
 
 
-@pytest.fixture
-def few(tmp_path):
-    """A source of twelve frames that a test may change."""
-    return layouts.many_frames(tmp_path / "source", 12)
-
-
 def test_outputs_are_those_of_segment_frame_by_frame(source, undisturbed, tmp_path):
     frame = open_source(source)[7]
     masks = ldls.InstanceMasks.from_file(source / "masks/000007.json")
@@ -255,18 +249,6 @@ def test_a_second_run_is_refused_while_the_first_lives(few, tmp_path):
     outcome = command(*runs.arguments(few, out))
     assert outcome.exit_code == 0, outcome.output
     assert not (out / lock.LOCK_NAME).exists()
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """What mounts a file system of so many KiB."""
-    place = tmp_path / "small"
-    place.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(place)]
-    if sys.platform != "linux" or os.geteuid() != 0 or subprocess.run(mount, check=False).returncode != 0:
-        pytest.skip("only root may mount a small file system")
-    yield place
-    subprocess.run(["umount", str(place)], check=True)
 
 
 def test_full_disk(source, undisturbed, small_disk):

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 
-from ldls import _ldls
-from ldls.batch.engines import Engine, open_engine
+from ldls.batch.engines import Engine, EngineOptions, open_engine
 from ldls.batch.frame_work import FrameWork
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
@@ -18,12 +17,10 @@ from ldls.batch.plan import check_names
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import Summary, count_objects, failures_of, write_failures
 from ldls.datasets import Source, open_source
-from ldls.errors import ParameterError
 from ldls.io.whole_file import sweep
 
 GROUP_S = 0.5
 """Frames finished within this time share a wait for the disk."""
-MAX_WORKERS = 1024
 
 Progress = Callable[[int, int, int], None]
 """Called with the frames done, those of them that failed, and all frames."""
@@ -37,6 +34,8 @@ def run(
     frames: slice = slice(None),
     workers: int | None = None,
     engine: str | Engine = "local",
+    ray_address: str | None = None,
+    gpus: float = 0.0,
     on_progress: Progress | None = None,
 ) -> Summary:
     """Label the frames of a source, and write the files of each to the folder `out`.
@@ -50,8 +49,10 @@ def run(
         out: Folder for the results; made if need be.
         settings: How frames are treated.
         frames: Which frames of the source.
-        workers: Frames segmented at a time; as many as the process may use cores by default.
-        engine: Where they are segmented: a key of `ldls.batch.engines.ENGINES`, or an engine.
+        workers: Frames segmented at a time; as many as the process, or the cluster, may use cores by default.
+        engine: Where they are segmented: "local", "ray", or an engine of your own.
+        ray_address: Address of the Ray cluster to join; by default one is started on this machine.
+        gpus: GPUs that a worker of the Ray cluster needs for its segmenter.
         on_progress: Called after each frame.
 
     Returns:
@@ -60,10 +61,11 @@ def run(
     Raises:
         BatchError: Another run is at work in `out`, or `out` holds a run of other settings, source or version.
         UnsafePathError: A frame's name is no file name.
+        ImportError: The engine needs an extra that is not installed.
         OSError: The results cannot be written, as on a full disk; what is written stays, and the run can go on.
     """
     opened = open_source(source, truth=False) if isinstance(source, str | PathLike) else source
-    runner = open_engine(engine, _checked_workers(workers))
+    runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
     chosen = list(zip(range(len(opened))[frames], opened.names[frames], strict=True))
     names = [name for _, name in chosen]
     check_names(names, settings.formats)
@@ -107,14 +109,6 @@ def run(
         seconds=dict(seconds),
         elapsed=elapsed,
     )
-
-
-def _checked_workers(workers: int | None) -> int:
-    if workers is None:
-        return _ldls.default_threads()
-    if not 1 <= workers <= MAX_WORKERS:
-        raise ParameterError(f"workers: got {workers}, expected 1 to {MAX_WORKERS}")
-    return workers
 
 
 def _recorded(outcomes: Iterator[Outcome], journal: Journal) -> Iterator[Outcome]:

@@ -18,7 +18,7 @@ class Failure:
 
     Attributes:
         frame: Its name.
-        stage: Where it failed: "read", "masks", "segment" or "write".
+        stage: Where it failed: "read", "masks", "segment" or "write"; "worker" if those that did it died.
         code: Stable code of the error, as "corrupt_file".
         message: What was wrong.
     """

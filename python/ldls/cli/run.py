@@ -53,6 +53,12 @@ def run(
     workers: Annotated[
         int | None, typer.Option(help="Frames at a time, one a core.", min=1, show_default="all cores")
     ] = None,
+    engine: Annotated[str, typer.Option(help="local, or ray for a Ray cluster; docs/scale.md.")] = "local",
+    ray_address: Annotated[
+        str | None,
+        typer.Option(help="Cluster to join, as auto or ray://HOST:10001.", show_default="one on this machine"),
+    ] = None,
+    gpus: Annotated[float, typer.Option(help="GPUs of each worker of a Ray cluster, for its segmenter.")] = 0.0,
 ) -> None:
     """Label all frames of a source; a run that was interrupted goes on where it stopped.
 
@@ -78,7 +84,15 @@ def run(
     opened = open_source(source, kind=dataset, truth=False)
     with frame_progress("labelling") as on_progress:
         summary = batch.run(
-            opened, out, settings, frames=parse_frames(frames), workers=workers, on_progress=on_progress
+            opened,
+            out,
+            settings,
+            frames=parse_frames(frames),
+            workers=workers,
+            engine=engine,
+            ray_address=ray_address,
+            gpus=gpus,
+            on_progress=on_progress,
         )
     show(summary, out)
     if summary.failures:

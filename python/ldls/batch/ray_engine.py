@@ -1,0 +1,197 @@
+"""The engine of a Ray cluster: workers in processes of their own, each a frame on one core.
+
+Frames go one by one to whoever is free. A worker that dies, with its machine or without, is replaced, and its frames
+are done again elsewhere: writing a frame twice leaves the same files. Outcomes come back to the process that began
+the run, which alone keeps the journal.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import pickle
+import socket
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from ldls import _ldls
+from ldls._optional import require
+from ldls.batch.frame_work import FrameWork
+from ldls.batch.lock import LOCK_NAME
+from ldls.batch.outcome import Outcome
+from ldls.batch.ray_worker import RayWorker
+from ldls.errors import BatchError
+
+MAX_DEATHS = 3
+"""Workers that one frame may take along before it counts as failed."""
+MAX_STILLBIRTHS = 20
+"""Workers that may die one after the other before any of them is ready."""
+CONNECT_S = 10.0
+STARTING = (-1, "")
+"""What a worker does that makes ready."""
+
+
+@dataclass(frozen=True)
+class RayCluster:
+    """Where Ray runs.
+
+    Attributes:
+        address: Address of a cluster, "auto" for the one that this machine is part of; None starts one on this machine.
+    """
+
+    address: str | None = None
+
+    @contextmanager
+    def joined(self, cores: int) -> Iterator[Any]:
+        """The library, connected; whoever was connected before stays so. A cluster begun here has so many cores.
+
+        Raises:
+            ImportError: The extra `ray` is not installed.
+            BatchError: There is no cluster at the address.
+        """
+        ray = require("ray", extra="ray")
+        if ray.is_initialized():
+            yield ray
+            return
+        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
+        try:
+            if self.address is None:
+                ray.init(address="local", num_cpus=cores, include_dashboard=False, **quiet)
+            else:
+                _check_reachable(self.address)
+                ray.init(address=self.address, **quiet)
+        except (OSError, RuntimeError, ValueError) as error:
+            raise BatchError(f"ray_address: cannot join {self.address!r}: {error}") from error
+        try:
+            yield ray
+        finally:
+            ray.shutdown()
+
+
+def _check_reachable(address: str) -> None:
+    """Ray itself tries for minutes before it gives up."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if colon:
+        socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
+
+
+def run_ray(
+    work: FrameWork,
+    frames: Sequence[tuple[int, str]],
+    cluster: RayCluster,
+    workers: int | None,
+    gpus: float,
+) -> Iterator[Outcome]:
+    """What became of each of `frames`, in the order in which they are finished.
+
+    Args:
+        work: What is done with a frame; workers open it anew.
+        frames: Number and name of each frame.
+        cluster: Where Ray runs.
+        workers: Processes; one a core, or one for each share of a GPU, by default.
+        gpus: GPUs of each worker. With any, the cores are shared out among the workers too, and each does as many
+            frames at a time: one segmenter a GPU, and a core for each cloud.
+
+    Raises:
+        BatchError: Workers cannot be started, do not see the folder, or are of another version.
+    """
+    if not frames:
+        return
+    own_cores = _ldls.default_threads()
+    with cluster.joined(own_cores if gpus else workers or own_cores) as ray:
+        resources = ray.cluster_resources()
+        cores = max(int(resources.get("CPU", 1)), 1)
+        if resources.get("GPU", 0) < gpus:
+            raise BatchError(f"gpus: the cluster has {resources.get('GPU', 0):g}, a worker wants {gpus:g}")
+        if workers is None:
+            workers = int(resources["GPU"] / gpus) if gpus else cores
+        share = max(cores // workers, 1) if gpus else 1
+        pool = _Pool(ray, work, {"num_cpus": share, "num_gpus": gpus, "max_concurrency": share})
+        try:
+            pool.hire(min(workers, len(frames)))
+            yield from pool.outcomes(frames)
+        finally:
+            pool.dismiss()
+
+
+class _Pool:
+    """Workers and what they are at."""
+
+    def __init__(self, ray: Any, work: FrameWork, resources: dict[str, Any]) -> None:  # noqa: ANN401
+        self._ray = ray
+        self._share: int = resources["max_concurrency"]
+        # a worker that dies is replaced here, lest a frame that kills be tried for ever
+        self._class = ray.remote(RayWorker).options(max_restarts=0, max_task_retries=0, **resources)
+        try:
+            self._work = ray.put(work)
+        except (TypeError, pickle.PicklingError) as error:
+            raise BatchError(f"source: cannot be sent to other processes: {error}") from error
+        self._holder = (work.out / LOCK_NAME).read_text(encoding="utf-8")
+        self._tasks: dict[Any, tuple[Any, tuple[int, str]]] = {}
+        self._alive: set[Any] = set()
+        self._stillbirths = 0
+
+    def hire(self, count: int) -> None:
+        for _ in range(count):
+            worker = self._class.remote()
+            self._alive.add(worker)
+            self._tasks[worker.open.remote(self._work, _ldls.__version__, self._holder)] = (worker, STARTING)
+
+    def dismiss(self) -> None:
+        for worker in self._alive:
+            # whatever state it is in
+            with contextlib.suppress(Exception):
+                self._ray.kill(worker)
+
+    def outcomes(self, frames: Sequence[tuple[int, str]]) -> Iterator[Outcome]:
+        waiting = deque(frames)
+        deaths: Counter[str] = Counter()
+        idle: deque[Any] = deque()
+        n_left = len(frames)
+        while n_left:
+            while idle and waiting:
+                worker = idle.popleft()
+                if worker in self._alive:
+                    frame = waiting.popleft()
+                    self._tasks[worker.do.remote(*frame)] = (worker, frame)
+            (done, *_), _ = self._ray.wait(list(self._tasks), num_returns=1)
+            worker, frame = self._tasks.pop(done)
+            try:
+                outcome = self._ray.get(done)
+            except self._ray.exceptions.RayActorError as death:
+                self._replace(worker, frame, death)
+                if frame == STARTING:
+                    continue
+                deaths[frame[1]] += 1
+                if deaths[frame[1]] < MAX_DEATHS:
+                    waiting.appendleft(frame)
+                    continue
+                outcome = _killer(frame[1])
+            except self._ray.exceptions.RayTaskError as error:
+                # a full disk, for one: what stops a run on one machine stops it here
+                raise getattr(error, "cause", None) or error from None
+            if frame == STARTING:
+                self._stillbirths = 0
+                idle.extend([worker] * self._share)
+                continue
+            idle.append(worker)
+            n_left -= 1
+            yield outcome
+
+    def _replace(self, worker: Any, frame: tuple[int, str], death: Exception) -> None:  # noqa: ANN401
+        if frame == STARTING:
+            self._stillbirths += 1
+            if self._stillbirths > MAX_STILLBIRTHS:
+                raise BatchError(f"workers die before they are ready: {death}") from death
+        # all frames of a worker come back with its death; one successor is enough
+        if worker in self._alive:
+            self._alive.remove(worker)
+            self.hire(1)
+
+
+def _killer(frame: str) -> Outcome:
+    message = f"{MAX_DEATHS} workers died of it; is memory short?"
+    return Outcome({"frame": frame, "error": {"stage": "worker", "code": "worker_died", "message": message}})

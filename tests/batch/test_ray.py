@@ -1,0 +1,177 @@
+"""Runs on a Ray cluster of this machine: what the local engine writes, whatever dies on the way."""
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+import ldls
+from batch import runs
+from ldls import batch
+from ldls.batch.engines import EngineOptions
+from ldls.batch.frame_work import FrameWork
+from ldls.batch.lock import LOCK_NAME
+from ldls.batch.ray_worker import RayWorker
+from ldls.datasets import open_source
+from ldls.errors import BatchError, ParameterError
+
+WORKERS = ("--engine", "ray", "--workers", 2)
+
+
+@pytest.fixture(scope="module")
+def ray():
+    return pytest.importorskip("ray")
+
+
+def stored(source):
+    return batch.RunSettings(masks=str(source / "masks"))
+
+
+def worker_pids(ancestor):
+    """Processes of workers below a process."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if b"ray::RayWorker" in (folder / "cmdline").read_bytes() and ancestor in ancestors(int(folder.name)):
+                found.append(int(folder.name))
+        except OSError:  # ended meanwhile
+            continue
+    return found
+
+
+def ancestors(pid):
+    while pid > 1:
+        pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+        yield pid
+
+
+def test_a_worker_killed_on_the_way_costs_nothing(ray, source, undisturbed, tmp_path):
+    killed = []
+
+    def kill_one(finished, _failed, _total):
+        if finished in (60, 150):
+            pids = [pid for pid in worker_pids(os.getpid()) if pid not in killed]
+            assert len(pids) == 2 - len(killed) or killed
+            os.kill(pids[0], signal.SIGKILL)
+            killed.append(pids[0])
+
+    summary = batch.run(source, tmp_path, stored(source), engine="ray", workers=2, on_progress=kill_one)
+    assert len(killed) == 2
+    assert (summary.n_done, summary.failures) == (300, ())
+    assert runs.contents(tmp_path) == undisturbed
+    assert not ray.is_initialized()
+
+
+def test_a_killed_run_goes_on_on_either_engine(ray, source, undisturbed, tmp_path):
+    words = runs.arguments(source, tmp_path)
+    assert runs.killed_after(words, tmp_path, 0.2)
+    with runs.process([*words, *map(str, WORKERS)]) as running:
+        n_local = len(list(tmp_path.glob("*.label")))
+        while len(list(tmp_path.glob("*.label"))) < min(n_local + 20, 290):
+            assert running.poll() is None
+        running.kill()
+    outcome = runs.finished([*words, *map(str, WORKERS)])
+    assert outcome.returncode == 0, outcome.stderr
+    assert "by earlier runs" in outcome.stdout
+    assert runs.contents(tmp_path) == undisturbed
+
+
+class Deadly:
+    """A source of which one frame kills whoever reads it."""
+
+    def __init__(self, source, number):
+        self.source, self.number = source, number
+        self.kind, self.path, self.names = source.kind, source.path, source.names
+        self.camera_names = source.camera_names
+
+    def __len__(self):
+        return len(self.source)
+
+    def __getitem__(self, index):
+        if index == self.number:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return self.source[index]
+
+    def files(self, index):
+        return self.source.files(index)
+
+
+def test_a_frame_that_kills_its_workers_is_passed_over(ray, few, tmp_path):
+    from ray import cloudpickle
+
+    # workers do not have the tests on their path
+    cloudpickle.register_pickle_by_value(sys.modules[__name__])
+    try:
+        deadly = Deadly(open_source(few), 4)
+        summary = batch.run(deadly, tmp_path / "out", stored(few), engine="ray", workers=2)
+    finally:
+        cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
+    (failure,) = summary.failures
+    assert (failure.frame, failure.stage, failure.code) == ("000004", "worker", "worker_died")
+    assert summary.n_done == 11
+    assert batch.run(few, tmp_path / "out", stored(few)).n_done == 12
+
+
+def test_bad_frames_and_a_full_disk(ray, source, small_disk, few, tmp_path):
+    (few / "velodyne/000002.bin").write_bytes(b"x" * 17)
+    outcome = runs.finished([*runs.arguments(few, tmp_path / "out"), *map(str, WORKERS)])
+    assert outcome.returncode == 2, outcome.stderr
+    assert "11 of 12 frames done, 1 failed" in outcome.stdout
+    outcome = runs.finished([*runs.arguments(source, small_disk), *map(str, WORKERS)])
+    assert outcome.returncode == 1
+    assert "No space left on device while" in outcome.stderr
+    assert "ing frame 000" in outcome.stderr
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1", "127.0.0.1:port"])
+def test_an_address_where_no_cluster_is(ray, few, tmp_path, address):
+    with pytest.raises(BatchError, match=f"cannot join '{address}'"):
+        batch.run(few, tmp_path / "out", stored(few), engine="ray", ray_address=address)
+
+
+def test_gpus_that_are_not_there(ray, few, tmp_path):
+    with pytest.raises(BatchError, match="the cluster has 0, a worker wants 64"):
+        batch.run(few, tmp_path / "out", stored(few), engine="ray", gpus=64)
+
+
+def test_without_ray_the_extra_is_named(few, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ImportError, match=r"pip install 'ldls\[ray\]'"):
+        batch.run(few, tmp_path / "out", stored(few), engine="ray")
+
+
+@pytest.mark.parametrize(
+    ("seen", "version", "named"),
+    [
+        pytest.param(None, ldls.__version__, "does not see the folder", id="no such folder"),
+        pytest.param("another run", ldls.__version__, "does not see the folder", id="another folder of that name"),
+        pytest.param("this run", "0.0.1", "the run is of 0.0.1", id="another version"),
+    ],
+)
+def test_a_worker_that_cannot_take_part_says_so(few, tmp_path, seen, version, named):
+    if seen is not None:
+        (tmp_path / LOCK_NAME).write_text(seen)
+    work = FrameWork(open_source(few), stored(few), tmp_path)
+    with pytest.raises(BatchError, match=named):
+        RayWorker().open(work, version, "this run", wait_s=0)
+
+
+def test_a_worker_does_frames(few, tmp_path):
+    (tmp_path / LOCK_NAME).write_text("this run")
+    worker = RayWorker()
+    worker.open(FrameWork(open_source(few), stored(few), tmp_path), ldls.__version__, "this run")
+    assert worker.do(3, "000003").record["frame"] == "000003"
+    assert (tmp_path / "000003.label").exists()
+
+
+@pytest.mark.parametrize("gpus", [-1.0, 1.5, float("nan")])
+def test_gpus_out_of_range(gpus):
+    with pytest.raises(ParameterError, match="gpus"):
+        EngineOptions(gpus=gpus)
+
+
+def test_options_of_ray_are_refused_on_the_local_engine(few, tmp_path):
+    with pytest.raises(ParameterError, match="are for engine 'ray'"):
+        batch.run(few, tmp_path / "out", stored(few), ray_address="auto")
