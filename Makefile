@@ -42,3 +42,7 @@ bench: ## Compare with peers, then time every stage.
 picture: ## Make the picture of the README anew.
 	ldls demo --out build/demo
 	cp build/demo/demo.png docs/images/demo.png
+
+.PHONY: kills
+kills: ## Kill 200 runs of `ldls run` and hold what they leave, resumed, against an undisturbed one.
+	python tests/campaigns/kills.py

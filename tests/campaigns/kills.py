@@ -1,0 +1,73 @@
+"""Kills runs over 300 frames, lets them go on, and holds their folders against an undisturbed one: `make kills`."""
+
+import argparse
+import random
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from batch import killed_at, runs
+from datasets import layouts
+
+N_FRAMES = 300
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        campaign = Campaign(Path(folder), random.Random(options.seed))
+        while campaign.n_kills < options.kills:
+            campaign.disturb(options.kills - campaign.n_kills)
+            print(f"\r{campaign.n_kills} kills", end="", file=sys.stderr, flush=True)
+    print(
+        f"\n{campaign.n_kills} kills ({campaign.n_at_steps} at a step of a write) of {campaign.n_runs} runs over "
+        f"{N_FRAMES} frames; {campaign.n_equal} of {campaign.n_runs} folders equal the undisturbed one byte for byte"
+    )
+    sys.exit(campaign.n_equal != campaign.n_runs)
+
+
+class Campaign:
+    """Runs that are killed one to four times each, at random moments and at steps of a write in turn."""
+
+    def __init__(self, folder, random_):
+        self.folder, self.random = folder, random_
+        self.n_kills = self.n_at_steps = self.n_runs = self.n_equal = 0
+        self.source = layouts.many_frames(folder / "source", N_FRAMES)
+        out = folder / "undisturbed"
+        start = time.monotonic()
+        assert self.finish(out) == 0
+        self.longest_s = time.monotonic() - start
+        self.expected = runs.contents(out)
+
+    def disturb(self, most):
+        out = self.folder / f"out {self.n_runs}"
+        for _ in range(min(self.random.randint(1, 4), most)):
+            self.n_kills += self.kill_at_step(out) if self.random.random() < 0.4 else self.kill_at_random(out)
+        assert self.finish(out) == 0
+        self.n_runs += 1
+        self.n_equal += runs.contents(out) == self.expected
+
+    def finish(self, out):
+        return runs.finished(runs.arguments(self.source, out)).returncode
+
+    def kill_at_random(self, out):
+        return runs.killed_after(runs.arguments(self.source, out), out, self.random.uniform(0, self.longest_s / 2))
+
+    def kill_at_step(self, out):
+        step = self.random.choice(list(killed_at.STEPS))
+        n = 1 if step.startswith("journal") else self.random.choice((1, 2, 3, 30, 100, 200))
+        words = [step, str(n), *runs.arguments(self.source, out)]
+        killed = runs.finished(words, program=[str(runs.KILLED_AT)]).returncode == -signal.SIGKILL
+        self.n_at_steps += killed
+        return killed
+
+
+if __name__ == "__main__":
+    main()
