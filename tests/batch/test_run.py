@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import ldls
 from batch import runs
-from datasets import layouts
+from datasets import layouts, ros_samples
 from ldls import batch
 from ldls.batch import lock
 from ldls.batch.plan import check_names, parse_frames
@@ -108,6 +108,21 @@ def test_rings_with_masks_of_each_camera(tmp_path):
         views = [ldls.View(own, image.camera) for own, image in zip(masks, frame.images, strict=True)]
         ldls.segment(frame.points, views).save(tmp_path / "one.label")
         assert (out / "000001.label").read_bytes() == (tmp_path / "one.label").read_bytes()
+
+
+@pytest.mark.parametrize("n_cameras", [1, 2], ids=["one camera", "two cameras"])
+def test_a_bag_with_stored_masks(tmp_path, n_cameras):
+    topics = ("/left/image_raw", "/right/image_raw")[:n_cameras]
+    bag = ros_samples.Recording(
+        image_topics=topics, info_topics=("/left/camera_info", "/right/camera_info")[:n_cameras]
+    ).write(tmp_path / "small.bag")
+    opened = open_source(bag, truth=False, image_topics=topics)
+    for image in opened[0].images:
+        for name in opened.names:
+            layouts.write_text(tmp_path / f"masks/{image.name}/{name}.json", json.dumps(layouts._coco(20)))
+    settings = batch.RunSettings(masks=str(tmp_path / "masks"))
+    assert batch.run(opened, tmp_path / "out", settings).n_done == 3
+    assert batch.run(opened, tmp_path / "out", settings).n_earlier == 3
 
 
 def test_one_corrupt_frame_of_a_thousand(tmp_path):

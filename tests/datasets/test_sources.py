@@ -1,5 +1,6 @@
 """Every source on a small layout of its own, and what is said where something is missing."""
 
+import pickle
 import re
 import shutil
 
@@ -50,6 +51,14 @@ def test_a_source_names_cameras_and_files_without_reading_a_frame(tmp_path, kind
         files = source.files(index)
         assert all(path.is_file() for path in files)
         assert {image.path for image in frame.images} < set(files)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_a_source_travels_between_processes(tmp_path, kind):
+    source = open_source(WRITERS[kind](tmp_path))
+    arrived = pickle.loads(pickle.dumps(source))
+    assert (arrived.names, arrived.files(1)) == (source.names, source.files(1))
+    np.testing.assert_array_equal(arrived[1].points, source[1].points)
 
 
 @pytest.mark.parametrize("kind", WRITERS)

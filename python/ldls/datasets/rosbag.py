@@ -114,21 +114,6 @@ class RosBag:
         self._pair(entries[self.topics.points], [entries[topic] for topic in self.topics.images])
         self._tree: TransformTree | None = None
         self._reading = Lock()
-        self._reopen = partial(
-            RosBag,
-            self.path,
-            points_topic=points_topic,
-            image_topics=image_topics,
-            info_topics=info_topics,
-            max_offset_s=max_offset_s,
-            T_camera_lidar=T_camera_lidar,
-            fields=fields,
-            recover=recover,
-        )
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """In another process the bag is opened anew."""
-        return self._reopen, ()
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
