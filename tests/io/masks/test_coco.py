@@ -140,3 +140,16 @@ def test_a_file_of_two_gigabytes_is_refused(tmp_path):
         file.truncate(2 << 30)
     with pytest.raises(ldls.LimitError, match=r"masks\.json: over 1073741824 bytes; split it by image"):
         ldls.InstanceMasks.from_coco(path)
+
+
+def test_polygons_of_an_image_of_another_size_are_refused(tmp_path):
+    triangle = [[1, 1, 9, 1, 5, 8]]
+    document = {
+        "images": [{"id": 1, "height": 20, "width": 30}],
+        "categories": [{"id": 3, "name": "car"}],
+        "annotations": [{"id": 1, "image_id": 1, "category_id": 3, "segmentation": triangle}],
+    }
+    (tmp_path / "masks.json").write_text(json.dumps(document))
+    assert len(ldls.InstanceMasks.from_file(tmp_path / "masks.json", image_size=(20, 30))) == 1
+    with pytest.raises(ldls.MaskError, match=r"masks of \(20, 30\).*the image is \(30, 20\); swapped"):
+        ldls.InstanceMasks.from_file(tmp_path / "masks.json", image_size=(30, 20))

@@ -57,7 +57,7 @@ def read(
     image_id = _choose_image(place, annotations, images, image_id)
     chosen = [a for a in annotations if image_id is None or a.get("image_id", image_id) == image_id]
     try:
-        size = checked_size(image_size or _size_of(images, image_id, chosen))
+        size = _size_of(images, image_id, chosen, image_size)
     except MaskError as error:
         raise MaskError(f"{place}: {error}") from None
     labels = [f"{place}: annotation {a.get('id', i)}" for i, a in enumerate(chosen)]
@@ -188,16 +188,27 @@ def _choose_image(
 
 
 def _size_of(
-    images: Mapping[Any, dict[str, Any]], image_id: int | str | None, annotations: list[dict[str, Any]]
-) -> object:
+    images: Mapping[Any, dict[str, Any]],
+    image_id: int | str | None,
+    annotations: list[dict[str, Any]],
+    image_size: tuple[int, int] | None,
+) -> tuple[int, int]:
+    """(height, width) of the image: what its record says, else what is given, else what the first RLE says."""
+    given = None if image_size is None else checked_size(image_size)
     image = images.get(image_id, {})
     if image.get("height") is not None and image.get("width") is not None:
-        return image["height"], image["width"]
+        found = checked_size((image["height"], image["width"]))
+        if given not in (None, found):
+            hint = "; swapped?" if given == found[::-1] else ""
+            raise MaskError(f"masks of {found} (height, width), the image is {given}{hint}")
+        return found
+    if given is not None:
+        return given
     segmentations = (a.get("segmentation") for a in annotations)
     sizes = [s["size"] for s in segmentations if isinstance(s, dict) and "size" in s]
     if not sizes:
         raise MaskError("the image's size is not given; pass image_size=(height, width)")
-    return sizes[0]
+    return checked_size(sizes[0])
 
 
 def _rle(place: str, annotation: dict[str, Any], size: tuple[int, int]) -> _ldls.Rle:
