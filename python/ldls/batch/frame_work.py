@@ -24,8 +24,6 @@ from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
 from ldls.view import View
 
-STAGES = ("read", "masks", "segment", "write")
-
 
 class StageError(Exception):
     """An error of one frame, and the stage at which it happened."""

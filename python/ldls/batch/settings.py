@@ -11,6 +11,7 @@ from typing import Any
 
 from ldls import _ldls
 from ldls.errors import ParameterError
+from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
 
 DEFAULT_FORMATS = ("label",)
@@ -39,7 +40,7 @@ class RunSettings:
     categories: tuple[int | str, ...] | None = None
     params: Params = field(default_factory=Params)
     formats: tuple[str, ...] = DEFAULT_FORMATS
-    same_object: float = 0.5
+    same_object: float = SAME_OBJECT
 
     def __post_init__(self) -> None:
         if (self.masks is None) == (self.segmenter is None):

@@ -14,14 +14,10 @@ from ldls.cli.options import words
 from ldls.errors import InputError
 from ldls.masks import InstanceMasks
 
-SegmenterOption = Annotated[
-    str | None,
-    typer.Option(
-        help="What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or "
-        "grabcut:LABEL_2.txt.",
-        show_default=False,
-    ),
-]
+SEGMENTER_HELP = (
+    "What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt."
+)
+SegmenterOption = Annotated[str | None, typer.Option(help=SEGMENTER_HELP, show_default=False)]
 MinScoreOption = Annotated[
     float | None,
     typer.Option(help="Lowest score of a mask that counts.", show_default="0.5 of a network, 0 of a file"),

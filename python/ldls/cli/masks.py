@@ -10,7 +10,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from ldls.cli.mask_options import CategoriesOption, MinScoreOption, masks_of, wanted
+from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of, wanted
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.outputs import picture_of
 from ldls.errors import ParameterError
@@ -133,9 +133,7 @@ def make(
     out: OutArgument,
     segmenter: Annotated[
         str,
-        typer.Option(
-            help="onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt.", show_default=False
-        ),
+        typer.Option(help=SEGMENTER_HELP, show_default=False),
     ],
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,

@@ -25,7 +25,7 @@ DISTORTION: dict[str, type] = {"model": str, "coefficients": list}
 
 TEMPLATE = """\
 # Where the frames of this folder lie. {frame} stands for the name of a frame; paths are relative to this folder.
-points = "lidar/{frame}.bin"        # .bin (float32 rows) or .npy: x y z first, in metres
+points = "lidar/{frame}.bin"        # any format of docs/formats.md: x y z first, in metres
 columns = 4                         # floats a row of a .bin: 4 by default, 5 for .pcd.bin
 stamps = "lidar/stamps.txt"         # optional: lines `frame seconds`
 truth = "labels/{frame}.label"      # optional: any format that `ldls evaluate` reads
@@ -34,7 +34,7 @@ truth_format = "semantic-kitti"     # only where the file's ending does not tell
 # one table a camera; its calibration inline ...
 [cameras.front]
 images = "front/{frame}.png"
-masks = "front_masks/{frame}.json"  # optional: COCO .json, or .npz of ldls
+masks = "front_masks/{frame}.json"  # optional: any format of docs/masks.md
 stamps = "front/stamps.txt"         # optional
 image_size = [480, 640]             # optional: height, width in pixels; else that of each image
 K = [[525.0, 0.0, 319.5], [0.0, 525.0, 239.5], [0.0, 0.0, 1.0]]

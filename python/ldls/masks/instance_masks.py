@@ -346,6 +346,9 @@ class InstanceMasks:
         Args:
             by: Who keeps a pixel: the highest "score", the smallest "area" (what lies in front is often smaller), or
                 the first in "order". The first also wins where scores or areas are equal.
+
+        Raises:
+            ParameterError: `by` is none of these.
         """
         keys = {
             "score": -self.scores,
