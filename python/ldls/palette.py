@@ -1,47 +1,103 @@
-"""Colours that tell instances apart."""
+"""Colours of instances: the hue says the category, the shade tells instances of it apart.
 
+Hues are the same in every picture. They were chosen one after the other, each as far as can be from those before it and
+from grey, to eyes with all three kinds of cones and to eyes that lack one. No more than eight or so can be kept well
+apart for all of them, so pictures also write names. Coordinates are OKLCh (https://bottosson.github.io/posts/oklab/).
+"""
+
+from collections import Counter
+from collections.abc import Iterable
 from functools import cache
+from math import cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
-DISTINCT = 256  # colours, before they start again
-FIRST = (255, 136, 0)
-# Linear RGB to OKLab (https://bottosson.github.io/posts/oklab/), by way of its cone responses,
-# and to what an eye without green cones makes of it (Machado, Oliveira and Fernandes 2009).
-CONES = [[0.41222, 0.53633, 0.05145], [0.21190, 0.68070, 0.10740], [0.08830, 0.28172, 0.62998]]
-OKLAB = [[0.21045, 0.79362, -0.00407], [1.97800, -2.42859, 0.45059], [0.02590, 0.78277, -0.80868]]
-NO_GREEN = [[0.36732, 0.86065, -0.22797], [0.28009, 0.6725, 0.04741], [-0.01182, 0.04294, 0.96888]]
+Colour = tuple[int, int, int]
+
+BACKGROUND: Colour = (128, 128, 128)
+"""Colour of points without an object."""
+
+HUES: tuple[tuple[float, float, float], ...] = (
+    (0.74, 0.18, 56),  # orange
+    (0.70, 0.14, 248),  # blue
+    (0.58, 0.26, 312),  # violet
+    (0.86, 0.18, 144),  # light green
+    (0.58, 0.22, 24),  # red
+    (0.70, 0.14, 336),  # lilac
+    (0.86, 0.18, 96),  # yellow
+    (0.62, 0.22, 336),  # magenta
+    (0.62, 0.14, 280),  # slate blue
+    (0.78, 0.14, 168),  # aquamarine
+    (0.78, 0.14, 128),  # olive green
+    (0.62, 0.14, 160),  # dark green
+    (0.66, 0.22, 304),  # light violet
+    (0.82, 0.14, 336),  # pink
+    (0.66, 0.22, 0),  # crimson
+    (0.66, 0.14, 56),  # brown
+)
+"""Lightness, chroma and hue in degrees, the best kept apart first."""
+OF_EVERYDAY: dict[int, int] = {1: 0, 3: 1, 8: 2, 2: 3, 6: 4, 4: 5}
+"""Which hue belongs to the categories that traffic is made of: person, car, truck, bicycle, bus, motorcycle."""
+LIGHTER = (0.0, 0.08, -0.08, 0.04, -0.04, 0.12, -0.12)
+"""What the shades of a hue add to its lightness, in the order in which instances get them."""
+LIGHTEST = 0.90
+PALER = 0.65
+"""Share of the chroma left to a second turn through the shades."""
+# from OKLab to the cube roots of cone responses, and from these responses to linear RGB
+CONE_ROOTS = np.array([[1, 0.39634, 0.21580], [1, -0.10556, -0.06385], [1, -0.08948, -1.29149]])
+LINEAR_RGB = np.array([[4.07674, -3.30771, 0.23097], [-1.26844, 2.60976, -0.34132], [-0.00420, -0.70342, 1.70761]])
 
 
-def palette(n: int) -> NDArray[np.uint8]:
-    """Return `n` colours (n, 3), RGB, none near grey; the m-th is the same for every `n`."""
-    order = _order_of_colours()
-    return np.asarray(order[np.arange(n) % len(order)])
+def category_colour(category: int) -> Colour:
+    """Red, green and blue, 0 to 255, of a category: the first shade of its hue, the same in every picture."""
+    return _shade(_hue_of(category), 0)
+
+
+def instance_colours(categories: Iterable[int]) -> NDArray[np.uint8]:
+    """(M, 3) uint8 red, green and blue of M instances from the category id of each.
+
+    The k-th instance of a category has the k-th shade of its hue, whatever other categories there are. After fourteen
+    the shades begin again.
+    """
+    met: Counter[int] = Counter()
+    colours = []
+    for category in categories:
+        hue = _hue_of(int(category))
+        colours.append(_shade(hue, met[category]))
+        met[category] += 1
+    return np.array(colours, np.uint8).reshape(-1, 3)
+
+
+def _hue_of(category: int) -> int:
+    others = len(HUES) - len(OF_EVERYDAY)
+    return OF_EVERYDAY.get(category, len(OF_EVERYDAY) + category % others)
 
 
 @cache
-def _order_of_colours() -> NDArray[np.uint8]:
-    """Return vivid colours, each the farthest from those before it, also for colour-blind eyes."""
-    level = np.arange(0, 256, 17.0)
-    rgb = np.stack(np.meshgrid(level, level, level), axis=-1).reshape(-1, 3)
-    lightness, *chroma = _oklab(rgb, np.eye(3)).T
-    rgb = rgb[(np.hypot(*chroma) > 0.14) & (lightness > 0.58) & (lightness < 0.92)]
-    normal, colour_blind = _oklab(rgb, np.eye(3)), _oklab(rgb, np.array(NO_GREEN))
-    chosen = [int(np.abs(rgb - FIRST).sum(axis=1).argmin())]
-    nearest = np.full(len(rgb), np.inf)
-    while len(chosen) < DISTINCT:
-        gap, gap_blind = (np.linalg.norm(lab - lab[chosen[-1]], axis=1) for lab in (normal, colour_blind))
-        nearest = np.minimum(nearest, gap + 0.5 * gap_blind)
-        chosen.append(int(nearest.argmax()))
-    return np.asarray(rgb[chosen].astype(np.uint8))
+def _shade(hue: int, instance: int) -> Colour:
+    lightness, chroma, angle = HUES[hue]
+    turn, place = divmod(instance % (2 * len(LIGHTER)), len(LIGHTER))
+    step = LIGHTER[place]
+    if lightness + step > LIGHTEST:  # no room above: go on below
+        step = -step - max(LIGHTER)
+    return _rgb(lightness + step, chroma, PALER**turn, radians(angle))
 
 
-def _oklab(rgb: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
-    linear = ((rgb / 255 + 0.055) / 1.055) ** 2.4
-    cones = np.cbrt((linear @ eye.T).clip(0) @ np.array(CONES).T)
-    return np.asarray(cones @ np.array(OKLAB).T)
+def _rgb(lightness: float, chroma: float, share: float, angle: float) -> Colour:
+    """A share of the chroma, or of the largest that a screen can show at this lightness and hue."""
+    while not _shows(_linear(lightness, chroma, angle)):
+        chroma *= 0.97
+    linear = _linear(lightness, share * chroma, angle).clip(0, 1)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    red, green, blue = np.round(255 * encoded).astype(int).tolist()
+    return red, green, blue
 
 
-BACKGROUND = (128, 128, 128)
-"""Colour of points without an object."""
+def _linear(lightness: float, chroma: float, angle: float) -> NDArray[np.float64]:
+    oklab = np.array([lightness, chroma * cos(angle), chroma * sin(angle)])
+    return np.asarray(LINEAR_RGB @ (CONE_ROOTS @ oklab) ** 3)
+
+
+def _shows(linear: NDArray[np.float64]) -> bool:
+    return bool(((linear > -0.001) & (linear < 1.001)).all())

@@ -14,7 +14,7 @@ from ldls.errors import InputError, LimitError, ParameterError, RecoveredFileWar
 from ldls.io.labelled_bag import LabelledBag
 from ldls.io.ros.bags import open_bag
 from ldls.io.ros.messages import Header
-from ldls.palette import BACKGROUND, palette
+from ldls.palette import BACKGROUND, instance_colours
 
 KINDS = ("rosbag1", "rosbag2", "mcap")
 HEADER = Header(1_700_000_000_123_456_789, "velodyne")
@@ -46,7 +46,7 @@ def test_labels_come_back(tmp_path, result, kind):
     assert kinds == [np.uint32, np.uint8, np.float32, np.float32]
     assert set(cloud.fields["class_id"]) == {0, 1, 3}
     colours = cloud.fields["rgb"].view(np.uint32)
-    for label, (red, green, blue) in enumerate([BACKGROUND, *palette(2).tolist()]):
+    for label, (red, green, blue) in enumerate([BACKGROUND, *instance_colours([1, 3]).tolist()]):
         assert set(colours[np.maximum(result.labels, 0) == label]) == {red << 16 | green << 8 | blue}
 
 

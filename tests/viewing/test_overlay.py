@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from ldls.viewing import overlay, palette
+from ldls.palette import instance_colours
+from ldls.viewing import overlay
 from ldls.viewing.tags import place_tags
 
 NAMES = ["car 0.98", "person 0.91"]
+CATEGORIES = [3, 1]
 MASKS = [(20, 10, np.ones((30, 60), bool)), (25, 200, np.ones((40, 15), bool))]
 
 
@@ -21,32 +23,32 @@ def _street_photo() -> np.ndarray:
 def test_a_labelled_point_has_its_instances_colour(scale: int | None) -> None:
     uv_px = np.array([[30.0, 45.0], [207.2, 60.4], [0.0, 0.0], [299.0, 99.0]])
     labels = np.array([1, 2, 1, 2], np.int32)
-    picture = overlay(_street_photo(), MASKS, uv_px, labels, NAMES, scale=scale)
+    picture = overlay(_street_photo(), MASKS, uv_px, labels, NAMES, CATEGORIES, scale=scale)
     enlarged = picture.width // 300
     assert picture.size == (300 * enlarged, 100 * enlarged)
     for (u, v), label in zip(uv_px, labels, strict=True):
         at = (int((u + 0.5) * enlarged), int((v + 0.5) * enlarged))
-        assert picture.getpixel(at) == tuple(palette(2)[label - 1])
+        assert picture.getpixel(at) == tuple(instance_colours(CATEGORIES)[label - 1])
 
 
 def test_the_default_scale_makes_the_picture_wide_enough() -> None:
     empty = np.empty((0, 2)), np.empty(0, np.int32)
-    assert overlay(_street_photo(), [], *empty, []).width == 1800
-    assert overlay(np.zeros((10, 2000, 3), np.uint8), [], *empty, []).width == 2000
+    assert overlay(_street_photo(), [], *empty, [], []).width == 1800
+    assert overlay(np.zeros((10, 2000, 3), np.uint8), [], *empty, [], []).width == 2000
 
 
 def test_background_points_leave_the_image_visible() -> None:
     uv_px = np.stack(np.meshgrid(np.arange(300.0), np.arange(100.0)), axis=-1).reshape(-1, 2)[::7]
     nothing = np.empty((0, 2)), np.empty(0, np.int32)
-    without = np.asarray(overlay(_street_photo(), [], *nothing, []), np.float64)
+    without = np.asarray(overlay(_street_photo(), [], *nothing, [], []), np.float64)
     labels = np.zeros(len(uv_px), np.int32)
-    with_points = np.asarray(overlay(_street_photo(), [], uv_px, labels, []), np.float64)
+    with_points = np.asarray(overlay(_street_photo(), [], uv_px, labels, [], []), np.float64)
     assert 0 < np.abs(with_points - without).mean() < 10
 
 
 def test_masks_and_names_must_agree_in_number() -> None:
     with pytest.raises(ValueError, match="zip"):
-        overlay(_street_photo(), MASKS, np.empty((0, 2)), np.empty(0, np.int32), NAMES[:1])
+        overlay(_street_photo(), MASKS, np.empty((0, 2)), np.empty(0, np.int32), NAMES[:1], CATEGORIES)
 
 
 @pytest.mark.parametrize(
@@ -78,16 +80,3 @@ def test_a_tag_gives_way_to_what_is_drawn() -> None:
 
 def test_a_tag_without_room_is_left_out() -> None:
     assert place_tags([(0, 0, 9, 9)], [(80, 16)], np.zeros((20, 40), bool), (40, 20)) == [None]
-
-
-@pytest.mark.parametrize("n", [0, 1, 19, 60, 300])
-def test_palette_is_the_start_of_a_longer_one(n: int) -> None:
-    assert palette(n).shape == (n, 3)
-    np.testing.assert_array_equal(palette(n), palette(400)[:n])
-
-
-def test_palette_colours_are_vivid_and_apart() -> None:
-    colours = palette(40).astype(int)
-    assert (np.ptp(colours, axis=1) > 60).all()
-    gaps = np.abs(colours[:, None] - colours).sum(axis=2) + 1000 * np.eye(40)
-    assert gaps.min() > 40

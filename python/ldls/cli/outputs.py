@@ -79,4 +79,5 @@ def picture_of(
     if image is None:
         image = np.full((*masks.image_size, 3), CANVAS, np.uint8)
     crops = ((*mask.bounding_box[:2], mask.crop()) for mask in masks)
-    return overlay(image, crops, uv_px, labels, [f"{mask.name} {mask.score:.2f}" for mask in masks])
+    names = [f"{mask.name} {mask.score:.2f}" for mask in masks]
+    return overlay(image, crops, uv_px, labels, names, masks.categories.tolist())

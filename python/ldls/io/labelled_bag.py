@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import LimitError, UnsupportedFormatError
+from ldls.io.labeled_points import colors
 from ldls.io.ros.bags import Topic, open_bag
 from ldls.io.ros.messages import POINTS, Header
 from ldls.io.ros.point_cloud2 import encode
 from ldls.io.ros.writer import BagWriter
-from ldls.palette import BACKGROUND, palette
 
 if TYPE_CHECKING:
     from ldls.segmentation import Segmentation
@@ -118,8 +118,7 @@ def labelled_columns(result: Segmentation) -> dict[str, NDArray[Any]]:
     categories = result.categories
     if categories.size and categories.max() > HIGHEST_CLASS:
         raise LimitError(f"class_id: category {categories.max()} is beyond the {HIGHEST_CLASS} that a byte holds")
-    # label -1, out of view, picks the last entry
-    colours = np.vstack([[BACKGROUND], palette(len(result.instances)), [BACKGROUND]])[result.labels].astype(np.uint32)
+    colours = colors(result).astype(np.uint32)
     packed = colours[:, 0] << 16 | colours[:, 1] << 8 | colours[:, 2]
     columns: dict[str, NDArray[Any]] = {
         name: result.points[:, column].astype(np.float32)

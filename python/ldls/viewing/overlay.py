@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
 
-from ldls.palette import palette
-from ldls.viewing.tags import Colour, Tag, draw_tags
+from ldls.palette import Colour, instance_colours
+from ldls.viewing.tags import Tag, draw_tags
 
 MIN_WIDTH_PX = 1800
 BACKGROUND: Colour = (225, 225, 225)
@@ -21,12 +21,14 @@ def overlay(
     uv_px: NDArray[np.floating],
     labels: NDArray[np.int32],
     names: Sequence[str],
+    categories: Sequence[int],
     *,
     scale: int | None = None,
 ) -> Image.Image:
     """Return `image` (H, W, 3), enlarged `scale` times, with its instances drawn on it.
 
-    `masks` yields (top, left, crop) for instance 1, 2, ...; `names` has a tag for each. `uv_px`
+    `masks` yields (top, left, crop) for instance 1, 2, ...; `names` has a tag for each
+    and `categories` its category id. `uv_px`
     (n, 2) are points' pixel positions (centres at integers), `labels` (n,) their instances, 0 the
     background. By default the scale makes the picture at least 1800 pixels wide.
     """
@@ -34,7 +36,7 @@ def overlay(
     picture = _subdued(image, scale)
     pen_px = max(picture.width / 1240, 1)  # pictures of one width look alike
     covered = np.zeros(image.shape[:2], bool)
-    colours: list[Colour] = [(int(r), int(g), int(b)) for r, g, b in palette(len(names))]
+    colours: list[Colour] = [(int(r), int(g), int(b)) for r, g, b in instance_colours(categories)]
     tags = []
     for (top, left, crop), colour, name in zip(masks, colours, names, strict=True):
         bottom, right = top + crop.shape[0], left + crop.shape[1]

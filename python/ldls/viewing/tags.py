@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from ldls.palette import Colour
+
 I64 = NDArray[np.int64]
-Colour = tuple[int, int, int]
 Box = tuple[int, int, int, int]  # left, top, right, bottom, in pixels of the picture
 
 
