@@ -98,7 +98,7 @@ class Camera:
         """
         projection, transform = kitti.read_calibration(path, camera=camera)
         found = FoundCamera(place=str(path), projection=projection, T_camera_lidar=transform, image_size=image_size)
-        return cls._from_found(found)
+        return cls.from_found(found)
 
     @classmethod
     def from_kitti_raw(cls, folder: str | PathLike[str], *, camera: int = 2) -> Self:
@@ -112,7 +112,7 @@ class Camera:
             CalibrationError: A key is missing or doubled, or a line has too few or too many numbers.
             FileNotFoundError: A file is missing.
         """
-        return cls._from_found(kitti_raw.read(folder, camera))
+        return cls.from_found(kitti_raw.read(folder, camera))
 
     @classmethod
     def from_opencv(cls, path: str | PathLike[str], T_camera_lidar: ArrayLike, *, fisheye: bool = False) -> Self:
@@ -128,7 +128,7 @@ class Camera:
             CalibrationError: It is not YAML, a key is missing, or a value cannot be a camera's.
             FileNotFoundError: There is no such file.
         """
-        return cls._from_found(opencv_yaml.read(path, _transform("T_camera_lidar", T_camera_lidar), fisheye=fisheye))
+        return cls.from_found(opencv_yaml.read(path, _transform("T_camera_lidar", T_camera_lidar), fisheye=fisheye))
 
     @classmethod
     def from_kalibr(
@@ -154,7 +154,7 @@ class Camera:
         """
         to_camera = None if T_camera_lidar is None else _transform("T_camera_lidar", T_camera_lidar)
         to_imu = None if T_imu_lidar is None else _transform("T_imu_lidar", T_imu_lidar)
-        return cls._from_found(kalibr.read(path, camera, to_camera, to_imu))
+        return cls.from_found(kalibr.read(path, camera, to_camera, to_imu))
 
     @classmethod
     def from_camera_info(cls, message: object, T_camera_lidar: ArrayLike, *, rectified: bool = False) -> Self:
@@ -170,7 +170,7 @@ class Camera:
         Raises:
             CalibrationError: The camera is not calibrated, or a field is missing or cannot be a camera's.
         """
-        return cls._from_found(
+        return cls.from_found(
             camera_info.read(message, _transform("T_camera_lidar", T_camera_lidar), rectified=rectified)
         )
 
@@ -197,16 +197,22 @@ class Camera:
             CalibrationError: A key is missing, or a value has the wrong size or is no rotation.
         """
         records = (calibrated_camera, ego_pose_camera, calibrated_lidar, ego_pose_lidar)
-        return cls._from_found(nuscenes.read(*records, image_size))
+        return cls.from_found(nuscenes.read(*records, image_size))
 
     @classmethod
-    def _from_found(cls, found: FoundCamera) -> Self:
+    def from_found(cls, found: FoundCamera) -> Self:
+        """Camera of what a reader of calibrations found.
+
+        Raises:
+            CalibrationError: It cannot be a camera; the message begins with the file.
+        """
         try:
             return cls(
                 projection=found.projection,
                 T_camera_lidar=found.T_camera_lidar,
                 distortion=found.distortion,
                 image_size=found.image_size,
+                min_depth_m=found.min_depth_m,
             )
         except CalibrationError as error:
             raise CalibrationError(f"{found.place}: {error}") from None

@@ -20,6 +20,7 @@ class FoundCamera:
         T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates.
         distortion: How the lens departs from a pinhole.
         image_size: (height, width) in pixels, if known.
+        min_depth_m: Points at this depth or nearer are not in view, in metres.
     """
 
     place: str
@@ -27,3 +28,4 @@ class FoundCamera:
     T_camera_lidar: NDArray[np.float64]
     distortion: Distortion = field(default_factory=Distortion)
     image_size: tuple[int, int] | None = None
+    min_depth_m: float = 0.1

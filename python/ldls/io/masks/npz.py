@@ -35,7 +35,7 @@ def read(path: str | PathLike[str]) -> MaskRecords:
     arrays = read_npz(path)
     try:
         if arrays.keys() >= OWN_ARRAYS:
-            return _from_runs(fspath(path), arrays)
+            return records_of(fspath(path), arrays)
         if arrays.keys() >= {"masks", "class_ids", "scores"}:
             return _from_research_code(fspath(path), arrays)
     except LimitError as error:
@@ -60,13 +60,14 @@ def write(path: str | PathLike[str], masks: InstanceMasks, *, layout: Literal["r
     Raises:
         MaskError: The research code does not know a category.
     """
-    layouts = {"runs": _runs, "research": _research_arrays}
+    layouts = {"runs": mask_arrays, "research": _research_arrays}
     if layout not in layouts:
         raise ParameterError(f"layout: got {layout!r}, expected {' or '.join(layouts)}")
     write_npz(path, layouts[layout](masks))
 
 
-def _runs(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
+def mask_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
+    """Categories, scores, names and run lengths, each array by its name in the file."""
     runs = [mask.rle.runs() for mask in masks]
     return {
         "size": np.array(masks.image_size, np.int64),
@@ -79,7 +80,13 @@ def _runs(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
     }
 
 
-def _from_runs(source: str, arrays: dict[str, NDArray[Any]]) -> MaskRecords:
+def records_of(source: str, arrays: dict[str, NDArray[Any]]) -> MaskRecords:
+    """The masks of arrays that `mask_arrays` made.
+
+    Raises:
+        MaskError: They do not fit one another.
+        KeyError: One is missing.
+    """
     height, width = checked_size(arrays["size"].tolist())
     runs, counts = arrays["runs"], arrays["run_counts"]
     if runs.dtype != np.uint32 or runs.ndim != 1 or counts.dtype.kind not in "iu" or counts.ndim != 1:

@@ -1,0 +1,121 @@
+"""Segmentations come back from their files as they were, and files that are not whole are refused."""
+
+import numpy as np
+import pytest
+
+import ldls
+from ldls.io.npz import read_npz, write_npz
+
+PLAIN = ("labels", "diffused_labels", "confidence", "in_view", "points", "categories")
+
+
+def same(one: ldls.Segmentation, other: ldls.Segmentation) -> None:
+    for name in PLAIN:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        assert getattr(one, name).dtype == getattr(other, name).dtype
+    assert (one.instances, one.params, one.report) == (other.instances, other.params, other.report)
+    assert dict(one.timings) == dict(other.timings)
+    for seen, other_seen in zip(one.views, other.views, strict=True):
+        for name in ("in_view", "pixels", "labels"):
+            np.testing.assert_array_equal(getattr(seen, name), getattr(other_seen, name))
+        camera, other_camera = seen.view.camera, other_seen.view.camera
+        np.testing.assert_array_equal(camera.projection, other_camera.projection)
+        np.testing.assert_array_equal(camera.T_camera_lidar, other_camera.T_camera_lidar)
+        assert camera.distortion == other_camera.distortion
+        assert (camera.image_size, camera.min_depth_m) == (other_camera.image_size, other_camera.min_depth_m)
+        assert seen.view.name == other_seen.view.name
+        np.testing.assert_array_equal(seen.view.masks.to_array(), other_seen.view.masks.to_array())
+        np.testing.assert_array_equal(seen.view.masks.scores, other_seen.view.masks.scores)
+        assert seen.view.masks.names == other_seen.view.masks.names
+
+
+def through_file(result: ldls.Segmentation, path) -> ldls.Segmentation:
+    result.save(path)
+    return ldls.Segmentation.from_npz(path)
+
+
+@pytest.fixture
+def scene(small_scene):
+    points, masks, camera = small_scene
+    return np.vstack([points, [[0, 0, -5], [np.nan, 0, 1]]]).astype(np.float32), masks, camera
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_one_camera(scene, tmp_path, dtype):
+    points, masks, camera = scene
+    result = ldls.segment(points.astype(dtype), masks, camera, params=ldls.Params(iterations=None, threads=1))
+    same(through_file(result, tmp_path / "a.npz"), result)
+
+
+def test_a_distorted_camera_of_known_size_with_a_name(scene, tmp_path):
+    points, masks, _ = scene
+    camera = ldls.Camera(
+        projection=[[100, 0, 40], [0, 100, 30], [0, 0, 1]],
+        distortion=ldls.Distortion("plumb_bob", (0.1, -0.02, 0.001, 0.002, 0.0)),
+        image_size=(60, 80),
+        min_depth_m=0.5,
+    )
+    result = ldls.segment(points, [ldls.View(masks, camera, "前")])
+    same(through_file(result, tmp_path / "a.npz"), result)
+
+
+def test_a_ring_whose_instances_merge(scene, tmp_path):
+    points, masks, camera = scene
+    second = ldls.InstanceMasks.from_array(masks.to_array()[::-1], categories=[3, 1], scores=[0.3, 0.95])
+    result = ldls.segment(points, [ldls.View(masks, camera, "left"), ldls.View(second, camera, "right")])
+    assert len(result.instances) == 2
+    same(through_file(result, tmp_path / "a.npz"), result)
+
+
+def test_no_points_and_no_masks(scene, tmp_path):
+    _, masks, camera = scene
+    nothing = masks.filter(min_score=1.0)
+    result = ldls.segment(np.zeros((0, 3), np.float32), nothing, camera)
+    same(through_file(result, tmp_path / "a.npz"), result)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        pytest.param({"labels": np.zeros(3, np.int32)}, r"labels: expected \(502,\) int32, got \(3,\)", id="too few"),
+        pytest.param({"labels": np.full(502, 3, np.int32)}, "labels: expected -1 to 2, got 3", id="unknown instance"),
+        pytest.param({"confidence": np.full(502, np.nan, np.float32)}, "confidence: expected 0 to 1", id="NaN"),
+        pytest.param({"in_view": np.array([502])}, "in_view: expected 0 to 501", id="row beyond the end"),
+        pytest.param({"points": np.zeros((502, 2))}, "points: expected shape", id="points without z"),
+        pytest.param({"params": np.array("{}x")}, "Extra data", id="not JSON"),
+        pytest.param({"params": np.array('{"neighbors": 0}')}, "neighbors", id="parameters out of range"),
+        pytest.param({"report": np.array("{}")}, "empty_masks", id="report without fields"),
+        pytest.param({"camera": np.array('{"projection": 1}')}, "image_size", id="camera without fields"),
+        pytest.param({"masks_runs": np.zeros(1, np.uint32)}, "run_counts sum to", id="masks cut off"),
+        pytest.param({"object_name": np.array(["person"])}, "zip", id="an instance without a name"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(scene, tmp_path, spoil, message):
+    path = tmp_path / "a.npz"
+    ldls.segment(*scene).save(path)
+    write_npz(path, read_npz(path) | spoil)
+    with pytest.raises(ldls.LdlsError, match=message) as error:
+        ldls.Segmentation.from_npz(path)
+    assert str(error.value).startswith(str(path))
+
+
+def test_a_missing_array_is_named(scene, tmp_path):
+    path = tmp_path / "a.npz"
+    ldls.segment(*scene).save(path)
+    write_npz(path, {name: array for name, array in read_npz(path).items() if name != "view_names"})
+    with pytest.raises(ldls.CorruptFileError, match="view_names"):
+        ldls.Segmentation.from_npz(path)
+
+
+def test_other_files_are_refused_by_what_they_are(scene, tmp_path):
+    scene[1].save(tmp_path / "masks.npz")
+    with pytest.raises(ldls.UnsupportedFormatError, match=r"expected those of Segmentation.save"):
+        ldls.Segmentation.from_npz(tmp_path / "masks.npz")
+    ldls.segment(*scene).save(tmp_path / "old.npz")
+    arrays = read_npz(tmp_path / "old.npz")
+    del arrays["points"]
+    write_npz(tmp_path / "old.npz", arrays)
+    with pytest.raises(ldls.UnsupportedFormatError, match="segment the frame again"):
+        ldls.Segmentation.from_npz(tmp_path / "old.npz")
+    with pytest.raises(FileNotFoundError):
+        ldls.Segmentation.from_npz(tmp_path / "none.npz")
