@@ -330,3 +330,23 @@ def test_a_bug_in_a_worker_is_an_internal_error_and_the_next_call_works(small_sc
         ldls._ldls.panic_in_worker()
     assert capfd.readouterr().err == ""
     assert len(ldls.segment(points, masks, camera).labels) == len(points)
+
+
+def test_direct_labels_are_those_of_the_nearest_pixels(small_scene):
+    points, masks, camera = small_scene
+    points = np.vstack([points, [[0, 0, -5]]]).astype(np.float32)
+    result = ldls.segment(points, masks, camera)
+    pixels = np.floor(result.pixels + 0.5).astype(int)
+    expected = np.full(len(points), -1)
+    covered = masks.to_array()[:, pixels[:, 1], pixels[:, 0]]
+    expected[result.in_view] = np.where(covered.any(axis=0), covered.argmax(axis=0) + 1, 0)
+    np.testing.assert_array_equal(result.direct_labels, expected)
+    assert (result.direct_labels == -1).any() and (result.direct_labels != result.labels).any()
+
+
+def test_direct_labels_of_a_ring_are_those_of_the_first_camera_that_sees_an_instance(small_scene):
+    points, masks, camera = small_scene
+    first, second = masks.select([0]), masks.select([1])
+    ring = ldls.segment(points, [ldls.View(first, camera), ldls.View(second, camera)])
+    alone = ldls.segment(points, masks, camera)
+    np.testing.assert_array_equal(ring.direct_labels, alone.direct_labels)

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls import _ldls
 from ldls.camera import Camera
 from ldls.cloud import Points, as_points
 from ldls.errors import CorruptFileError, InputError, LdlsError
@@ -148,6 +149,21 @@ class Segmentation:
         # label -1 picks the last entry
         by_label = np.array([0, *(instance.category for instance in self.instances), 0], np.int32)
         return by_label[self.labels]
+
+    @cached_property
+    def direct_labels(self) -> NDArray[np.int32]:
+        """(N,) int32: direct projection, for comparison: the label of the pixel nearest to each point, -1 out of view.
+
+        Of several masks that cover the pixel, the first counts; of several cameras, the first that sees an instance.
+        """
+        labels = np.full(len(self.labels), -1, np.int32)
+        for seen in reversed(self.views):
+            # label 0, the background, stays
+            names = np.concatenate([np.zeros(1, np.int32), seen.labels])
+            found = names[_ldls.direct_labels(seen.pixels, seen.view.masks.core)]
+            kept = np.maximum(labels[seen.in_view], 0)
+            labels[seen.in_view] = np.where(found > 0, found, kept)
+        return labels
 
     @cached_property
     def objects(self) -> tuple[SegmentedObject, ...]:

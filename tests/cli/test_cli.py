@@ -37,7 +37,7 @@ def test_demo_writes_results_and_beats_direct_projection(demo):
     folder, outcome = demo
     assert outcome.exit_code == 0, outcome.output
     assert {path.name for path in folder.iterdir()} == {
-        "demo.npz", "demo.label", "demo.ply", "demo.png", "input",
+        "demo.npz", "demo.label", "demo.ply", "demo.png", "demo-birds-eye.png", "demo-comparison.png", "input",
     }  # fmt: skip
     (mean,) = (line for line in outcome.output.splitlines() if "mean" in line)
     direct, method = (float(cell) for cell in mean.replace("│", " ").split()[2:4])
@@ -48,7 +48,7 @@ def test_demo_writes_results_and_beats_direct_projection(demo):
 
 def test_segment_on_the_files_of_the_demo_gives_the_same(demo, tmp_path):
     folder, _ = demo
-    outcome = run(app, arguments(folder, tmp_path))
+    outcome = run(app, arguments(folder, tmp_path, picture=tmp_path / "seen.png"))
     assert outcome.exit_code == 0, outcome.output
     assert "objects found" in outcome.output
     assert "diffusion" in outcome.output
@@ -56,6 +56,8 @@ def test_segment_on_the_files_of_the_demo_gives_the_same(demo, tmp_path):
         np.testing.assert_array_equal(stored["labels"], expected["labels"])
     with Image.open(tmp_path / "points.png") as picture, Image.open(folder / "demo.png") as first:
         assert picture.tobytes() == first.tobytes()
+    for kind in ("", "-birds-eye", "-comparison"):
+        assert (tmp_path / f"seen{kind}.png").read_bytes() == (folder / f"demo{kind}.png").read_bytes()
 
 
 def test_formats_can_be_chosen_and_an_image_is_not_needed(demo, tmp_path):

@@ -1,54 +1,134 @@
-"""The overlay puts colours and names where they belong."""
+"""Overlays put colours and names where they belong."""
 
 import numpy as np
 import pytest
 
-from ldls.palette import instance_colours
-from ldls.viewing import overlay
+import ldls
+from ldls.palette import BACKGROUND, instance_colours
+from ldls.viewing import masks_overlay, overlay
+from ldls.viewing.overlay import MARK, shown_overlay
+from ldls.viewing.shown import images_of, shown
 from ldls.viewing.tags import place_tags
 
-NAMES = ["car 0.98", "person 0.91"]
-CATEGORIES = [3, 1]
-MASKS = [(20, 10, np.ones((30, 60), bool)), (25, 200, np.ones((40, 15), bool))]
+
+@pytest.fixture
+def result(small_scene):
+    points, masks, camera = small_scene
+    points = np.vstack([points, [[0, 0, -5], [np.nan, 0, 0]]]).astype(np.float32)
+    return ldls.segment(points, masks, camera)
 
 
-def _street_photo() -> np.ndarray:
-    return np.random.default_rng(0).integers(0, 255, (100, 300, 3), dtype=np.uint8)
+def photo(height: int = 60, width: int = 80) -> np.ndarray:
+    return np.random.default_rng(0).integers(0, 255, (height, width, 3), dtype=np.uint8)
+
+
+def pixels_at(picture, result, view: int = 0) -> np.ndarray:
+    """(n, 3) colours of the picture at the points of a view."""
+    seen = result.views[view]
+    scale = picture.width / seen.view.masks.width
+    x, y = np.floor((seen.pixels + 0.5) * scale).astype(int).T
+    return np.asarray(picture)[y, x]
+
+
+@pytest.mark.parametrize("stage", ["direct", "diffused", "final"])
+def test_points_have_their_instances_colours(result, stage) -> None:
+    picture = overlay(result, photo(), stage=stage)
+    labels = {"direct": result.direct_labels, "diffused": result.diffused_labels, "final": result.labels}[stage]
+    labels = labels[result.in_view]
+    # the nearest point at a place is on top: look at points that no other one is drawn near to
+    at = result.pixels
+    apart = np.linalg.norm(at[:, None] - at[None], axis=2)
+    np.fill_diagonal(apart, np.inf)
+    alone = (apart.min(axis=1) > 0.3) & (labels > 0)
+    assert alone.sum() > 20
+    expected = instance_colours([1, 3])[labels[alone] - 1].astype(int)
+    shown_colours = pixels_at(picture, result)[alone].astype(int)
+    # a few lie beneath a name
+    assert (np.abs(shown_colours - expected).max(axis=1) <= 2).mean() > 0.9
 
 
 @pytest.mark.parametrize(
-    "scale",
-    [pytest.param(None, id="enlarged to a legible width"), pytest.param(1, id="as it is")],
+    ("size", "width_px"),
+    [
+        pytest.param((60, 80), None, id="enlarged"),
+        pytest.param((60, 80), 97, id="to an odd width"),
+        pytest.param((1200, 3840), None, id="reduced"),
+    ],
 )
-def test_a_labelled_point_has_its_instances_colour(scale: int | None) -> None:
-    uv_px = np.array([[30.0, 45.0], [207.2, 60.4], [0.0, 0.0], [299.0, 99.0]])
-    labels = np.array([1, 2, 1, 2], np.int32)
-    picture = overlay(_street_photo(), MASKS, uv_px, labels, NAMES, CATEGORIES, scale=scale)
-    enlarged = picture.width // 300
-    assert picture.size == (300 * enlarged, 100 * enlarged)
-    for (u, v), label in zip(uv_px, labels, strict=True):
-        at = (int((u + 0.5) * enlarged), int((v + 0.5) * enlarged))
-        assert picture.getpixel(at) == tuple(instance_colours(CATEGORIES)[label - 1])
+def test_pictures_have_the_width_asked_for(small_scene, size, width_px) -> None:
+    points, _, camera = small_scene
+    masks = ldls.InstanceMasks.from_boxes([[1, 1, 9, 9]], size, categories=[3])
+    picture = overlay(ldls.segment(points, masks, camera), photo(*size), width_px=width_px)
+    assert picture.width == (width_px or 1800)
+    assert picture.height == round(size[0] * picture.width / size[1])
 
 
-def test_the_default_scale_makes_the_picture_wide_enough() -> None:
-    empty = np.empty((0, 2)), np.empty(0, np.int32)
-    assert overlay(_street_photo(), [], *empty, [], []).width == 1800
-    assert overlay(np.zeros((10, 2000, 3), np.uint8), [], *empty, [], []).width == 2000
+def test_background_points_leave_the_image_visible(small_scene) -> None:
+    points, masks, camera = small_scene
+    nothing = masks.select([])
+    with_points = overlay(ldls.segment(points, nothing, camera), photo())
+    without = overlay(ldls.segment(points[:0], nothing, camera), photo())
+    change = np.abs(np.asarray(with_points, float) - np.asarray(without, float)).mean()
+    assert 0 < change < 10
 
 
-def test_background_points_leave_the_image_visible() -> None:
-    uv_px = np.stack(np.meshgrid(np.arange(300.0), np.arange(100.0)), axis=-1).reshape(-1, 2)[::7]
-    nothing = np.empty((0, 2)), np.empty(0, np.int32)
-    without = np.asarray(overlay(_street_photo(), [], *nothing, [], []), np.float64)
-    labels = np.zeros(len(uv_px), np.int32)
-    with_points = np.asarray(overlay(_street_photo(), [], uv_px, labels, [], []), np.float64)
-    assert 0 < np.abs(with_points - without).mean() < 10
+def test_marked_points_have_a_white_rim(result) -> None:
+    marked = result.labels == 1
+    plain, rimmed = (
+        shown_overlay(shown(result, "final", chosen), images_of(result, None), 1800) for chosen in (None, marked)
+    )
+    changed = np.any(np.asarray(plain) != np.asarray(rimmed), axis=2)
+    white = np.all(np.asarray(rimmed) == MARK, axis=2)
+    assert (white & changed).sum() > 100
+    # the other object is as it was
+    assert not changed[:, 1000:].any()
 
 
-def test_masks_and_names_must_agree_in_number() -> None:
-    with pytest.raises(ValueError, match="zip"):
-        overlay(_street_photo(), MASKS, np.empty((0, 2)), np.empty(0, np.int32), NAMES[:1], CATEGORIES)
+def test_a_ring_has_a_picture_a_camera_with_its_name(small_scene) -> None:
+    points, masks, camera = small_scene
+    views = [ldls.View(masks, camera, name) for name in ("left", "right", "rear")]
+    result = ldls.segment(points, views)
+    picture = overlay(result, [photo(), None, photo()], width_px=400)
+    assert picture.width == 2 * 400 + 6
+    assert picture.height == 2 * (300 + 30)
+
+
+@pytest.mark.parametrize(
+    ("images", "message"),
+    [
+        pytest.param([photo(), photo()], "images: got 2, expected 1", id="more images than cameras"),
+        pytest.param(photo(80, 60), r"expected \(60, 80, 3\) uint8, the size of the masks", id="swapped sides"),
+        pytest.param(photo().astype(float), "float64; read it with ldls.read_image", id="not uint8"),
+        pytest.param(photo()[..., 0], "images: got 60, expected 1", id="grey"),
+    ],
+)
+def test_images_that_do_not_fit_are_refused(result, images, message) -> None:
+    with pytest.raises(ldls.InputError, match=message):
+        overlay(result, images)
+
+
+def test_an_unknown_stage_is_refused(result) -> None:
+    with pytest.raises(ldls.ParameterError, match="stage: got 'diffuse', expected direct, diffused, final"):
+        overlay(result, stage="diffuse")
+
+
+def test_masks_alone_are_drawn_in_the_same_colours(small_scene) -> None:
+    _, masks, _ = small_scene
+    picture = np.asarray(masks_overlay(masks, photo())).astype(int)
+    middle = picture[30 * 1800 // 80, 23 * 1800 // 80]
+    colour = instance_colours([1])[0].astype(int)
+    grey = np.asarray(masks_overlay(masks.select([]), photo())).astype(int)[30 * 1800 // 80, 23 * 1800 // 80]
+    np.testing.assert_allclose(middle, 0.72 * grey + 0.28 * colour, atol=2)
+
+
+def test_masks_without_pixels_are_no_trouble(small_scene) -> None:
+    points, _, camera = small_scene
+    empty = ldls.InstanceMasks.from_array(np.zeros((2, 60, 80), bool), categories=[1, 3])
+    overlay(ldls.segment(points, empty, camera))
+
+
+def test_the_background_has_no_colour() -> None:
+    assert len(set(BACKGROUND)) == 1
 
 
 @pytest.mark.parametrize(
@@ -59,9 +139,10 @@ def test_masks_and_names_must_agree_in_number() -> None:
     ],
 )
 def test_tags_stay_apart_and_inside(boxes: list[tuple[int, int, int, int]]) -> None:
-    places = place_tags(boxes, [(80, 16)] * len(boxes), np.zeros((100, 200), bool), (400, 200))
+    taken = [(100, 20, 140, 40)]
+    places = place_tags(boxes, [(80, 16)] * len(boxes), np.zeros((100, 200), bool), (400, 200), taken=taken)
     canvas = np.zeros((200, 400), int)
-    for place in places:
+    for place in [*taken, *places]:
         assert place is not None
         left, top, right, bottom = place
         assert left >= 0 and top >= 0 and right <= 400 and bottom <= 200

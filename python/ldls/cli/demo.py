@@ -13,7 +13,7 @@ from rich.table import Table
 
 import ldls
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
-from ldls.cli.outputs import DEFAULT_OUTPUTS, write_outputs
+from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
 
 if TYPE_CHECKING:
     from ldls.simulation import SimulatedFrame
@@ -30,9 +30,11 @@ def demo(
 
     Builds a small street with cars, people and more, simulates a lidar sweep and the masks that a network would
     find, segments the sweep, and holds direct projection and the method against the scene's true labels. Writes the
-    results as `ldls segment` does, and the frame itself so that you can run that command on it.
+    results as `ldls segment` does, pictures (the image, the bird's-eye view, and the comparison with direct
+    projection), and the frame itself so that you can run that command on it.
     """
     from ldls.simulation import street_scene
+    from ldls.viewing import save_pictures
 
     frame = street_scene(seed)
     masks = ldls.InstanceMasks.from_array(
@@ -43,7 +45,9 @@ def demo(
     )
     camera = ldls.Camera(projection=frame.projection, T_camera_lidar=frame.T_camera_lidar)
     result = ldls.segment(frame.points, masks, camera)
-    written = write_outputs(out, "demo", result, frame.image, DEFAULT_OUTPUTS)
+    outputs = [output for output in DEFAULT_OUTPUTS if output is not Output.PNG]
+    written = write_outputs(out, "demo", result, frame.image, outputs)
+    written += save_pictures(out / "demo.png", result, frame.image)
     command = write_inputs(out, frame, masks)
 
     screen = console()

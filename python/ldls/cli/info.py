@@ -182,13 +182,12 @@ def write_picture(frame: Frame, path: Path) -> None:
     Raises:
         ParameterError: The frame has no image.
     """
-    from ldls.io.whole_file import whole_file
+    from ldls.viewing import save_picture
     from ldls.viewing.depth import depth_picture
 
     if not frame.images:
         raise ParameterError(f"--picture: frame {frame.name} has no image")
-    with whole_file(path) as file:
-        depth_picture(frame).save(file, "PNG")
+    save_picture(path, depth_picture(frame))
 
 
 def _value(text: str) -> str | int | bool | tuple[int, ...]:

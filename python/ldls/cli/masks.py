@@ -12,10 +12,8 @@ from rich.table import Table
 
 from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of, wanted
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.outputs import picture_of
 from ldls.errors import ParameterError
 from ldls.io import read_image
-from ldls.io.whole_file import whole_file
 from ldls.masks import InstanceMasks
 
 app = typer.Typer(help="Make, show and convert instance masks.", no_args_is_help=True)
@@ -174,11 +172,11 @@ def show(
 
 
 def _show(masks: InstanceMasks, pixels: np.ndarray | None, picture: Path | None) -> None:
+    from ldls.viewing import masks_overlay, save_picture
+
     console().print(mask_table(masks))
     if picture is not None:
-        drawn = picture_of(masks, pixels, np.zeros((0, 2)), np.zeros(0, np.int32))
-        with whole_file(picture) as file:
-            drawn.save(file, "PNG")
+        save_picture(picture, masks_overlay(masks, pixels))
         console().print(f"wrote {picture}", highlight=False, soft_wrap=True)
 
 

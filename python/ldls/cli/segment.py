@@ -60,6 +60,16 @@ def segment(
         list[Output] | None,
         typer.Option("--format", help="What to write; may be repeated.", show_default="npz, label, ply, png"),
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="NAME.png",
+            help="Write pictures: NAME.png, the image with masks and points; NAME-birds-eye.png; NAME-comparison.png, "
+            "direct projection beside the method.",
+            show_default=False,
+            dir_okay=False,
+        ),
+    ] = None,
     neighbors: Annotated[int, typer.Option(help="K: nearest neighbours a point.")] = 10,
     sigma: Annotated[float, typer.Option(help="Reach of point edges exp(-d^2/sigma), in square metres.")] = 1.0,
     pixel_weight: Annotated[float, typer.Option(help="lambda: weight of pixel edges.")] = 0.001,
@@ -113,6 +123,10 @@ def segment(
     result = segment_cloud(read_points(points), chosen, Camera.from_kitti(calib, camera=camera), params=params)
     name = points.stem.removesuffix(".pcd")
     written = write_outputs(out, name, result, pixels, formats or DEFAULT_OUTPUTS)
+    if picture is not None:
+        from ldls.viewing import save_pictures
+
+        written += save_pictures(picture, result, pixels)
     screen = console()
     screen.print(object_table(result.objects))
     screen.print(timing_table(result.timings))

@@ -1,107 +1,167 @@
 """The image with masks, labelled points and names drawn on it: the picture people judge by."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
-from math import ceil
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
 
+from ldls.masks import InstanceMask, InstanceMasks
 from ldls.palette import Colour, instance_colours
+from ldls.segmentation import Segmentation
+from ldls.view import SeenView
+from ldls.viewing.grid import grid
+from ldls.viewing.marks import disc, stamp
+from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of, shown
 from ldls.viewing.tags import Tag, draw_tags
 
-MIN_WIDTH_PX = 1800
+WIDTH_PX = 1800
+"""Width of a picture of one image."""
+TILE_PX = 960
+"""Width of each picture of several."""
 BACKGROUND: Colour = (225, 225, 225)
 HALO: Colour = (15, 15, 20)
+MARK: Colour = (255, 255, 255)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outline:
+    """A mask to be drawn."""
+
+    mask: InstanceMask
+    colour: Colour
+    name: str
 
 
 def overlay(
-    image: NDArray[np.uint8],
-    masks: Iterable[tuple[int, int, NDArray[np.bool_]]],
-    uv_px: NDArray[np.floating],
-    labels: NDArray[np.int32],
-    names: Sequence[str],
-    categories: Sequence[int],
+    result: Segmentation,
+    images: Images = None,
     *,
-    scale: int | None = None,
+    stage: Stage = "final",
+    width_px: int | None = None,
 ) -> Image.Image:
-    """Return `image` (H, W, 3), enlarged `scale` times, with its instances drawn on it.
+    """The camera image with masks, points in the colour of their instance, and names with labels.
 
-    `masks` yields (top, left, crop) for instance 1, 2, ...; `names` has a tag for each
-    and `categories` its category id. `uv_px`
-    (n, 2) are points' pixel positions (centres at integers), `labels` (n,) their instances, 0 the
-    background. By default the scale makes the picture at least 1800 pixels wide.
+    Args:
+        result: What to show.
+        images: (H, W, 3) uint8 RGB image; for several cameras one for each, None where there is none. Without an image
+            masks and points stand on a dark one.
+        stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
+        width_px: Width of the picture of an image; 1800 pixels by default, 960 each if there are several.
+
+    Raises:
+        InputError: There are more or fewer images than cameras, or one has not the size of the masks.
+        ParameterError: There is no such stage.
     """
-    scale = scale or ceil(MIN_WIDTH_PX / image.shape[1])
+    return shown_overlay(shown(result, stage), images_of(result, images), width_px)
+
+
+def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) -> Image.Image:
+    """The image with masks and their names and scores.
+
+    Raises:
+        InputError: The image has not the size of the masks.
+    """
+    colours = _as_colours(instance_colours(masks.categories.tolist()))
+    outlines = [
+        Outline(mask=mask, colour=colour, name=f"{mask.name} {mask.score:.2f}")
+        for mask, colour in zip(masks, colours, strict=True)
+    ]
+    image = image_like(image, masks.image_size)
+    return _with_tags(*_with_masks(image, outlines, WIDTH_PX / image.shape[1]))
+
+
+def shown_overlay(what: Shown, images: Sequence[NDArray[np.uint8]], width_px: int | None) -> Image.Image:
+    """The same of what is already chosen, marked points rimmed."""
+    views = what.result.views
+    width_px = width_px or (WIDTH_PX if len(views) == 1 else TILE_PX)
+    tiles = [_tile(what, seen, image, width_px) for seen, image in zip(views, images, strict=True)]
+    return tiles[0] if len(tiles) == 1 else grid(tiles, [seen.view.name for seen in views])
+
+
+def _tile(what: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
+    colours = _as_colours(what.colours)
+    outlines = [
+        Outline(mask=mask, colour=colours[label - 1], name=what.names[label - 1])
+        for mask, label in zip(seen.view.masks, seen.labels.tolist(), strict=True)
+    ]
+    scale = width_px / image.shape[1]
+    picture, tags, covered = _with_masks(image, outlines, scale)
+    return _with_tags(_with_points(picture, what, seen, scale), tags, covered)
+
+
+def _with_masks(
+    image: NDArray[np.uint8], outlines: Iterable[Outline], scale: float
+) -> tuple[Image.Image, list[Tag], NDArray[np.bool_]]:
     picture = _subdued(image, scale)
-    pen_px = max(picture.width / 1240, 1)  # pictures of one width look alike
     covered = np.zeros(image.shape[:2], bool)
-    colours: list[Colour] = [(int(r), int(g), int(b)) for r, g, b in instance_colours(categories)]
     tags = []
-    for (top, left, crop), colour, name in zip(masks, colours, names, strict=True):
-        bottom, right = top + crop.shape[0], left + crop.shape[1]
-        _draw_mask(picture, crop, (left * scale, top * scale), colour, scale, pen_px)
-        covered[top:bottom, left:right] |= crop
-        tags.append(Tag(name, colour, (left * scale, top * scale, right * scale, bottom * scale)))
-    _draw_points(picture, np.floor((uv_px + 0.5) * scale).astype(int), labels, colours, pen_px)
-    draw_tags(picture, tags, covered, pen_px)
+    for outline in outlines:
+        top, left, height, width = outline.mask.bounding_box
+        crop = outline.mask.crop()
+        box = (round(scale * left), round(scale * top), round(scale * (left + width)), round(scale * (top + height)))
+        if height:
+            _draw_mask(picture, crop, outline.colour, (left, top), scale)
+        covered[top : top + height, left : left + width] |= crop
+        tags.append(Tag(outline.name, outline.colour, box))
+    return picture, tags, covered
+
+
+def _with_points(picture: Image.Image, what: Shown, seen: SeenView, scale: float) -> Image.Image:
+    pen_px = _pen_px(picture)
+    canvas = np.array(picture)
+    # the farthest first, the nearest above them
+    distances = np.linalg.norm(what.result.points[seen.in_view, :3], axis=1)
+    order = np.argsort(-distances, kind="stable")
+    at_px = np.floor((seen.pixels[order] + 0.5) * scale).astype(np.int64)
+    labels, marked = what.labels[seen.in_view][order], what.marked[seen.in_view][order]
+    labelled = labels > 0
+    stamp(canvas, at_px[~labelled], BACKGROUND, disc(0.45 * pen_px, 0.5))
+    stamp(canvas, at_px[labelled & ~marked], HALO, disc(1.7 * pen_px, 0.55))
+    stamp(canvas, at_px[labelled & marked], MARK, disc(2.0 * pen_px))
+    stamp(canvas, at_px[labelled], what.colours_of(labels[labelled]), disc(1.1 * pen_px))
+    return Image.fromarray(canvas)
+
+
+def _with_tags(picture: Image.Image, tags: Sequence[Tag], covered: NDArray[np.bool_]) -> Image.Image:
+    draw_tags(picture, tags, covered, _pen_px(picture))
     return picture
 
 
-def _subdued(image: NDArray[np.uint8], scale: int) -> Image.Image:
+def _subdued(image: NDArray[np.uint8], scale: float) -> Image.Image:
     """Return the image, enlarged, darker and nearly grey: colour belongs to the labels."""
     picture = Image.fromarray(image)
     nearly_grey = Image.blend(picture.convert("L").convert("RGB"), picture, 0.3)
     darker = Image.blend(nearly_grey, Image.new("RGB", picture.size), 0.22)
-    return darker.resize((picture.width * scale, picture.height * scale), Image.Resampling.BICUBIC)
+    return darker.resize(_scaled(picture, scale), Image.Resampling.BICUBIC)
 
 
 def _draw_mask(
-    picture: Image.Image,
-    crop: NDArray[np.bool_],
-    corner_px: tuple[int, int],
-    colour: Colour,
-    scale: int,
-    pen_px: float,
+    picture: Image.Image, crop: NDArray[np.bool_], colour: Colour, corner: tuple[int, int], scale: float
 ) -> None:
     margin = 3  # for the outline
     small = Image.fromarray(np.pad(crop, margin).astype(np.uint8) * 255)
-    large = small.resize((small.width * scale, small.height * scale), Image.Resampling.BILINEAR)
+    large = small.resize(_scaled(small, scale), Image.Resampling.BILINEAR)
     inside = np.asarray(large.filter(ImageFilter.GaussianBlur(scale))) / 255
     # A blurred edge rises by 1 / (sqrt(2 pi) radius) a pixel, which gives the way to it in pixels.
     to_edge_px = np.abs(inside - 0.5) * 2.5 * scale
-    outline = (0.6 * pen_px + 0.5 - to_edge_px).clip(0, 1)
-    at_px = (corner_px[0] - margin * scale, corner_px[1] - margin * scale)
-    picture.paste(colour, at_px, _opacity(np.maximum(outline, 0.28 * (inside > 0.5))))
+    outline = (0.6 * _pen_px(picture) + 0.5 - to_edge_px).clip(0, 1)
+    at_px = (round((corner[0] - margin) * scale), round((corner[1] - margin) * scale))
+    opacity = np.maximum(outline, 0.28 * (inside > 0.5))
+    picture.paste(colour, at_px, Image.fromarray((opacity * 255).round().astype(np.uint8)))
 
 
-def _draw_points(
-    picture: Image.Image,
-    at_px: NDArray[np.int64],
-    labels: NDArray[np.int32],
-    colours: Sequence[Colour],
-    pen_px: float,
-) -> None:
-    labelled = labels > 0
-    own = [colours[m - 1] for m in labels[labelled]]
-    grey = [BACKGROUND] * (len(labels) - len(own))
-    _stamp(picture, at_px[~labelled], grey, _disc(0.45 * pen_px, 0.5))
-    _stamp(picture, at_px[labelled], [HALO] * len(own), _disc(1.7 * pen_px, 0.55))
-    _stamp(picture, at_px[labelled], own, _disc(1.1 * pen_px, 1.0))
+def _scaled(picture: Image.Image, scale: float) -> tuple[int, int]:
+    return max(round(picture.width * scale), 1), max(round(picture.height * scale), 1)
 
 
-def _disc(radius_px: float, opacity: float) -> Image.Image:
-    """Return the smooth opacity of a disc in the middle of an odd square."""
-    reach = ceil(radius_px + 0.5)
-    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    return _opacity((radius_px + 0.5 - np.hypot(x, y)).clip(0, 1) * opacity)
+def _pen_px(picture: Image.Image) -> float:
+    """Width of a thin line: pictures of one width look alike."""
+    return max(picture.width / 1240, 1)
 
 
-def _opacity(share: NDArray[np.floating]) -> Image.Image:
-    return Image.fromarray((share * 255).round().astype(np.uint8))
-
-
-def _stamp(picture: Image.Image, at_px: NDArray[np.int64], colours: Sequence[Colour], disc: Image.Image) -> None:
-    corners = at_px - disc.width // 2
-    for (x, y), colour in zip(corners.tolist(), colours, strict=True):
-        picture.paste(colour, (x, y), disc)
+def _as_colours(colours: NDArray[np.uint8]) -> list[Colour]:
+    return [(int(red), int(green), int(blue)) for red, green, blue in colours]

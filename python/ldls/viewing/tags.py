@@ -22,10 +22,19 @@ class Tag(NamedTuple):
     box: Box
 
 
-def draw_tags(picture: Image.Image, tags: Sequence[Tag], covered: NDArray[np.bool_], pen_px: float) -> None:
+def draw_tags(
+    picture: Image.Image,
+    tags: Sequence[Tag],
+    covered: NDArray[np.bool_],
+    pen_px: float,
+    *,
+    aversion: float = 4.0,
+    taken: Sequence[Box] = (),
+) -> None:
     """Draw tags onto the picture; one for which no room is left is not drawn.
 
-    `covered` (H, W), at the picture's size or a whole part of it, is where tags had better not be.
+    `covered` (H, W), of the picture's shape at any size, is where tags had better not be; `aversion` is how many of its
+    heights a tag goes aside rather than lie there. Tags stay clear of the boxes `taken`.
     """
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(size=12 * pen_px)
@@ -34,6 +43,8 @@ def draw_tags(picture: Image.Image, tags: Sequence[Tag], covered: NDArray[np.boo
         [(ceil(draw.textlength(tag.text, font) + 8 * pen_px), ceil(17 * pen_px)) for tag in tags],
         covered,
         picture.size,
+        aversion,
+        taken,
     )
     shown = [(tag, place) for tag, place in zip(tags, places, strict=True) if place]
     for tag, place in shown:
@@ -49,13 +60,15 @@ def place_tags(
     sizes: Sequence[tuple[int, int]],
     covered: NDArray[np.bool_],
     picture: tuple[int, int],
+    aversion: float = 4.0,
+    taken: Sequence[Box] = (),
 ) -> list[Box | None]:
     """Return where each tag goes: inside the picture and apart; None where no room is left."""
     cover = np.pad(covered.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     places: list[Box | None] = [None] * len(boxes)
     for index in sorted(range(len(boxes)), key=lambda i: -boxes[i][3]):  # the nearest chooses first
-        taken = [place for place in places if place]
-        places[index] = _best_place(boxes[index], sizes[index], picture, taken, cover)
+        own = [place for place in places if place]
+        places[index] = _best_place(boxes[index], sizes[index], picture, [*taken, *own], cover, aversion)
     return places
 
 
@@ -65,6 +78,7 @@ def _best_place(
     picture: tuple[int, int],
     taken: Sequence[Box],
     cover: I64,
+    aversion: float,
 ) -> Box | None:
     """Return the free place nearest to the top of `box`, rather farther off than over objects."""
     width, height = size
@@ -74,9 +88,11 @@ def _best_place(
     right, bottom = left + width, top + height
     aside_px = np.abs((left + right - box[0] - box[2]) / 2)
     off_px = np.abs(bottom + height // 4 - box[1])
-    scale = picture[0] // (cover.shape[1] - 1)
-    hidden = _covered_share(cover, left // scale, top // scale, right // scale, bottom // scale)
-    cost = np.hypot(aside_px, off_px) + 4 * height * hidden
+    across, down = (cover.shape[1] - 1) / picture[0], (cover.shape[0] - 1) / picture[1]
+    cells = (
+        (edges * share).astype(int) for edges, share in ((left, across), (top, down), (right, across), (bottom, down))
+    )
+    cost = np.hypot(aside_px, off_px) + aversion * height * _covered_share(cover, *cells)
     for low_x, low_y, high_x, high_y in taken:
         cost[(right >= low_x) & (left <= high_x) & (bottom >= low_y) & (top <= high_y)] = np.inf
     if not np.isfinite(cost).any():

@@ -1,0 +1,238 @@
+"""The cloud from above: labelled points, oriented boxes, names, and rings of equal range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, cos, floor, sin
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFilter, ImageFont
+
+from ldls.objects import SegmentedObject
+from ldls.palette import Colour
+from ldls.segmentation import Segmentation
+from ldls.viewing.grid import INK, PAPER
+from ldls.viewing.marks import disc, stamp
+from ldls.viewing.shown import Shown, Stage, shown
+from ldls.viewing.tags import Box, Tag, draw_tags
+
+WIDTH_PX, HEIGHT_PX = 1800, 1200
+"""Most that a picture measures."""
+LEAST_RANGE_M, MOST_RANGE_M = 10.0, 120.0
+MARGIN_M = 1.5
+RING_STEPS_M = (1, 2, 5, 10, 20, 50)
+MOST_RINGS = 7
+RINGS: Colour = (70, 70, 80)
+RANGES: Colour = (170, 170, 180)
+RIM_PX = 3
+"""Paper left around the range of a ring."""
+OUT_OF_VIEW: Colour = (66, 66, 76)
+BACKGROUND: Colour = (135, 135, 140)
+MARK: Colour = (255, 255, 255)
+PEN_PX = 1.15
+AVERSION = 40.0
+"""How many of its heights a name goes aside rather than lie on an object."""
+FINE = 2
+"""How much larger a picture is drawn than it becomes, so that slanting lines are smooth."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ground:
+    """The part of the ground that a picture shows, and where it lies in it.
+
+    Attributes:
+        forward: (2,) unit vector in the lidar frame that points up in the picture.
+        left_m, right_m, behind_m, ahead_m: Its edges, in metres from the lidar.
+        px_per_m: Scale.
+    """
+
+    forward: NDArray[np.float64]
+    left_m: float
+    right_m: float
+    behind_m: float
+    ahead_m: float
+    px_per_m: float
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the picture."""
+        across, along = self.right_m - self.left_m, self.ahead_m - self.behind_m
+        return round(across * self.px_per_m), round(along * self.px_per_m)
+
+    def at(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 2) places in the picture, right and down in pixels, of (n, 2) places on the ground in metres."""
+        sideways, ahead = _turned(xy, self.forward).T
+        return np.stack([sideways - self.left_m, self.ahead_m - ahead], axis=1) * self.px_per_m
+
+
+def birds_eye_view(
+    result: Segmentation, *, stage: Stage = "final", range_m: float | None = None, boxes: bool = True
+) -> Image.Image:
+    """The cloud from above, the first camera looking up: points, oriented boxes, names and rings of equal range.
+
+    Points that no camera sees are dark, the background is grey.
+
+    Args:
+        result: What to show.
+        stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
+        range_m: Farthest range shown, in metres; by default as far as the objects lie.
+        boxes: Whether to draw the boxes of the objects; they are those of the final labels.
+
+    Raises:
+        ParameterError: There is no such stage.
+    """
+    return shown_birds_eye_view(shown(result, stage), ground_of(result, range_m), boxes=boxes)
+
+
+def ground_of(
+    result: Segmentation,
+    range_m: float | None = None,
+    *,
+    size_px: tuple[int, int] = (WIDTH_PX, HEIGHT_PX),
+    fill: bool = False,
+) -> Ground:
+    """The part of the ground that a picture of a result shows, as large as fits into a width and a height.
+
+    With `fill`, what room is left at the sides shows more of the ground.
+    """
+    forward = _heading(result)
+    seen = _turned(result.points[result.in_view, :2].astype(np.float64), forward)
+    ranges = np.hypot(*seen.T)
+    objects = result.labels[result.in_view] > 0
+    reach = range_m or _reach(ranges[objects] if objects.any() else ranges)
+    near = np.vstack([np.zeros((1, 2)), seen[ranges <= reach]])
+    left, behind = near.min(axis=0) - MARGIN_M
+    right, ahead = near.max(axis=0) + MARGIN_M
+    scale = min(size_px[0] / (right - left), size_px[1] / (ahead - behind))
+    if fill:
+        wider = size_px[0] / scale - (right - left)
+        left, right = left - wider / 2, right + wider / 2
+    return Ground(forward=forward, left_m=left, right_m=right, behind_m=behind, ahead_m=ahead, px_per_m=scale)
+
+
+def shown_birds_eye_view(what: Shown, ground: Ground, *, boxes: bool) -> Image.Image:
+    """The same of what is already chosen, marked points rimmed."""
+    width, height = ground.size_px
+    fine = Image.new("RGB", (FINE * width, FINE * height), PAPER)
+    draw = ImageDraw.Draw(fine)
+    step = _ring_step(ground)
+    _draw_rings(draw, ground, step)
+    fine = _with_points(fine, what, ground)
+    found = [found for found in what.result.objects if found.box is not None] if boxes else []
+    corners = [FINE * ground.at(corners_of(one)) for one in found]
+    draw = ImageDraw.Draw(fine)
+    for one, corner in zip(found, corners, strict=True):
+        outline = [tuple(place) for place in [*corner.tolist(), corner[0].tolist()]]
+        draw.line(outline, _colour(what, one), 2 * FINE, joint="curve")
+    picture = fine.reduce(FINE)
+    written = _write_ranges(picture, ground, step)
+    covered = _covered(picture, what, ground)
+    tags = [
+        Tag(what.names[one.label - 1], _colour(what, one), _around(corner / FINE))
+        for one, corner in zip(found, corners, strict=True)
+    ]
+    draw_tags(picture, tags, covered, PEN_PX, aversion=AVERSION, taken=written)
+    return picture
+
+
+def corners_of(found: SegmentedObject) -> NDArray[np.float64]:
+    """(4, 2) corners of an object's box on the ground, in metres in the lidar frame, in order around it."""
+    assert found.box is not None
+    length, width, _ = found.box.size / 2
+    along = np.array([cos(found.box.yaw), sin(found.box.yaw)])
+    across = np.array([-along[1], along[0]])
+    signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
+    return np.asarray(found.box.center[:2] + signs[:, :1] * length * along + signs[:, 1:] * width * across)
+
+
+def _heading(result: Segmentation) -> NDArray[np.float64]:
+    """Where the first camera looks, along the ground of the lidar frame; x if it looks up or down."""
+    axis: NDArray[np.float64] = result.views[0].view.camera.T_camera_lidar[2, :2]
+    length = np.hypot(*axis)
+    return axis / length if length > 1e-6 else np.array([1.0, 0.0])
+
+
+def _turned(xy: NDArray[np.float64], forward: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2) metres to the right of and along `forward`."""
+    return np.asarray(xy @ np.array([[forward[1], forward[0]], [-forward[0], forward[1]]]))
+
+
+def _reach(ranges_m: NDArray[np.float64]) -> float:
+    farthest = float(np.quantile(ranges_m, 0.995)) if len(ranges_m) else 0.0
+    return min(max(1.12 * farthest, LEAST_RANGE_M), MOST_RANGE_M)
+
+
+def _ring_step(ground: Ground) -> int:
+    farthest = max(ground.ahead_m, ground.right_m, -ground.left_m)
+    return next((step for step in RING_STEPS_M if farthest / step <= MOST_RINGS), RING_STEPS_M[-1])
+
+
+def _ranges(ground: Ground, step_m: int) -> range:
+    edges = np.hypot(*np.meshgrid([ground.left_m, ground.right_m], [ground.behind_m, ground.ahead_m]))
+    return range(step_m, floor(edges.max()) + 1, step_m)
+
+
+def _draw_rings(draw: ImageDraw.ImageDraw, ground: Ground, step_m: int) -> None:
+    (x, y), *_ = (FINE * ground.at(np.zeros((1, 2)))).tolist()
+    for range_m in _ranges(ground, step_m):
+        radius = FINE * range_m * ground.px_per_m
+        draw.ellipse((x - radius, y - radius, x + radius, y + radius), outline=RINGS, width=FINE)
+    arm = 8 * FINE
+    draw.polygon([(x, y - 1.6 * arm), (x - arm, y + arm), (x, y + 0.4 * arm), (x + arm, y + arm)], fill=INK)
+
+
+def _write_ranges(picture: Image.Image, ground: Ground, step_m: int) -> list[Box]:
+    """Write the range of each ring where it crosses the line ahead of the lidar; the places taken."""
+    written = []
+    draw = ImageDraw.Draw(picture)
+    font = ImageFont.load_default(size=15)
+    for range_m in _ranges(ground, step_m):
+        ((x, y),) = ground.at(range_m * ground.forward[None]).tolist()
+        text = f"{range_m} m"
+        left, top, right, bottom = draw.textbbox((x, y), text, font, anchor="mm")
+        if top > RIM_PX:
+            box = (int(left) - RIM_PX, int(top) - RIM_PX, ceil(right) + RIM_PX, ceil(bottom) + RIM_PX)
+            draw.rectangle(box, PAPER)
+            draw.text((x, y), text, RANGES, font, anchor="mm")
+            written.append(box)
+    return written
+
+
+def _with_points(fine: Image.Image, what: Shown, ground: Ground) -> Image.Image:
+    canvas = np.array(fine)
+    points = what.result.points
+    finite = np.isfinite(points[:, :3]).all(axis=1)
+    rows = np.flatnonzero(finite)
+    # the lowest first: what stands on the ground covers it
+    rows = rows[np.argsort(points[rows, 2], kind="stable")]
+    at_px = np.floor(FINE * ground.at(points[rows, :2].astype(np.float64))).astype(np.int64)
+    labels, marked = what.labels[rows], what.marked[rows]
+    size = float(np.clip(ground.px_per_m / 14, 0.7, 1.8))
+    for label, colour in ((-1, OUT_OF_VIEW), (0, BACKGROUND)):
+        stamp(canvas, at_px[labels == label], colour, disc(0.55 * FINE * size))
+    own = labels > 0
+    stamp(canvas, at_px[own & marked], MARK, disc((1.2 * size + 0.8) * FINE))
+    stamp(canvas, at_px[own], what.colours_of(labels[own]), disc(1.2 * FINE * size))
+    return Image.fromarray(canvas)
+
+
+def _covered(picture: Image.Image, what: Shown, ground: Ground) -> NDArray[np.bool_]:
+    """Where objects are: (H, W) of the picture."""
+    points = what.result.points[what.labels > 0, :2].astype(np.float64)
+    at = np.floor(ground.at(points)).astype(int)
+    covered = np.zeros((picture.height, picture.width), bool)
+    x, y = at[((at >= 0) & (at < picture.size)).all(axis=1)].T
+    covered[y, x] = True
+    return np.asarray(Image.fromarray(covered).convert("L").filter(ImageFilter.MaxFilter(9))) > 0
+
+
+def _colour(what: Shown, found: SegmentedObject) -> Colour:
+    red, green, blue = what.colours[found.label - 1].tolist()
+    return red, green, blue
+
+
+def _around(corners: NDArray[np.float64]) -> tuple[int, int, int, int]:
+    left, top = np.floor(corners.min(axis=0)).astype(int).tolist()
+    right, bottom = np.ceil(corners.max(axis=0)).astype(int).tolist()
+    return left, top, right, bottom

@@ -1,0 +1,52 @@
+"""Pictures as files."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+from PIL import Image
+
+from ldls.errors import UnsupportedFormatError
+from ldls.io.whole_file import whole_file
+from ldls.segmentation import Segmentation
+from ldls.viewing.birds_eye import birds_eye_view
+from ldls.viewing.comparison import comparison
+from ldls.viewing.overlay import overlay
+from ldls.viewing.shown import Images
+
+
+def save_pictures(path: str | PathLike[str], result: Segmentation, images: Images = None) -> list[Path]:
+    """The files written: the overlay at `path`, and beside it NAME-birds-eye.png and NAME-comparison.png.
+
+    Args:
+        path: `NAME.png`.
+        result: What to show.
+        images: As for `overlay`.
+
+    Raises:
+        UnsupportedFormatError: The name does not end in `.png`.
+        InputError: There are more or fewer images than cameras, or one has not the size of the masks.
+    """
+    path = Path(path)
+    pictures = {
+        path: overlay(result, images),
+        path.with_name(f"{path.stem}-birds-eye{path.suffix}"): birds_eye_view(result),
+        path.with_name(f"{path.stem}-comparison{path.suffix}"): comparison(result, images),
+    }
+    for own, picture in pictures.items():
+        save_picture(own, picture)
+    return list(pictures)
+
+
+def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:
+    """Write a picture; the file appears only when it is whole.
+
+    Raises:
+        UnsupportedFormatError: The name does not end in `.png`.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} pictures, expected .png")
+    with whole_file(path) as file:
+        picture.save(file, "PNG")

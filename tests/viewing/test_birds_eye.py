@@ -1,0 +1,114 @@
+"""Bird's-eye views are to scale, turned to the camera, and show boxes and ranges where they are."""
+
+import numpy as np
+import pytest
+
+import ldls
+from ldls.palette import instance_colours
+from ldls.viewing import birds_eye_view
+from ldls.viewing.birds_eye import BACKGROUND, OUT_OF_VIEW, RINGS, corners_of, ground_of
+
+# camera axes (x right, y down, z forward) of a lidar whose x is forward and z up, and of one whose y is forward
+X_FORWARD = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
+Y_FORWARD = [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
+
+
+def street(T_camera_lidar, shift_m: float = 0.0) -> ldls.Segmentation:
+    """A box 12 m ahead and 3 m to the left on a ground, in the lidar's axes."""
+    generator = np.random.default_rng(3)
+    ground = generator.uniform([-8, 1.5, 3], [8, 1.6, 25], (3000, 3))
+    box = generator.uniform([-4, 0.2, 11], [-2, 1.4, 13], (600, 3))
+    behind = generator.uniform([-8, 1.5, -20], [8, 1.6, -3], (1000, 3))
+    in_camera = np.vstack([ground, box, behind])
+    rotation = np.array(T_camera_lidar, float)[:3, :3]
+    points = (in_camera @ rotation).astype(np.float32)
+    camera = ldls.Camera(
+        projection=[[200, 0, 200], [0, 200, 80], [0, 0, 1]], T_camera_lidar=np.array(T_camera_lidar, float)
+    )
+    masks = ldls.InstanceMasks.from_boxes([[128, 82, 164, 104]], (160, 400), categories=[3])
+    return ldls.segment(points, masks, camera)
+
+
+@pytest.mark.parametrize(
+    "axes", [pytest.param(X_FORWARD, id="x forward"), pytest.param(Y_FORWARD, id="y forward, as in nuScenes")]
+)
+def test_what_is_ahead_left_of_the_camera_is_up_left_of_the_lidar(axes) -> None:
+    result = street(axes)
+    picture = np.asarray(birds_eye_view(result))
+    ground = ground_of(result)
+    (lidar,) = ground.at(np.zeros((1, 2)))
+    left, top = np.round(lidar + ground.px_per_m * np.array([-4, -13])).astype(int)
+    right, bottom = np.round(lidar + ground.px_per_m * np.array([-2, -11])).astype(int)
+    coloured = np.abs(picture.astype(int) - instance_colours([3])[0]).max(axis=2) <= 3
+    assert coloured[top:bottom, left:right].mean() > 0.4
+    assert coloured[:, int(lidar[0]) :].sum() == 0
+
+
+def test_a_camera_that_looks_down_takes_x_for_ahead() -> None:
+    points = np.random.default_rng(1).uniform([-3, -3, 4], [3, 3, 5], (400, 3)).astype(np.float32)
+    masks = ldls.InstanceMasks.from_boxes([[40, 40, 60, 60]], (100, 100), categories=[1])
+    camera = ldls.Camera(projection=[[60, 0, 50], [0, 60, 50], [0, 0, 1]])
+    np.testing.assert_array_equal(ground_of(ldls.segment(points, masks, camera)).forward, [1, 0])
+
+
+def test_rings_stand_at_their_ranges() -> None:
+    result = street(X_FORWARD)
+    picture = np.asarray(birds_eye_view(result)).astype(int)
+    ground = ground_of(result)
+    for range_m in (5, 10):
+        # to the left behind nothing is drawn over the ring
+        angle = np.radians(np.arange(60, 85))
+        places = ground.at(range_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)).astype(int)
+        inside = (places >= 1).all(axis=1) & (places[:, 0] < picture.shape[1] - 1)
+        found = [
+            np.abs(picture[y - 1 : y + 2, x - 1 : x + 2] - RINGS).max(axis=2).min() < 25 for x, y in places[inside]
+        ]
+        assert len(found) > 5 and np.mean(found) > 0.6
+
+
+def test_points_in_view_and_out_of_it_are_two_greys() -> None:
+    colours, counts = np.unique(
+        np.asarray(birds_eye_view(street(X_FORWARD), range_m=60)).reshape(-1, 3), axis=0, return_counts=True
+    )
+    often = {tuple(colour) for colour in colours[counts > 20].tolist()}
+    assert {BACKGROUND, OUT_OF_VIEW} <= often
+
+
+def test_the_picture_fits_and_follows_the_range() -> None:
+    result = street(X_FORWARD)
+    picture = birds_eye_view(result)
+    assert picture.width <= 1800 and picture.height <= 1201
+    far, near = ground_of(result, 25.0), ground_of(result, 10.0)
+    assert far.ahead_m > near.ahead_m and far.px_per_m < near.px_per_m
+    filled = ground_of(result, size_px=(1000, 500), fill=True)
+    assert filled.size_px[0] == pytest.approx(1000, abs=1)
+
+
+def test_corners_go_around_the_box() -> None:
+    (found,) = street(X_FORWARD).objects
+    corners = corners_of(found)
+    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    np.testing.assert_allclose(sides, found.box.size[[1, 0, 1, 0]])
+    np.testing.assert_allclose(corners.mean(axis=0), found.box.center[:2])
+
+
+def test_boxes_can_be_left_out() -> None:
+    result = street(X_FORWARD)
+    with_boxes, without = (np.asarray(birds_eye_view(result, boxes=boxes)) for boxes in (True, False))
+    assert (with_boxes != without).any()
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        pytest.param(np.zeros((0, 3), np.float32), id="no points"),
+        pytest.param(np.full((5, 3), np.nan, np.float32), id="none finite"),
+        pytest.param(np.array([[-5, 0, 0]] * 20, np.float32), id="none in view"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_there_may_be_nothing_to_see(points) -> None:
+    masks = ldls.InstanceMasks.from_boxes([[40, 40, 60, 60]], (100, 100), categories=[1])
+    camera = ldls.Camera(projection=[[60, 0, 50], [0, 60, 50], [0, 0, 1]], T_camera_lidar=np.array(X_FORWARD, float))
+    picture = birds_eye_view(ldls.segment(points, masks, camera))
+    assert min(picture.size) > 10
