@@ -43,18 +43,56 @@ def test_objects_describe_their_points(small_scene):
 
 
 @pytest.mark.parametrize("yaw_deg", [-89, -45, 0, 10, 33, 90])
-def test_boxes_find_the_heading_of_a_rectangle(yaw_deg):
+def test_boxes_have_the_heading_of_two_sides_that_meet(yaw_deg):
     generator = np.random.default_rng(1)
+    share = generator.uniform(-1, 1, (60, 1))
     corners = np.array([[2, 1], [2, -1], [-2, 1], [-2, -1]])
-    local = np.vstack([corners, generator.uniform([-2, -1], [2, 1], (100, 2))])
-    yaw = np.deg2rad(yaw_deg)
-    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    ground = local @ turn.T + [10, -3]
-    height = generator.uniform(-1, 1, (len(ground), 1))
-    box = ldls.objects.fit_upright_box(np.hstack([ground, height]))
+    local = np.vstack(
+        [corners, np.hstack([2 * share, np.ones_like(share)]), np.hstack([np.full_like(share, 2), share])]
+    )
+    box = ldls.objects.fit_upright_box(turned(local, yaw_deg, generator))
     np.testing.assert_allclose(box.size[:2], [4, 2], atol=1e-9)
     np.testing.assert_allclose(box.center[:2], [10, -3], atol=1e-9)
     assert np.rad2deg(box.yaw) == pytest.approx(yaw_deg)
+
+
+@pytest.mark.parametrize("yaw_deg", [-45, 0, 33])
+def test_boxes_of_points_all_over_are_right_to_some_degrees(yaw_deg):
+    generator = np.random.default_rng(1)
+    box = ldls.objects.fit_upright_box(turned(generator.uniform([-2, -1], [2, 1], (400, 2)), yaw_deg, generator))
+    assert abs(np.rad2deg(box.yaw) - yaw_deg) <= 5
+    np.testing.assert_allclose(box.size[:2], [4, 2], atol=0.4)
+
+
+@pytest.mark.parametrize("yaw_deg", [-70, 3, 48])
+def test_a_stray_point_widens_a_box_and_does_not_turn_it(yaw_deg):
+    generator = np.random.default_rng(2)
+    side, rear = generator.uniform([-2, 1], [2, 1.05], (200, 2)), generator.uniform([-2, -1], [-1.95, 1], (100, 2))
+    box = ldls.objects.fit_upright_box(turned(np.vstack([side, rear, [[1.5, -2.5]]]), yaw_deg, generator))
+    assert abs(np.rad2deg(box.yaw) - yaw_deg) <= 1
+    np.testing.assert_allclose(box.size[:2], [4, 3.55], atol=0.15)
+
+
+@pytest.mark.parametrize(
+    ("places", "size"),
+    [
+        pytest.param([[3, 4]], [0, 0], id="one point"),
+        pytest.param([[3, 4]] * 5, [0, 0], id="one place"),
+        pytest.param([[0, 0], [3, 3]], [18**0.5, 0], id="two points"),
+        pytest.param(np.linspace(0, 1, 40)[:, None] * [2, 2], [8**0.5, 0], id="a line"),
+    ],
+)
+def test_boxes_of_few_points_have_no_width(places, size):
+    ground = np.array(places, float)
+    box = ldls.objects.fit_upright_box(np.hstack([ground, np.zeros((len(ground), 1))]))
+    np.testing.assert_allclose(box.size, [*size, 0], atol=1e-9)
+
+
+def turned(local, yaw_deg, generator):
+    """Places on the ground turned and moved to (10, -3), at random heights."""
+    yaw = np.deg2rad(yaw_deg)
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    return np.hstack([local @ turn.T + [10, -3], generator.uniform(-1, 1, (len(local), 1))])
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
+
+NEAR_M = 0.1
+"""Distance from a side up to which points count the same: sides bulge, and ranges are noisy."""
+AS_GOOD = 0.998
+"""Share of the best closeness from which on area decides."""
+STRAY = 0.02
+"""Share of the points at either end that do not decide where a side is."""
+MOST_LOOKED_AT = 500
+"""Points of an object, evenly chosen, that decide on its heading."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +44,7 @@ class SegmentedObject:
         score: Score of the 2D segmenter.
         n_points: Points that carry its label.
         centroid: (3,) mean of these points in metres; None without points.
-        box: The upright box of least ground area that holds them; None without points.
+        box: The upright box that holds them, its sides along the sides seen; None without points.
     """
 
     label: int
@@ -52,25 +62,47 @@ class SegmentedObject:
 
 
 def fit_upright_box(points: NDArray[np.float64]) -> OrientedBox:
-    """The upright box of least ground area, to one degree of heading, around (n, 3) points in metres."""
+    """The upright box around (n, 3) points in metres whose sides run along the sides that the lidar saw.
+
+    Of 90 headings, one degree apart, it has the one at which points lie nearest to two sides that meet (closeness, of
+    Zhang et al., Efficient L-Shape Fitting for Vehicle Detection Using Laser Scanners, IV 2017), and of those as good
+    as that, the one of least area. Stray points do not decide where sides are; the box holds all points.
+    """
     # a rectangle comes round to itself after a quarter turn
     headings = np.deg2rad(np.arange(90.0))
-    along = np.stack([np.cos(headings), np.sin(headings)])
-    across = np.stack([-np.sin(headings), np.cos(headings)])
-    ground = points[:, :2]
-    low = np.stack([(ground @ axis).min(axis=0) for axis in (along, across)])
-    high = np.stack([(ground @ axis).max(axis=0) for axis in (along, across)])
-    best = int(np.argmin((high - low).prod(axis=0)))
-    middle = (low + high)[:, best] / 2
-    length, width = (high - low)[:, best]
-    yaw = float(headings[best])
+    some = points[:: ceil(len(points) / MOST_LOOKED_AT), :2]
+    heading = float(headings[_best(some, headings)])
+    along, across = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
+    ground = points[:, :2] @ np.stack([along, across], axis=1)
+    low, high = ground.min(axis=0), ground.max(axis=0)
+    middle = (low + high) / 2
+    length, width = high - low
+    yaw = heading
     if width > length:
-        length, width, yaw = width, length, yaw - np.pi / 2
+        length, width, yaw = width, length, heading - np.pi / 2
         yaw = yaw + np.pi if yaw <= -np.pi / 2 else yaw
     bottom, top = points[:, 2].min(), points[:, 2].max()
-    x, y = along[:, best] * middle[0] + across[:, best] * middle[1]
+    x, y = middle[0] * along + middle[1] * across
     return OrientedBox(
         center=np.array([x, y, (bottom + top) / 2]),
         size=np.array([length, width, top - bottom]),
         yaw=yaw,
     )
+
+
+def _best(ground: NDArray[np.float64], headings: NDArray[np.float64]) -> int:
+    """Which heading fits (n, 2) places best."""
+    axes = np.stack([np.cos(headings), np.sin(headings)]), np.stack([-np.sin(headings), np.cos(headings)])
+    places = [ground @ axis for axis in axes]
+    to_side = np.minimum(*(_to_nearer_side(each) for each in places))
+    closeness = (1 / np.maximum(to_side, NEAR_M)).sum(axis=0)
+    along, across = (np.ptp(each, axis=0) for each in places)
+    as_good = closeness >= AS_GOOD * closeness.max()
+    return int(np.argmin(np.where(as_good, along * across, np.inf)))
+
+
+def _to_nearer_side(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distances (n, headings) of places along an axis to that end of them to which they are nearer as a whole."""
+    low, high = np.quantile(places, [STRAY, 1 - STRAY], axis=0)
+    to_low, to_high = np.abs(places - low), np.abs(high - places)
+    return np.where(np.square(to_low).sum(axis=0) < np.square(to_high).sum(axis=0), to_low, to_high)
