@@ -105,4 +105,4 @@ def _to_nearer_side(places: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distances (n, headings) of places along an axis to that end of them to which they are nearer as a whole."""
     low, high = np.quantile(places, [STRAY, 1 - STRAY], axis=0)
     to_low, to_high = np.abs(places - low), np.abs(high - places)
-    return np.where(np.square(to_low).sum(axis=0) < np.square(to_high).sum(axis=0), to_low, to_high)
+    return np.asarray(np.where(np.square(to_low).sum(axis=0) < np.square(to_high).sum(axis=0), to_low, to_high))

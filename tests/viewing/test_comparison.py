@@ -53,7 +53,10 @@ def test_without_change_nothing_is_marked(small_scene) -> None:
 def test_a_ring_is_compared_too(small_scene) -> None:
     points, masks, camera = small_scene
     result = ldls.segment(points, [ldls.View(masks, camera, "left"), ldls.View(masks, camera, "right")])
-    assert comparison(result).width == 2 * 960 + 6
+    picture = comparison(result)
+    # a row a camera, then the views from above
+    assert picture.width == 1800
+    assert picture.height == 2 * (round(897 * 60 / 80) + 30) + 30 + 897
 
 
 def test_three_files(result, tmp_path) -> None:

@@ -6,7 +6,7 @@ import pytest
 import ldls
 from ldls.palette import BACKGROUND, instance_colours
 from ldls.viewing import masks_overlay, overlay
-from ldls.viewing.overlay import MARK, shown_overlay
+from ldls.viewing.overlay import MARK, overlay_of
 from ldls.viewing.shown import images_of, shown
 from ldls.viewing.tags import place_tags
 
@@ -74,8 +74,9 @@ def test_background_points_leave_the_image_visible(small_scene) -> None:
 
 def test_marked_points_have_a_white_rim(result) -> None:
     marked = result.labels == 1
+    (image,) = images_of(result, None)
     plain, rimmed = (
-        shown_overlay(shown(result, "final", chosen), images_of(result, None), 1800) for chosen in (None, marked)
+        overlay_of(shown(result, "final", chosen), result.views[0], image, 1800) for chosen in (None, marked)
     )
     changed = np.any(np.asarray(plain) != np.asarray(rimmed), axis=2)
     white = np.all(np.asarray(rimmed) == MARK, axis=2)
@@ -89,8 +90,8 @@ def test_a_ring_has_a_picture_a_camera_with_its_name(small_scene) -> None:
     views = [ldls.View(masks, camera, name) for name in ("left", "right", "rear")]
     result = ldls.segment(points, views)
     picture = overlay(result, [photo(), None, photo()], width_px=400)
-    assert picture.width == 2 * 400 + 6
-    assert picture.height == 2 * (300 + 30)
+    assert picture.size == (2 * 400 + 6, 2 * (300 + 30))
+    assert overlay(result).width == 1800
 
 
 @pytest.mark.parametrize(

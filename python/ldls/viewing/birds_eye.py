@@ -101,7 +101,9 @@ def ground_of(
     ranges = np.hypot(*seen.T)
     objects = result.labels[result.in_view] > 0
     reach = range_m or _reach(ranges[objects] if objects.any() else ranges)
-    near = np.vstack([np.zeros((1, 2)), seen[ranges <= reach]])
+    corners = [corners_of(found) for found in result.objects if found.box is not None]
+    held = _turned(np.concatenate([np.zeros((1, 2)), *corners]), forward)
+    near = np.concatenate([seen[ranges <= reach], held[np.hypot(*held.T) <= (range_m or MOST_RANGE_M)]])
     left, behind = near.min(axis=0) - MARGIN_M
     right, ahead = near.max(axis=0) + MARGIN_M
     scale = min(size_px[0] / (right - left), size_px[1] / (ahead - behind))

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.segmentation import Segmentation
 from ldls.viewing.birds_eye import ground_of, shown_birds_eye_view
-from ldls.viewing.grid import GAP_PX, grid
-from ldls.viewing.overlay import shown_overlay
-from ldls.viewing.shown import Images, images_of, shown
+from ldls.viewing.grid import grid, half
+from ldls.viewing.overlay import WIDTH_PX, overlay_of
+from ldls.viewing.shown import Images, Shown, images_of, shown
 
-WIDTH_PX = 1800
 WIDE = 2.0
 """Width over height from which on two images stand one above the other."""
 
@@ -32,16 +33,26 @@ def comparison(result: Segmentation, images: Images = None) -> Image.Image:
     """
     changed = result.direct_labels != result.labels
     pair = [shown(result, "direct", changed), shown(result, "final", changed)]
-    pixels = images_of(result, images)
-    height, width = result.views[0].view.masks.image_size
-    stacked = len(pixels) > 1 or width > WIDE * height
-    each = None if len(pixels) > 1 else WIDTH_PX if stacked else (WIDTH_PX - GAP_PX) // 2
-    overlays = grid([shown_overlay(one, pixels, each) for one in pair], captions(result), columns=1 if stacked else 2)
-    half = (overlays.width - GAP_PX) // 2
-    ground = ground_of(result, size_px=(half, half), fill=True)
-    views = [shown_birds_eye_view(one, ground, boxes=one is pair[1]) for one in pair]
-    above = grid(views, ["direct projection from above", "ldls from above, with boxes"], columns=2)
-    return grid([overlays, above], columns=1)
+    ground = ground_of(result, size_px=(half(WIDTH_PX), half(WIDTH_PX)), fill=True)
+    above = [shown_birds_eye_view(one, ground, boxes=one is pair[1]) for one in pair]
+    return grid(
+        [
+            _overlays(pair, images_of(result, images)),
+            grid(above, ["direct projection from above", "ldls from above, with boxes"], columns=2),
+        ],
+        columns=1,
+    )
+
+
+def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]]) -> Image.Image:
+    """Both overlays of every camera: one above the other if there is only one wide image, else side by side."""
+    views = pair[0].result.views
+    height, width = views[0].view.masks.image_size
+    stacked = len(views) == 1 and width > WIDE * height
+    each_px = WIDTH_PX if stacked else half(WIDTH_PX)
+    tiles = [overlay_of(what, seen, image, each_px) for seen, image in zip(views, images, strict=True) for what in pair]
+    cameras = [name for seen in views[1:] for name in (seen.view.name, seen.view.name)]
+    return grid(tiles, [*captions(pair[0].result), *cameras], columns=1 if stacked else 2)
 
 
 def captions(result: Segmentation) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil, sqrt
 
 from PIL import Image, ImageDraw, ImageFont
 
@@ -16,10 +15,9 @@ FONT_PX = 17
 CAPTION_PX = 30
 
 
-def grid(pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, columns: int | None = None) -> Image.Image:
-    """The pictures row by row, each below its caption if any, in so many columns or about as many as rows."""
+def grid(pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, columns: int) -> Image.Image:
+    """The pictures row by row, each below its caption if any."""
     caption_px = CAPTION_PX if captions else 0
-    columns = columns or ceil(sqrt(len(pictures)))
     rows = [range(start, min(start + columns, len(pictures))) for start in range(0, len(pictures), columns)]
     widths = [max(pictures[i].width for i in range(column, len(pictures), columns)) for column in range(columns)]
     heights = [max(pictures[i].height for i in row) for row in rows]
@@ -38,6 +36,11 @@ def grid(pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, colum
             left += width + GAP_PX
         top += caption_px + height
     return whole
+
+
+def half(width_px: int) -> int:
+    """Width of each of two pictures side by side."""
+    return (width_px - GAP_PX) // 2
 
 
 def _write(picture: Image.Image, corner: tuple[int, int], caption: str) -> None:

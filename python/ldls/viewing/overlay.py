@@ -13,15 +13,13 @@ from ldls.masks import InstanceMask, InstanceMasks
 from ldls.palette import Colour, instance_colours
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView
-from ldls.viewing.grid import grid
+from ldls.viewing.grid import grid, half
 from ldls.viewing.marks import disc, stamp
 from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of, shown
 from ldls.viewing.tags import Tag, draw_tags
 
 WIDTH_PX = 1800
-"""Width of a picture of one image."""
-TILE_PX = 960
-"""Width of each picture of several."""
+"""Width of a picture."""
 BACKGROUND: Colour = (225, 225, 225)
 HALO: Colour = (15, 15, 20)
 MARK: Colour = (255, 255, 255)
@@ -50,13 +48,19 @@ def overlay(
         images: (H, W, 3) uint8 RGB image; for several cameras one for each, None where there is none. Without an image
             masks and points stand on a dark one.
         stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
-        width_px: Width of the picture of an image; 1800 pixels by default, 960 each if there are several.
+        width_px: Width of the picture of each image; by default 1800 pixels, or half of it where there are several,
+            which then stand two by two.
 
     Raises:
         InputError: There are more or fewer images than cameras, or one has not the size of the masks.
         ParameterError: There is no such stage.
     """
-    return shown_overlay(shown(result, stage), images_of(result, images), width_px)
+    what, each = shown(result, stage), images_of(result, images)
+    if len(each) == 1:
+        return overlay_of(what, result.views[0], each[0], width_px or WIDTH_PX)
+    pairs = zip(result.views, each, strict=True)
+    tiles = [overlay_of(what, seen, image, width_px or half(WIDTH_PX)) for seen, image in pairs]
+    return grid(tiles, [seen.view.name for seen in result.views], columns=2)
 
 
 def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) -> Image.Image:
@@ -74,15 +78,8 @@ def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) 
     return _with_tags(*_with_masks(image, outlines, WIDTH_PX / image.shape[1]))
 
 
-def shown_overlay(what: Shown, images: Sequence[NDArray[np.uint8]], width_px: int | None) -> Image.Image:
-    """The same of what is already chosen, marked points rimmed."""
-    views = what.result.views
-    width_px = width_px or (WIDTH_PX if len(views) == 1 else TILE_PX)
-    tiles = [_tile(what, seen, image, width_px) for seen, image in zip(views, images, strict=True)]
-    return tiles[0] if len(tiles) == 1 else grid(tiles, [seen.view.name for seen in views])
-
-
-def _tile(what: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
+def overlay_of(what: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
+    """The picture of one camera's image, marked points with a white rim."""
     colours = _as_colours(what.colours)
     outlines = [
         Outline(mask=mask, colour=colours[label - 1], name=what.names[label - 1])
