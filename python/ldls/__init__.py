@@ -26,11 +26,15 @@ from ldls.errors import (
 from ldls.io import read_image, read_points
 from ldls.label_diffusion import LabelDiffusion, segment
 from ldls.masks import InstanceMasks
+from ldls.notebook import html_of
 from ldls.objects import OrientedBox, SegmentedObject
 from ldls.params import Params
 from ldls.report import Report
 from ldls.segmentation import Instance, Segmentation
 from ldls.view import SeenView, View
+
+# pictures lie above the nouns, which know nothing of them
+Segmentation._repr_html_ = html_of
 
 __all__ = [
     "CalibrationError",

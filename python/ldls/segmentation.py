@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,9 @@ class Segmentation:
     timings: Mapping[str, float]
     points: Points
     params: Params
+
+    # what notebooks show; the package gives it
+    _repr_html_: ClassVar[Callable[[Segmentation], str]]
 
     @classmethod
     def from_npz(cls, path: str | PathLike[str]) -> Self:
