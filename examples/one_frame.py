@@ -1,0 +1,46 @@
+"""One frame: points, masks and a camera become labels, objects, files and pictures.
+
+    python examples/one_frame.py [OUT]
+
+The frame is simulated; with files of your own it begins with
+
+    points = ldls.read_points("velodyne/000571.bin")
+    masks = ldls.InstanceMasks.from_file("masks/000571.json")
+    camera = ldls.Camera.from_kitti("calib/000571.txt")
+    image = ldls.read_image("image_2/000571.png")
+"""
+
+import sys
+from pathlib import Path
+
+import ldls
+from ldls.simulation import street_scene
+from ldls.viewing import save_pictures
+
+out = Path(sys.argv[1] if len(sys.argv) > 1 else "one-frame")
+out.mkdir(parents=True, exist_ok=True)
+
+frame = street_scene(seed=3)
+points, image = frame.points, frame.image  # (N, 4) float32 in metres, (H, W, 3) uint8
+masks = ldls.InstanceMasks.from_array(frame.masks, categories=frame.categories, scores=frame.scores)
+camera = ldls.Camera(projection=frame.projection, T_camera_lidar=frame.T_camera_lidar)
+
+result = ldls.segment(points, masks, camera)
+
+print(result)
+for found in sorted(result.objects, key=lambda each: each.distance_m or float("inf")):
+    if found.box is not None:
+        length, width, height = found.box.size
+        print(
+            f"{found.name:>13} {found.label:<3} {found.n_points:5} points at {found.distance_m:5.1f} m, "
+            f"{length:.1f} x {width:.1f} x {height:.1f} m"
+        )
+
+nearest = min((each for each in result.objects if each.box is not None), key=lambda each: each.distance_m)
+cloud = points[result.labels == nearest.label, :3]  # the points of one object
+print(f"the nearest is {nearest.name} {nearest.label}: x from {cloud[:, 0].min():.2f} to {cloud[:, 0].max():.2f} m")
+
+result.save(out / "frame.npz")  # everything, for ldls.Segmentation.from_npz, `ldls view` and `ldls explain`
+result.save(out / "frame.label")  # SemanticKITTI; docs/formats.md has the others
+for path in save_pictures(out / "frame.png", result, image):
+    print("wrote", path)
