@@ -3,6 +3,7 @@ import pytest
 
 import ldls
 import oracle
+from ring_samples import as_views, random_ring
 
 WALL = np.stack(np.meshgrid(np.linspace(-3, 3, 90), np.linspace(-0.6, 0.6, 25), [1.0]), axis=-1).reshape(-1, 3)
 
@@ -120,38 +121,12 @@ def test_threads_do_not_change_a_bit(threads):
     np.testing.assert_array_equal(one.confidence, other.confidence)
 
 
-def random_ring(seed):
-    """Clusters of points around three cameras that overlap, with masks about the clusters and at random."""
-    generator = np.random.default_rng(seed)
-    centres = np.stack([generator.uniform(-1.2, 1.2, 9), generator.uniform(4, 12, 9)], axis=1)
-    towards = [[r * np.sin(a), generator.uniform(-0.5, 0.5), r * np.cos(a)] for a, r in centres]
-    clusters = [generator.normal(at, 0.25, (60, 3)) for at in towards]
-    points = np.vstack([*clusters, generator.uniform([-10, -1, 2], [10, 1, 14], (300, 3))])
-    views = []
-    for turn in (-0.7, 0.0, 0.7):
-        cos, sin = np.cos(turn), np.sin(turn)
-        T = np.array([[cos, 0, -sin, 0], [0, 1, 0, 0], [sin, 0, cos, 0], [0, 0, 0, 1.0]])
-        one = ldls.Camera(projection=[[40, 0, 30], [0, 40, 20], [0, 0, 1]], T_camera_lidar=T)
-        pixels = np.zeros((4, 40, 60), bool)
-        for mask, cluster in zip(pixels, generator.permutation(9)[:4], strict=True):
-            _, uv = ldls.stages.project(clusters[cluster], one, image_size=(40, 60))
-            if len(uv):
-                (left, top), (right, bottom) = np.floor(uv.min(axis=0)).astype(int), np.ceil(uv.max(axis=0)).astype(int)
-                mask[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = True
-        views.append((pixels, generator.integers(1, 3, 4), one))
-    return points, views
-
-
 @pytest.mark.parametrize("seed", range(40))
 def test_labels_equal_those_of_plain_double_precision(seed):
     points, views = random_ring(seed)
     params = ldls.Params(neighbors=6, sigma=0.3, pixel_weight=0.01, iterations=40)
-    given = [
-        ldls.View(ldls.InstanceMasks.from_array(pixels, categories=categories), one)
-        for pixels, categories, one in views
-    ]
     plain = [(pixels, categories, one.projection @ one.T_camera_lidar) for pixels, categories, one in views]
     labels, groups = oracle.segment_ring(points, plain, params)
-    result = ldls.segment(points, given, params=params)
+    result = ldls.segment(points, as_views(views), params=params)
     assert [list(sources) for sources in result.sources] == groups
     np.testing.assert_array_equal(result.labels, labels)
