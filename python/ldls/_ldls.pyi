@@ -12,6 +12,7 @@ _Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 __all__ = [
     "Camera",
     "Masks",
+    "Products",
     "Rle",
     "SegmentationArrays",
     "StreamMemory",
@@ -84,6 +85,13 @@ class Camera:
 @final
 class StreamMemory:
     def __new__(cls) -> StreamMemory: ...
+
+@final
+class Products:
+    def __new__(cls, point_graph: _Csr, labels: _Csr, n_labels: int, iterations: int | None) -> Products: ...
+    def advance(self, products: int, threads: int | None) -> NDArray[np.float32]: ...
+    @property
+    def finished(self) -> bool: ...
 
 @final
 class SegmentationArrays:

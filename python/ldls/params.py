@@ -37,10 +37,10 @@ class Params:
 
     def __post_init__(self) -> None:
         for name in ("neighbors", "window"):
-            _whole_number(name, getattr(self, name))
+            check_whole_number(name, getattr(self, name))
         for name in ("iterations", "threads"):
             if getattr(self, name) is not None:
-                _whole_number(name, getattr(self, name))
+                check_whole_number(name, getattr(self, name))
         for name in ("sigma", "pixel_weight"):
             _number(name, getattr(self, name))
         if not isinstance(self.remove_outliers, bool):
@@ -64,7 +64,12 @@ class Params:
         )
 
 
-def _whole_number(name: str, value: object) -> None:
+def check_whole_number(name: str, value: object) -> None:
+    """Refuse what is no whole number from 0 to 2^31 - 1.
+
+    Raises:
+        ParameterError: `value` is another one, or of another type; bool counts as such.
+    """
     try:
         number = operator.index(value)  # type: ignore[arg-type]
     except TypeError:

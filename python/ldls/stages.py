@@ -13,8 +13,9 @@ Needs the extra `eval`.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,9 +24,9 @@ from ldls import _ldls
 from ldls._optional import require
 from ldls.camera import Camera
 from ldls.cloud import as_points
-from ldls.errors import DtypeError, InputError, NonFiniteError, ShapeError
+from ldls.errors import DtypeError, InputError, NonFiniteError, ParameterError, ShapeError
 from ldls.masks import InstanceMasks
-from ldls.params import Params
+from ldls.params import Params, check_whole_number
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -136,17 +137,65 @@ def normalize_rows(graph: csr_array, labels: PixelLabels) -> tuple[csr_array, cs
     return _csr(a, graph.shape[1]), _csr(b, labels.weights.shape[1])
 
 
+@overload
 def diffuse(
     A: csr_array,
     b: csr_array,
     *,
     iterations: int | None = _PAPER.iterations,
+    every: None = None,
     threads: int | None = None,
-) -> NDArray[np.float32]:
-    """Likelihoods (n, M + 1): z <- A z + b from z = 0, `iterations` times or, if None, until converged (step 5)."""
-    Params(iterations=iterations)
-    z, _, _ = _ldls.diffuse(_arrays(A), _arrays(b), b.shape[1], iterations, threads)
-    return z
+) -> NDArray[np.float32]: ...
+
+
+@overload
+def diffuse(
+    A: csr_array,
+    b: csr_array,
+    *,
+    iterations: int | None = _PAPER.iterations,
+    every: int,
+    threads: int | None = None,
+) -> Iterator[NDArray[np.float32]]: ...
+
+
+def diffuse(
+    A: csr_array,
+    b: csr_array,
+    *,
+    iterations: int | None = _PAPER.iterations,
+    every: int | None = None,
+    threads: int | None = None,
+) -> NDArray[np.float32] | Iterator[NDArray[np.float32]]:
+    """Likelihoods (n, M + 1): z <- A z + b from z = 0, `iterations` times or, if None, until converged (step 5).
+
+    With `every`, an iterator of them: those after `every`, 2 `every`, ... products, and after the last. The products
+    are then run as they stand, in double precision, and no z is kept but the last; every array is the caller's own. On
+    real frames the last differs from what is returned without `every`, a series in single precision, by at most 2e-5
+    of the largest likelihood of a point, and the largest is of the same label.
+
+    Args:
+        A: (n, n) of `normalize_rows`.
+        b: (n, M + 1) of `normalize_rows`.
+        iterations: Number of products. None with `every`: until one more changes no likelihood by more than 1e-5, at
+            most 20,000. On real frames the last is then within 1e-4 of the largest likelihood of the fixed point.
+        every: Products from one array to the next, 1 or more.
+        threads: As in `Params`. Results do not depend on it.
+    """
+    Params(iterations=iterations, threads=threads)
+    if every is None:
+        z, _, _ = _ldls.diffuse(_arrays(A), _arrays(b), b.shape[1], iterations, threads)
+        return z
+    check_whole_number("every", every)
+    if every < 1:
+        raise ParameterError(f"every: got {every!r}, expected 1 or more products from one array to the next")
+    products = _ldls.Products(_arrays(A), _arrays(b), b.shape[1], iterations)
+    return _as_it_happens(products, every, threads)
+
+
+def _as_it_happens(products: _ldls.Products, every: int, threads: int | None) -> Iterator[NDArray[np.float32]]:
+    while not products.finished:
+        yield products.advance(every, threads)
 
 
 def largest_components(graph: csr_array, labels: ArrayLike) -> NDArray[np.int32]:

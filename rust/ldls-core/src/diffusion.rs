@@ -142,7 +142,8 @@ pub fn likelihoods(
     Ok((all, convergence))
 }
 
-fn check(a: &PointGraph, b: &PixelLabels, n_labels: usize) -> Result<()> {
+/// Refuses seeds that do not fit the graph or the labels.
+pub(crate) fn check(a: &PointGraph, b: &PixelLabels, n_labels: usize) -> Result<()> {
     let mismatch = |problem: String| {
         Err(Error::Mismatch {
             name: "pixel_labels",

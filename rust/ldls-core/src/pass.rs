@@ -18,7 +18,7 @@ const SLACK: f32 = 1e-3;
 /// Where one more product changes nothing by more, the solution counts as converged.
 pub(crate) const CONVERGED: f64 = 1e-5;
 /// Sweeps after which a run without a bound gives up.
-const MOST_SWEEPS: usize = 20_000;
+pub(crate) const MOST_SWEEPS: usize = 20_000;
 /// Rows handled by one task of the thread pool.
 const BLOCK: usize = 2048;
 

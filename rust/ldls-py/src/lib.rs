@@ -12,6 +12,7 @@ mod camera;
 mod errors;
 mod masks;
 mod memory;
+mod products;
 mod segment;
 mod stages;
 
@@ -26,6 +27,8 @@ mod _ldls {
     use crate::masks::{Masks, Rle};
     #[pymodule_export]
     use crate::memory::StreamMemory;
+    #[pymodule_export]
+    use crate::products::Products;
     #[pymodule_export]
     use crate::segment::{SegmentationArrays, check_params, segment, segment_ring};
     #[pymodule_export]

@@ -1,0 +1,52 @@
+//! Diffusion some products at a time, for `ldls.stages.diffuse`.
+
+use crate::arrays::{CsrArguments, graph, matrix, pixel_labels};
+use crate::call::{run, run_here};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+/// A diffusion on its way. One thread at a time may use it; others get a `RuntimeError` meanwhile.
+#[pyclass(module = "ldls._ldls")]
+pub struct Products {
+    state: ldls_core::Products,
+    n_labels: usize,
+}
+
+#[pymethods]
+impl Products {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        point_graph: CsrArguments<'_>,
+        labels: CsrArguments<'_>,
+        n_labels: usize,
+        iterations: Option<usize>,
+    ) -> PyResult<Self> {
+        let a = graph(py, &point_graph)?;
+        // nobody asks for it, but there is one for each row
+        let mass = vec![0.0; labels.0.as_array().len().saturating_sub(1)];
+        let b = pixel_labels(py, &labels, mass)?;
+        let state = run_here(py, || ldls_core::Products::new(a, b, n_labels, iterations))?;
+        Ok(Self { state, n_labels })
+    }
+
+    /// Runs so many products more, or as many as there are left; the likelihoods after them.
+    fn advance(
+        &mut self,
+        py: Python<'_>,
+        products: usize,
+        threads: Option<usize>,
+    ) -> PyResult<Py<PyArray2<f32>>> {
+        let z = run(py, threads, || {
+            self.state.advance(products);
+            Ok(self.state.likelihoods())
+        })?;
+        matrix(py, z, self.n_labels)
+    }
+
+    /// Whether none is left.
+    #[getter]
+    fn finished(&self) -> bool {
+        self.state.is_finished()
+    }
+}
