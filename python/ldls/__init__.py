@@ -23,6 +23,7 @@ from ldls.errors import (
     UnsafePathError,
     UnsupportedFormatError,
 )
+from ldls.explanation import Explanation, explain
 from ldls.io import read_image, read_points
 from ldls.label_diffusion import LabelDiffusion, segment
 from ldls.masks import InstanceMasks
@@ -42,6 +43,7 @@ __all__ = [
     "CorruptFileError",
     "Distortion",
     "DtypeError",
+    "Explanation",
     "FileFormatError",
     "InputError",
     "Instance",
@@ -67,6 +69,7 @@ __all__ = [
     "UnsupportedFormatError",
     "View",
     "__version__",
+    "explain",
     "read_image",
     "read_points",
     "segment",

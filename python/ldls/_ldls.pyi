@@ -81,6 +81,7 @@ class Camera:
         model: str,
         coefficients: NDArray[np.float64],
     ) -> Camera: ...
+    def project(self, x: float, y: float, z: float) -> tuple[float, float, float]: ...
 
 @final
 class StreamMemory:

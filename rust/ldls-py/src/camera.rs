@@ -52,6 +52,11 @@ impl Camera {
         };
         camera.map(Self).map_err(|error| to_python(py, &error))
     }
+
+    /// u and v in pixels and the depth in metres of a point in the lidar frame, in view or not.
+    fn project(&self, x: f64, y: f64, z: f64) -> (f64, f64, f64) {
+        self.0.project(&[x, y, z]).into()
+    }
 }
 
 fn fixed<const N: usize>(py: Python<'_>, name: &str, values: &[f64]) -> PyResult<[f64; N]> {
