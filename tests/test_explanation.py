@@ -203,7 +203,7 @@ def pinhole():
     [
         pytest.param([0, 0, -3], pinhole, "behind", "behind the camera, at a depth of -3.00 m", id="behind"),
         pytest.param([0, 0, 0.05], pinhole, "behind", "at a depth of 0.05 m", id="nearer than the smallest depth"),
-        pytest.param([9, 0, 4], pinhole, "outside", "at u 120.0, v 20.0, outside the 60 x 40 pixels", id="beside"),
+        pytest.param([9, 0, 4], pinhole, "outside", "at u 120.0, v 20.0, outside the 60 x 40 pixels of", id="beside"),
         pytest.param([9, 0, 0.5], lens, "beyond the lens", "beyond the lens of the camera", id="beyond the lens"),
         pytest.param([0, np.nan, 4], pinhole, "not finite", "a coordinate is not finite", id="NaN"),
         pytest.param([np.inf, 0, 4], pinhole, "not finite", "a coordinate is not finite", id="infinite"),
@@ -230,7 +230,13 @@ def test_every_camera_of_a_ring_says_why_it_does_not_see_a_point(ring):
     points, views, _ = ring
     result = ldls.segment(np.vstack([points, [[0, 0, -9.0]]]), as_views(views), params=PARAMS)
     verdict = ldls.explain(result, len(points)).verdict
-    assert all(f"behind camera {number}, at" in verdict for number in range(3))
+    assert verdict == (
+        f"Point {len(points)} is out of view: no camera sees it; it is behind camera 0, camera 1 and camera 2."
+    )
+    aside = ldls.segment(np.vstack([points, [[-20, 0, 0.0]]]), as_views(views), params=PARAMS)
+    assert ldls.explain(aside, len(points)).verdict.endswith(
+        "it is behind camera 1 and camera 2; it is outside the image of camera 0."
+    )
 
 
 def test_verdicts_are_sentences_with_both_sizes(ring):
@@ -258,15 +264,15 @@ def explanation(**changes):
         "point": 7, "xyz": (1.0, 2.0, 3.0), "label": 1, "diffused_label": 1, "sights": (),
         "names": {-1: "out of view", 0: "background", 1: "car"},
         "likelihoods": (Likelihood(label=1, value=0.5, share=1.0),),
-        "components": Components(label=1, sizes=(5,), own=0, removed=False),
+        "components": Components(label=1, sizes=(5,), own=0, removal=True),
     }  # fmt: skip
     return Explanation(**fields | changes)
 
 
-def tied(own, removed):
+def tied(own):
     from ldls.explanation import Components
 
-    return Components(label=1, sizes=(5, 5, 1), own=own, removed=removed)
+    return Components(label=1, sizes=(5, 5, 1), own=own, removal=True)
 
 
 def likelihoods(*values):
@@ -281,13 +287,13 @@ def likelihoods(*values):
     [
         pytest.param({}, "Point 7 is car (label 1): no other label reached it.", id="alone"),
         pytest.param(
-            {"label": 0, "components": tied(1, True)},
+            {"label": 0, "components": tied(1)},
             "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 5 points, "
             "as large as the one kept, which has the lowest row: removed.",
             id="as large as the kept one",
         ),
         pytest.param(
-            {"label": 0, "components": tied(2, True)},
+            {"label": 0, "components": tied(2)},
             "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 1 point, "
             "the largest has 5: removed.",
             id="one point",
@@ -398,6 +404,11 @@ def test_clouds_next_to_nothing_can_be_explained():
 def test_rows_that_are_none_are_refused(ring, point, message):
     with pytest.raises(ldls.ParameterError, match=message):
         ldls.explain(ring[2], point)
+
+
+def test_without_a_camera_every_point_is_out_of_view():
+    found = ldls.explain(ldls.segment(np.array([[0, 0, 5.0]]), []), 0)
+    assert found.verdict == "Point 0 is out of view: there is no camera."
 
 
 def test_an_empty_cloud_has_no_point_to_explain():

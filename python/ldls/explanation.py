@@ -93,14 +93,19 @@ class Components:
     Attributes:
         label: The label.
         sizes: Points of each, the largest first; of equal ones the one with the lowest row of the cloud first.
-        own: Which of them the point lies in, from 0. Outlier removal keeps number 0.
-        removed: Whether the point lost its label for that.
+        own: Which of them the point lies in, from 0.
+        removal: Whether outliers were removed, so that number 0 alone was kept.
     """
 
     label: int
     sizes: tuple[int, ...]
     own: int
-    removed: bool
+    removal: bool
+
+    @property
+    def removed(self) -> bool:
+        """Whether the point lost its label."""
+        return self.removal and self.own > 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,12 +290,11 @@ def _components(graph: csr_array, result: Segmentation, row: int) -> Components:
     # numbers are given in the order of the first members, and a stable sort keeps it among equals
     in_order = np.argsort(-sizes, kind="stable")
     own = component[np.searchsorted(members, row)]
-    point = result.in_view[row]
     return Components(
         label=int(diffused[row]),
         sizes=tuple(sizes[in_order].tolist()),
         own=int(np.flatnonzero(in_order == own)[0]),
-        removed=bool(result.labels[point] != result.diffused_labels[point]),
+        removal=result.params.remove_outliers,
     )
 
 

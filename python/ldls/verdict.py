@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -69,15 +70,24 @@ def _why_unseen(sights: tuple[Sight, ...]) -> str:
     if sights[0].outcome == "origin":
         return "it lies at (0, 0, 0), which stands for a missing return"
     if len(sights) == 1:
-        return _unseen_by(sights[0], "the camera")
-    return "; ".join(_unseen_by(sight, sight.camera) for sight in sights)
+        return _unseen_by(sights[0])
+    return f"no camera sees it; {'; '.join(_each_unseen(sights))}"
 
 
-def _unseen_by(sight: Sight, camera: str) -> str:
+def _unseen_by(sight: Sight) -> str:
     if sight.outcome == "behind":
-        return f"it is behind {camera}, at a depth of {sight.depth_m:.2f} m"
+        return f"it is behind the camera, at a depth of {sight.depth_m:.2f} m"
     if sight.pixel is None:
-        return f"it is beyond the lens of {camera}, at a depth of {sight.depth_m:.2f} m"
+        return f"it is beyond the lens of the camera, at a depth of {sight.depth_m:.2f} m"
     height, width = sight.image_size
     u, v = sight.pixel
-    return f"it falls at u {u:.1f}, v {v:.1f}, outside the {width} x {height} pixels of {camera}"
+    return f"it falls at u {u:.1f}, v {v:.1f}, outside the {width} x {height} pixels of the image"
+
+
+def _each_unseen(sights: tuple[Sight, ...]) -> Iterator[str]:
+    words = {"behind": "behind", "outside": "outside the image of", "beyond the lens": "beyond the lens of"}
+    for outcome, where in words.items():
+        cameras = [sight.camera for sight in sights if sight.outcome == outcome]
+        if cameras:
+            *first, last = cameras
+            yield f"it is {where} {', '.join(first) + ' and ' if first else ''}{last}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ldls.cli import annotate, demo, evaluate, info, masks, reproduce, run, segment, simulate
+from ldls.cli import annotate, demo, evaluate, explain, info, masks, reproduce, run, segment, simulate
 
 app = typer.Typer(
     name="ldls",
@@ -15,6 +15,8 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command(name="segment")(segment.segment)
+# -3.2,1,0.5 is a place and no option
+app.command(name="explain", context_settings={"ignore_unknown_options": True})(explain.explain)
 app.command(name="info")(info.info)
 app.command(name="run")(run.run)
 app.add_typer(masks.app, name="masks")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ldls.camera import Camera
+from ldls.cli.frame_files import CALIB, COLOUR_CAMERA, EXISTING, IMAGE_ID, MASKS, POINTS, segment_files
 from ldls.cli.mask_options import (
     CategoriesOption,
     MinScoreOption,
@@ -16,30 +16,16 @@ from ldls.cli.mask_options import (
 )
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
-from ldls.io import read_image, read_points
-from ldls.label_diffusion import segment as segment_cloud
+from ldls.io import read_image
 from ldls.params import Params
-
-EXISTING = {"exists": True, "dir_okay": False, "readable": True}
 
 
 @speaks_plainly
 def segment(
-    points: Annotated[
-        Path,
-        typer.Option(help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, .csv, .txt or .xyz.", **EXISTING),
-    ],
-    calib: Annotated[Path, typer.Option(help="KITTI calibration of the frame.", **EXISTING)],
+    points: Annotated[Path, POINTS],
+    calib: Annotated[Path, CALIB],
     out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
-    masks: Annotated[
-        Path | None,
-        typer.Option(
-            help="Instance masks: COCO .json, .npz of ldls or the LDLS research code, instance .png, .npy stack, or "
-            "KITTI label_2 .txt.",
-            show_default=False,
-            **EXISTING,
-        ),
-    ] = None,
+    masks: Annotated[Path | None, MASKS] = None,
     segmenter: SegmenterOption = None,
     image: Annotated[
         Path | None,
@@ -54,8 +40,8 @@ def segment(
     camera: Annotated[
         int,
         typer.Option(min=0, max=3, help="Which camera of the calibration; 2 is the left colour one."),
-    ] = 2,
-    image_id: Annotated[int | None, typer.Option(help="Which image of a COCO file that holds several.")] = None,
+    ] = COLOUR_CAMERA,
+    image_id: Annotated[int | None, IMAGE_ID] = None,
     formats: Annotated[
         list[Output] | None,
         typer.Option("--format", help="What to write; may be repeated.", show_default="npz, label, ply, png"),
@@ -120,7 +106,7 @@ def segment(
     )
     if save_masks is not None:
         chosen.save(save_masks)
-    result = segment_cloud(read_points(points), chosen, Camera.from_kitti(calib, camera=camera), params=params)
+    result = segment_files(points, chosen, calib, camera=camera, params=params)
     name = points.stem.removesuffix(".pcd")
     written = write_outputs(out, name, result, pixels, formats or DEFAULT_OUTPUTS)
     if picture is not None:

@@ -1,0 +1,107 @@
+"""Which point of a result a word on the command line means."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import InputError, ParameterError
+from ldls.segmentation import Segmentation
+from ldls.view import SeenView
+
+EXPECTED = "a row number as 12345, a pixel U,V as 610,180 or a place X,Y,Z in metres as 12.5,-3,0.2"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChosenPoint:
+    """A point and how it was come to.
+
+    Attributes:
+        row: Its row in the cloud.
+        how: What it is nearest to and how near; empty where the row was given.
+    """
+
+    row: int
+    how: str = ""
+
+
+def chosen_point(word: str, result: Segmentation, camera: str | None = None) -> ChosenPoint:
+    """The point that `word` means: the row itself, the point in view nearest to a pixel, or nearest to a place.
+
+    Args:
+        word: A row number, U,V in pixels, or X,Y,Z in metres.
+        result: What to look in.
+        camera: Name or number of the view that a pixel belongs to; only a ring needs it.
+
+    Raises:
+        ParameterError: The word is none of these, or there is no such camera, or none is needed.
+        InputError: No point can be nearest: there is no camera, none is in view, or none is finite.
+    """
+    numbers = _numbers(word)
+    if len(numbers) == 2:
+        return _nearest_to_pixel(result, _view_of(result, camera), np.array(numbers))
+    if camera is not None and len(result.views) > 1:
+        raise ParameterError(f"--camera: got {camera!r} beside {word!r}; only a pixel U,V belongs to a camera")
+    if len(numbers) == 3:
+        return _nearest_to_place(result, np.array(numbers))
+    return ChosenPoint(row=_row(word))
+
+
+def _numbers(word: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in word.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (1, 2, 3) or not all(map(math.isfinite, numbers)):
+        raise ParameterError(f"POINT: got {word!r}, expected {EXPECTED}")
+    return numbers
+
+
+def _row(word: str) -> int:
+    try:
+        return int(word)
+    except ValueError:
+        raise ParameterError(f"POINT: got {word!r}, expected {EXPECTED}") from None
+
+
+def _view_of(result: Segmentation, camera: str | None) -> SeenView:
+    if not result.views:
+        raise InputError("POINT: got a pixel, and there is no camera; give a row number or X,Y,Z")
+    names = [seen.view.name or f"camera {number}" for number, seen in enumerate(result.views)]
+    if camera is None and len(names) == 1:
+        return result.views[0]
+    listed = ", ".join(f"{number} {name}" for number, name in enumerate(names))
+    if camera is None:
+        raise ParameterError(f"--camera: missing, and a pixel of which picture? Expected one of {listed}")
+    if camera in names:
+        return result.views[names.index(camera)]
+    if camera.isdecimal() and int(camera) < len(names):
+        return result.views[int(camera)]
+    raise ParameterError(f"--camera: got {camera!r}, expected one of {listed}")
+
+
+def _nearest_to_pixel(result: Segmentation, seen: SeenView, uv_px: NDArray[np.float64]) -> ChosenPoint:
+    if not len(seen.in_view):
+        raise InputError("POINT: no point is in view of the camera; give a row number or X,Y,Z")
+    distances = np.linalg.norm(seen.pixels - uv_px, axis=1)
+    # of points behind one another, the one that the camera would see
+    ranges_m = np.linalg.norm(result.points[seen.in_view, :3], axis=1)
+    nearest = int(np.lexsort((ranges_m, distances))[0])
+    row = int(seen.in_view[nearest])
+    u, v = uv_px.tolist()
+    how = f"Point {row} is the one in view nearest to pixel {u:g},{v:g}: {distances[nearest]:.1f} pixels away."
+    return ChosenPoint(row=row, how=how)
+
+
+def _nearest_to_place(result: Segmentation, xyz: NDArray[np.float64]) -> ChosenPoint:
+    distances = np.linalg.norm(result.points[:, :3].astype(np.float64) - xyz, axis=1)
+    if not np.isfinite(distances).any():
+        raise InputError("POINT: no point of the cloud is finite; give a row number")
+    row = int(np.nanargmin(distances))
+    x, y, z = xyz.tolist()
+    return ChosenPoint(
+        row=row, how=f"Point {row} is the one nearest to {x:g},{y:g},{z:g}: {distances[row]:.2f} m away."
+    )

@@ -1,0 +1,115 @@
+"""`ldls explain`: why a point has its label."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ldls.cli.frame_files import CALIB, COLOUR_CAMERA, EXISTING, IMAGE_ID, MASKS, POINTS, segment_files
+from ldls.cli.messages import console, speaks_plainly
+from ldls.errors import InputError, ParameterError
+from ldls.segmentation import Segmentation
+
+
+def refuse_options(word: str) -> str:
+    """`word`, unless it is an option: the command takes what it does not know for arguments, as -3.2,1,0.5 is one.
+
+    Raises:
+        typer.BadParameter: It is an option.
+    """
+    if word.startswith("-") and not word[1:2].isdigit() and not word.startswith("-."):
+        raise typer.BadParameter(f"no such option: {word}")
+    return word
+
+
+@speaks_plainly
+def explain(
+    point: Annotated[
+        str,
+        typer.Argument(
+            metavar="POINT",
+            help="Row number in the cloud, from 0; or U,V, a pixel of the picture; or X,Y,Z in metres in the lidar "
+            "frame. Of a pixel or a place, the nearest point is taken.",
+            callback=refuse_options,
+        ),
+    ],
+    result: Annotated[
+        Path | None,
+        typer.Argument(metavar="RESULT", help="An .npz file of ldls.", show_default=False, **EXISTING),
+    ] = None,
+    points: Annotated[Path | None, POINTS] = None,
+    calib: Annotated[Path | None, CALIB] = None,
+    masks: Annotated[Path | None, MASKS] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            help="Whose pixel U,V is, by name or number from 0, in a result of several cameras. With --calib: which "
+            "camera of the calibration, 0 to 3.",
+            show_default=f"with --calib {COLOUR_CAMERA}, the left colour one",
+        ),
+    ] = None,
+    image_id: Annotated[int | None, IMAGE_ID] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
+) -> None:
+    """Say why a point has its label.
+
+    The first line is the verdict. Then come what each camera sees of the point (its pixel, and what masks cover the
+    window around it), the likelihood of every label, the edges over which labels flow to it, and, for a point of an
+    object, the connected components of which outlier removal keeps the largest. Points out of view are told why.
+
+    The point is one of a result that ldls wrote (.npz), or of a sweep that is segmented on the spot with the paper's
+    parameters. Needs the extra eval.
+
+    Examples:
+    ldls explain 12345 results/000571.npz
+
+    ldls explain 610,180 results/000571.npz
+
+    ldls explain 12.5,-3,0.2 --points velodyne/000571.bin --calib calib/000571.txt --masks masks/000571.json
+    """
+    from ldls.cli.chosen_point import chosen_point
+    from ldls.explanation import explain as explain_point
+
+    if result is not None:
+        _refuse_files(points, calib, masks, image_id)
+        found, view = Segmentation.from_npz(result), camera
+    else:
+        found, view = _segmented(points, calib, masks, camera, image_id), None
+    chosen = chosen_point(point, found, view)
+    explanation = explain_point(found, chosen.row)
+    if as_json:
+        typer.echo(json.dumps(explanation.to_dict(), allow_nan=False, indent=2, ensure_ascii=False))
+        return
+    from ldls.cli.explanation_tables import tables_of
+
+    screen = console()
+    for part in (explanation.verdict, chosen.how, *tables_of(explanation)):
+        if part:
+            # a program that reads the sentences gets each as one line
+            one_line = isinstance(part, str) and not screen.is_terminal
+            screen.print(part, highlight=False, markup=False, soft_wrap=one_line)
+
+
+def _refuse_files(points: Path | None, calib: Path | None, masks: Path | None, image_id: int | None) -> None:
+    options = {"--points": points, "--calib": calib, "--masks": masks, "--image-id": image_id}
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise InputError(f"{given[0]}: given beside RESULT, which has points, camera and masks; leave one of them out")
+
+
+def _segmented(
+    points: Path | None, calib: Path | None, masks: Path | None, camera: str | None, image_id: int | None
+) -> Segmentation:
+    from ldls.cli.mask_options import masks_of
+    from ldls.params import Params
+
+    if points is None or calib is None or masks is None:
+        raise InputError("RESULT: missing; give an .npz file of ldls, or --points, --calib and --masks, all three")
+    number = str(COLOUR_CAMERA) if camera is None else camera
+    if number not in ("0", "1", "2", "3"):
+        raise ParameterError(f"--camera: got {camera!r}, expected 0 to 3, a camera of the calibration")
+    found = masks_of(None, masks=masks, segmenter=None, image_id=image_id)
+    return segment_files(points, found, calib, camera=int(number), params=Params())

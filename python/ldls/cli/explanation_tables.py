@@ -1,0 +1,187 @@
+"""What `ldls explain` prints below its verdict: tables, and sentences between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rich.markup import escape
+from rich.table import Table
+
+from ldls.explanation import Components, Explanation, Likelihood, Neighbor
+from ldls.sight import Sight
+from ldls.verdict import count_points, named, percent
+
+SHOWN_SHARE = 0.0005
+"""Share below which a likelihood is not listed, for it would read 0.0 %."""
+SHOWN_COMPONENTS = 8
+UNSEEN = {"behind": "behind the camera", "outside": "outside the image", "origin": "at the origin"}
+
+
+def tables_of(explanation: Explanation) -> Iterator[Table | str]:
+    """The parts in the order in which they are printed; a point out of view has but its place and what cameras say."""
+    yield _place(explanation)
+    yield _course(explanation)
+    yield sight_table(explanation)
+    if explanation.edges is None:
+        return
+    yield likelihood_table(explanation)
+    yield _provenance(explanation)
+    yield edge_table(explanation)
+    yield _island(explanation)
+    if explanation.components is not None:
+        yield component_table(explanation, explanation.components)
+
+
+def sight_table(explanation: Explanation) -> Table:
+    """What each camera has of the point."""
+    table = Table(title="what the camera sees" if len(explanation.sights) == 1 else "what the cameras see")
+    table.add_column("camera")
+    table.add_column("depth", justify="right")
+    table.add_column("u, v", justify="right")
+    table.add_column("nearest pixel")
+    table.add_column("pixels of its window")
+    for sight in explanation.sights:
+        table.add_row(
+            escape(sight.camera),
+            "-" if sight.depth_m is None else f"{sight.depth_m:.2f} m",
+            "-" if sight.pixel is None else "{:.1f}, {:.1f}".format(*sight.pixel),
+            escape(_nearest_pixel(explanation, sight)),
+            escape(_window(explanation, sight)),
+        )
+    return table
+
+
+def likelihood_table(explanation: Explanation) -> Table:
+    """The likelihoods that are more than nothing, the highest first."""
+    table = Table(title="likelihood after diffusion")
+    table.add_column("object")
+    for heading in ("likelihood", "share"):
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    listed = [each for each in explanation.likelihoods if _is_listed(explanation, each)]
+    for each in listed:
+        table.add_row(
+            escape(named(explanation, each.label)),
+            f"{each.value:.6f}",
+            percent(each.share),
+            _standing(explanation, each),
+        )
+    rest = explanation.likelihoods[len(listed) :]
+    if rest:
+        value, share = (sum(part) for part in zip(*((each.value, each.share) for each in rest), strict=True))
+        table.add_row(f"{len(rest)} more", f"{value:.6f}", percent(share), "")
+    return table
+
+
+def edge_table(explanation: Explanation) -> Table:
+    """The edges of the point: what each product takes of what."""
+    assert explanation.edges is not None
+    table = Table(title="edges: where labels flow to it from")
+    table.add_column("from")
+    for heading in ("distance", "weight", "share"):
+        table.add_column(heading, justify="right")
+    table.add_column("object")
+    pixels = sum(sight.window_pixels for sight in explanation.sights)
+    table.add_row("itself", "", f"{1:.4f}", percent(explanation.edges.own), "")
+    for each in explanation.neighbors:
+        table.add_row(
+            f"point {each.point}",
+            f"{each.distance_m:.3f} m",
+            f"{each.weight:.4f}",
+            percent(each.share),
+            escape(_object(explanation, each)),
+        )
+    table.add_row(f"its {pixels} pixels", "", "", percent(explanation.edges.pixels), "")
+    return table
+
+
+def component_table(explanation: Explanation, found: Components) -> Table:
+    """The components of the points that diffusion gave one label, the largest and that of the point."""
+    table = Table(title=escape(f"components of {named(explanation, found.label)}"))
+    table.add_column("points", justify="right")
+    table.add_column("")
+    listed = sorted({*range(min(SHOWN_COMPONENTS, len(found.sizes))), found.own})
+    for number in listed:
+        table.add_row(f"{found.sizes[number]:,}", _component(found, number))
+    rest = sum(found.sizes) - sum(found.sizes[number] for number in listed)
+    if rest:
+        table.add_row(f"{rest:,}", f"in {len(found.sizes) - len(listed)} more")
+    return table
+
+
+def _place(explanation: Explanation) -> str:
+    x, y, z = explanation.xyz
+    place = f"It lies at x {x:.2f}, y {y:.2f}, z {z:.2f} m in the lidar frame"
+    distance = math.hypot(x, y, z)
+    return f"{place}, {distance:.1f} m away." if math.isfinite(distance) else f"{place}."
+
+
+def _course(explanation: Explanation) -> str:
+    found = {sight.camera: sight.direct_label for sight in explanation.sights if sight.direct_label is not None}
+    if not found:
+        return ""
+    direct = (
+        named(explanation, label) + (f" by {camera}" if len(found) > 1 else "") for camera, label in found.items()
+    )
+    diffused, final = (named(explanation, label) for label in (explanation.diffused_label, explanation.label))
+    course = f"Direct projection: {', '.join(direct)}. After diffusion: {diffused}."
+    removal = explanation.components is not None and explanation.components.removal
+    return f"{course} After outlier removal: {final}." if removal else course
+
+
+def _nearest_pixel(explanation: Explanation, sight: Sight) -> str:
+    if sight.nearest_pixel is None or sight.direct_label is None:
+        return UNSEEN.get(sight.outcome, sight.outcome)
+    return "{}, {}: ".format(*sight.nearest_pixel) + named(explanation, sight.direct_label)
+
+
+def _window(explanation: Explanation, sight: Sight) -> str:
+    lines = (f"{each.pixels} of {sight.window_pixels}: {named(explanation, each.label)}" for each in sight.window)
+    return "\n".join(lines) or "-"
+
+
+def _is_listed(explanation: Explanation, each: Likelihood) -> bool:
+    return each.share >= SHOWN_SHARE or each in (explanation.winner, explanation.runner_up)
+
+
+def _standing(explanation: Explanation, each: Likelihood) -> str:
+    winner = explanation.winner
+    if winner is None or each.label == winner.label:
+        return "the highest"
+    if each is not explanation.runner_up:
+        return ""
+    return f"next, behind by {percent(winner.share - each.share)} of the sum"
+
+
+def _provenance(explanation: Explanation) -> str:
+    found = explanation.provenance
+    if found is None:
+        return ""
+    return (
+        f"Of the likelihood of {named(explanation, explanation.diffused_label)}, {percent(found.own_share)} comes from "
+        f"the point's own pixels, and half from pixels of points within {found.half_within_m:.2f} m."
+    )
+
+
+def _object(explanation: Explanation, each: Neighbor) -> str:
+    given = named(explanation, each.diffused_label)
+    return given if each.label == each.diffused_label else f"background, {given} before outlier removal"
+
+
+def _island(explanation: Explanation) -> str:
+    found = explanation.island
+    if found is None or found.islands == 1:
+        return ""
+    return (
+        f"It lies in a part of the graph of {count_points(found.points)}; no label crosses to the "
+        f"{found.islands - 1} others."
+    )
+
+
+def _component(found: Components, number: int) -> str:
+    own = "this point's" if number == found.own else ""
+    if not found.removal:
+        return own
+    fate = "kept" if number == 0 else "removed"
+    return f"{own}, {fate}" if own else fate
