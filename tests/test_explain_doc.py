@@ -1,0 +1,56 @@
+"""The commands and examples of docs/explain.md run, and print what is shown."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from ldls.cli import app
+
+DOC = (Path(__file__).parents[1] / "docs/explain.md").read_text()
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("doc")
+    outcome = CliRunner().invoke(app, ["demo", "--out", str(folder / "ldls-demo")])
+    assert outcome.exit_code == 0, outcome.output
+    return folder
+
+
+def words(text):
+    """Only the words: other machines may round numbers in another way."""
+    return re.findall(r"[A-Za-z]+", text)
+
+
+def test_commands_print_what_is_shown(demo, monkeypatch):
+    monkeypatch.chdir(demo)
+    blocks = re.findall(r"```(sh|text)\n(.*?)```", DOC, re.DOTALL)
+    commands = [line for kind, text in blocks if kind == "sh" for line in text.splitlines()]
+    assert len(commands) == 8
+    output = ""
+    for kind, text in blocks:
+        if kind == "text":
+            shown = text.splitlines()
+            printed = output.splitlines()[: len(shown)]
+            assert printed[0] == shown[0]
+            assert words("\n".join(printed)) == words(text)
+            continue
+        for command in text.splitlines():
+            _, *arguments = shlex.split(command)
+            outcome = CliRunner().invoke(app, arguments)
+            assert outcome.exit_code == 0, outcome.output
+            output = outcome.output
+
+
+def test_the_examples_run(demo, monkeypatch, capsys):
+    monkeypatch.chdir(demo)
+    names = {}
+    for example in re.findall(r"```python\n(.*?)```", DOC, re.DOTALL):
+        exec(example, names)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0] == names["found"].verdict
+    assert [line.split()[0] for line in printed[-4:]] == ["50", "100", "150", "200"]
+    assert printed[-1].split()[1] == "9"
