@@ -24,7 +24,7 @@ print(f"\n{source.kind}: {len(source)} frames, cameras {', '.join(source.camera_
 
 # As on a robot: one object keeps its memory from frame to frame.
 stream = ldls.LabelDiffusion()
-for number, frame in enumerate(source):
+for frame in source:
     (image,) = frame.images
     masks = ldls.InstanceMasks.from_file(masks_folder / f"{frame.name}.json")
     start = time.perf_counter()
@@ -38,7 +38,6 @@ for number, frame in enumerate(source):
 settings = batch.RunSettings(masks=str(masks_folder), formats=("npz", "label"))
 for _ in range(2):
     summary = batch.run(source, out / "labels", settings)
-    print(
-        f"{summary.n_done} frames done, {summary.n_earlier} of them by earlier runs; objects: {dict(summary.objects)}"
-    )
+    print(f"{summary.n_done} frames done, {summary.n_earlier} of them by earlier runs")
+print("objects:", ", ".join(f"{count} x {name}" for name, count in summary.objects.items()))
 print(f"now try: ldls view {out / 'labels' / source.names[0]}.npz")

@@ -2,8 +2,8 @@
 
     python examples/own_camera_and_lidar.py [OUT]        needs the extra sim, for the frames
 
-A robot with a 16-beam lidar and a small camera stands in for yours. What you need is the intrinsic matrix K, the pose of
-the camera on the vehicle, and files; the folder's ldls.toml says where they lie.
+A robot with a 16-beam lidar and a small camera stands in for yours. What you need is the intrinsic matrix K, the pose
+of the camera on the vehicle, and files; the folder's ldls.toml says where they lie.
 """
 
 import sys
@@ -30,8 +30,8 @@ for number, frame in enumerate(frames):
     Image.fromarray(frame.image).save(out / "front" / f"{number:04}.png")
     frame.masks.save(out / "masks" / f"{number:04}.json")
 
-# The calibration. T_camera_lidar takes lidar coordinates to camera coordinates (x right, y down, z forward). Most sheets
-# say the opposite, where the camera sits in the lidar's frame: turn that around, do not copy it.
+# The calibration. T_camera_lidar takes lidar coordinates to camera coordinates (x right, y down, z forward). Most
+# sheets say the opposite, where the camera sits in the lidar's frame: turn that around, do not copy it.
 true = rig.cameras[0]
 position = np.linalg.inv(true.T_camera_lidar())[:3, 3]  # of the camera, in the lidar's frame, in metres
 print("the camera sits at x y z =", np.round(position, 3), "m of the lidar")
