@@ -38,10 +38,13 @@ bench: ## Compare with peers, then time every stage.
 	python -m benches
 	cargo bench
 
-.PHONY: picture
-picture: ## Make the picture of the README anew.
-	ldls demo --out build/demo
-	cp build/demo/demo.png docs/images/demo.png
+.PHONY: docs
+docs: ## Build the documentation into site/, strictly: a dead link is an error.
+	mkdocs build --strict
+
+.PHONY: pictures
+pictures: ## Make the pictures of the documentation anew, by the commands beside them.
+	python docs/pictures.py
 
 .PHONY: kills
 kills: ## Kill 200 runs of `ldls run` and hold what they leave, resumed, against an undisturbed one.

@@ -1,0 +1,126 @@
+"""The Python of README.md and docs/: it runs, one block after the other, and does what the page says."""
+
+import numpy as np
+import pages
+import pytest
+from typer.testing import CliRunner
+
+from ldls.cli import app
+
+EVERY_BLOCK = [
+    pytest.param(page.name, block, id=f"{page.relative_to(pages.ROOT)}, block {number}")
+    for page in pages.pages()
+    for number, block in enumerate(pages.blocks(page.read_text(), "python"), start=1)
+]
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Runs the blocks of a page in an empty folder, all or those that hold a text; returns the names they leave."""
+    monkeypatch.chdir(tmp_path)
+
+    def blocks_of(page, holding=""):
+        names = {}
+        for block in pages.blocks((pages.ROOT / page).read_text(), "python"):
+            if holding in block:
+                exec(block, names)
+        return names
+
+    return blocks_of
+
+
+@pytest.fixture
+def demo_files(tmp_path, monkeypatch):
+    """What `ldls demo` leaves, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["demo", "--out", "ldls-demo"]).exit_code == 0
+
+
+@pytest.mark.parametrize(("page", "block"), EVERY_BLOCK)
+def test_it_is_python(page, block):
+    compile(block, page, "exec")
+
+
+def test_readme(run, tmp_path, capsys):
+    names = run("README.md")
+    assert "person" in capsys.readouterr().out
+    assert (tmp_path / "frame.label").stat().st_size == 4 * len(names["points"])
+    person = names["result"].labels[len(names["wall"]) :]
+    assert (person == 1).mean() > 0.95
+    assert np.isin(names["result"].labels[: len(names["wall"])], [-1, 0]).mean() > 0.9
+
+
+def test_masks(run, capsys):
+    names = run("docs/masks.md")
+    assert capsys.readouterr().out == "['car', 'person']\n"
+    assert [mask.area for mask in names["masks"]] == [20_000, 16_000]
+    assert len(names["boxes"]) == 1
+    assert [mask.name for mask in names["cars_and_people"]] == ["person", "car", "car"]
+
+
+def test_rings(run, capsys):
+    names = run("docs/rings.md")
+    result = names["result"]
+    assert result.sources == (((0, 0), (1, 0)),)
+    assert (result.labels[: len(names["car"])] == 1).mean() > 0.9
+    assert "left" in capsys.readouterr().out
+
+
+def test_quick_start(demo_files, run, tmp_path, capsys):
+    names = run("docs/quick-start.md")
+    assert "12 of 12 objects found" in capsys.readouterr().out
+    assert (tmp_path / "street.ply").stat().st_size > 12 * len(names["points"])
+
+
+def test_own_sensors(demo_files, run, tmp_path):
+    folder = tmp_path / "mine"
+    for source, target in (("points.bin", "lidar/a.bin"), ("image.png", "front/a.png"), ("masks.npz", "masks/a.npz")):
+        (folder / target).parent.mkdir(parents=True)
+        (tmp_path / "ldls-demo/input" / source).rename(folder / target)
+    (recipe, _) = pages.recipes(pages.ROOT / "docs/own-sensors.md")
+    (folder / "ldls.toml").write_text(recipe.commands.partition("<<'END'\n")[2].partition("END\n")[0])
+    names = run("docs/own-sensors.md")
+    assert sum(found.n_points > 0 for found in names["result"].objects) == 12
+    # the page's transform is that of the demo, put together from a pose and a turn
+    image = names["frame"].images[0]
+    np.testing.assert_allclose(names["T_camera_lidar"], image.camera.T_camera_lidar, atol=1e-12)
+    assert image.read().shape[:2] == names["camera"].image_size
+
+
+def test_errors(run, tmp_path, capsys):
+    (tmp_path / "000571.bin").write_bytes(b"cut")
+    names = run("docs/errors.md")
+    error, report = capsys.readouterr().out.splitlines()
+    assert error.startswith("truncated_file 000571.bin: 3 bytes")
+    assert f"prints `{report}`" in (pages.ROOT / "docs/errors.md").read_text()
+    assert names["report"].n_points == 5
+
+
+def test_parameters(run, capsys):
+    pytest.importorskip("embreex")
+    from ldls.simulation import suite_orders
+    from ldls.simulation.production import make_frames
+
+    frames = suite_orders("tuning")[:2]
+    assert len(list(make_frames("tuning", frames, processes=1))) == len(frames)
+    names = run("docs/parameters.md", holding="def scores")
+    assert len(capsys.readouterr().out.splitlines()) == len(names["SETTINGS"])
+
+
+def test_from_a_bag_to_a_labelled_bag(run):
+    pytest.importorskip("rosbags")
+    pytest.importorskip("embreex")
+    from ldls.datasets import RosBag
+    from ldls.simulation import write_robot_drive
+
+    write_robot_drive("robot", "mcap", frames=2)
+    names = run("docs/ros.md", holding="import ldls")
+    labelled = RosBag("robot/labelled", points_topic="/points_labelled")
+    assert len(labelled) == 2
+    np.testing.assert_array_equal(labelled.cloud(1).fields["class_id"], names["result"].categories)
+
+
+def test_ci_runs_the_test_command_of_the_readme():
+    command = "pip install '.[test]' && pytest"
+    assert command in (pages.ROOT / "README.md").read_text()
+    assert command in (pages.ROOT / ".ci/run").read_text()
