@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -66,14 +65,24 @@ def examples(text: str) -> list[str]:
 
 
 def wrapped(command: str) -> str:
-    """A command of several lines, where it is too long for one."""
-    lines = textwrap.wrap(command, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    """A command over several lines, where it is too long for one; options stay with their values."""
+    first, *options = re.split(r" (?=--)", command)
+    lines = [first]
+    for option in options:
+        if len(lines[-1]) + len(option) > WIDTH:
+            lines.append("   ")
+        lines[-1] += f" {option}"
     return " \\\n".join(lines)
 
 
 def table(records: list[tuple[str, str]]) -> str:
     """Options and what they do, as HTML: their texts may hold what Markdown takes for its own."""
     rows = "\n".join(
-        f"<tr><td><code>{escape(option)}</code></td><td>{escape(what)}</td></tr>" for option, what in records
+        f"<tr><td><code>{breakable(option)}</code></td><td>{escape(what)}</td></tr>" for option, what in records
     )
     return f"<table>\n<thead><tr><th>option</th><th>what it does</th></tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table>"
+
+
+def breakable(option: str) -> str:
+    """An option as HTML that may be broken where values are listed."""
+    return escape(option).replace("|", "|<wbr>")

@@ -1,7 +1,9 @@
 """Sources of frames: data sets, drives, bags and folders, one module each.
 
-for frame in open_source("2011_09_26/2011_09_26_drive_0001_sync"):
-    result = ldls.segment(frame.points, masks_of(frame.images[0].read()), frame.images[0].camera)
+    for frame in open_source("2011_09_26/2011_09_26_drive_0001_sync"):
+        result = ldls.segment(frame.points, masks_of(frame.images[0].read()), frame.images[0].camera)
+
+reads one frame after the other.
 """
 
 from ldls.datasets.folder import FolderSource
