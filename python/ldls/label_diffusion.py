@@ -82,7 +82,7 @@ class LabelDiffusion:
         camera: The camera that takes the images, or several.
         params: Parameters of the method.
 
-    Example:
+    Examples:
         >>> diffusion = ldls.LabelDiffusion(camera)  # doctest: +SKIP
         >>> for points, masks in stream:  # doctest: +SKIP
         ...     labels = diffusion.segment(points, masks).labels

@@ -33,7 +33,7 @@ class LabelledBag:
     class_id (uint8: the category id, COCO's with COCO's masks; 0 for none), probability (float32: the confidence) and
     rgb (float32 whose bits are 0x00RRGGBB, as viewers expect).
 
-    Example:
+    Examples:
         >>> source = RosBag("drive.bag")  # doctest: +SKIP
         >>> with LabelledBag("labelled.bag", "rosbag1") as bag:  # doctest: +SKIP
         ...     bag.copy(source.path)
