@@ -25,6 +25,7 @@ WRITERS: dict[str, Callable[[Path, Segmentation], None]] = {
     ".parquet": parquet.write,
     ".csv": csv.write,
 }
+"""What writes a segmentation, by the ending of the name."""
 
 
 def write(path: str | PathLike[str], result: Segmentation) -> None:
