@@ -124,3 +124,12 @@ def test_ci_runs_the_test_command_of_the_readme():
     command = "pip install '.[test]' && pytest"
     assert command in (pages.ROOT / "README.md").read_text()
     assert command in (pages.ROOT / ".ci/run").read_text()
+
+
+def test_viewing(run, demo_files, tmp_path, monkeypatch):
+    (tmp_path / "ldls-demo").rename(tmp_path / "street")
+    monkeypatch.setattr("PIL.Image.Image.show", lambda picture: None)
+    run("docs/viewing.md")
+    assert {path.name for path in tmp_path.glob("street*.png")} == {
+        "street.png", "street-birds-eye.png", "street-comparison.png",
+    }  # fmt: skip
