@@ -1,3 +1,4 @@
+import itertools
 import shutil
 import subprocess
 import sys
@@ -140,3 +141,15 @@ def test_every_format_can_be_asked_for(demo, tmp_path):
     assert outcome.exit_code == 0, outcome.output
     endings = {*WRITERS, ".png"}
     assert {path.name for path in tmp_path.iterdir()} == {f"points{ending}" for ending in endings}
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_help_fits_the_terminal(width):
+    text = run(app, ["run", "--help"], env={"COLUMNS": str(width)}).output
+    lines = [line.strip() for line in text.splitlines()]
+    start = next(at for at, line in enumerate(lines) if line.startswith("Files appear"))
+    paragraph = lines[start : lines.index("", start)]
+    # no line but the last ends where the next word had found room
+    for line, following in itertools.pairwise(paragraph):
+        assert len(line) + 1 + len(following.split()[0]) > width - 4
+    assert "Examples:" in lines

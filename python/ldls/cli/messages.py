@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import ParamSpec, TypeVar
@@ -28,7 +29,7 @@ STAGES = {
 
 
 def speaks_plainly(command: Callable[P, R]) -> Callable[P, R]:
-    """`command`, with its errors and warnings as single lines instead of tracebacks."""
+    """`command`, with its errors and warnings as single lines instead of tracebacks, and help for any width."""
 
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -44,7 +45,14 @@ def speaks_plainly(command: Callable[P, R]) -> Callable[P, R]:
                     typer.secho(f"warning: {warning.message}", err=True, fg="yellow")
         return result
 
+    wrapped.__doc__ = flowing(inspect.getdoc(command) or "")
     return wrapped
+
+
+def flowing(text: str) -> str:
+    """`text` with each paragraph on one line, as terminals of any width can wrap it; "Examples:" keeps its own."""
+    paragraphs = [" ".join(paragraph.split()) for paragraph in text.split("\n\n")]
+    return "\n\n".join(paragraph.replace("Examples: ", "Examples:\n", 1) for paragraph in paragraphs)
 
 
 def object_table(objects: Sequence[SegmentedObject]) -> Table:

@@ -49,8 +49,10 @@ def reproduce(
     the scores by maximum range and by number of iterations. Only points in view of the camera count. Writes the
     tables as Markdown, CSV and JSON, and the figures as PNG.
 
-    Examples: ldls reproduce kitti/training --truth boxes --out tables
-    and, with nothing downloaded, ldls reproduce --suite validation --out tables
+    Examples:
+    ldls reproduce --suite validation --out tables
+
+    ldls reproduce kitti/training --truth boxes --out tables
     """
     from ldls.evaluation import ClassSet
     from ldls.evaluation.kitti_frames import KittiFrames
