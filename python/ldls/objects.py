@@ -12,9 +12,9 @@ NEAR_M = 0.1
 """Distance from a side up to which points count the same: sides bulge, and ranges are noisy."""
 AS_GOOD = 0.998
 """Share of the best closeness from which on area decides."""
-STRAY = 0.02
+STRAY = 0.04
 """Share of the points at either end that do not decide where a side is."""
-MOST_LOOKED_AT = 500
+MOST_LOOKED_AT = 150
 """Points of an object, evenly chosen, that decide on its heading."""
 
 
@@ -92,17 +92,20 @@ def fit_upright_box(points: NDArray[np.float64]) -> OrientedBox:
 
 def _best(ground: NDArray[np.float64], headings: NDArray[np.float64]) -> int:
     """Which heading fits (n, 2) places best."""
-    axes = np.stack([np.cos(headings), np.sin(headings)]), np.stack([-np.sin(headings), np.cos(headings)])
-    places = [ground @ axis for axis in axes]
-    to_side = np.minimum(*(_to_nearer_side(each) for each in places))
-    closeness = (1 / np.maximum(to_side, NEAR_M)).sum(axis=0)
-    along, across = (np.ptp(each, axis=0) for each in places)
+    along = np.stack([np.cos(headings), np.sin(headings)], axis=1) @ ground.T
+    across = np.stack([-np.sin(headings), np.cos(headings)], axis=1) @ ground.T
+    to_side = np.minimum(_to_nearer_side(along), _to_nearer_side(across))
+    closeness = (1 / np.maximum(to_side, NEAR_M)).sum(axis=1)
     as_good = closeness >= AS_GOOD * closeness.max()
-    return int(np.argmin(np.where(as_good, along * across, np.inf)))
+    return int(np.argmin(np.where(as_good, np.ptp(along, axis=1) * np.ptp(across, axis=1), np.inf)))
 
 
 def _to_nearer_side(places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distances (n, headings) of places along an axis to that end of them to which they are nearer as a whole."""
-    low, high = np.quantile(places, [STRAY, 1 - STRAY], axis=0)
+    """Distances (headings, n) of places along an axis to that end of them to which they are nearer as a whole."""
+    n = places.shape[1]
+    stray = int(STRAY * (n - 1))
+    in_order = np.partition(places, (stray, n - 1 - stray), axis=1)
+    low, high = in_order[:, stray, None], in_order[:, n - 1 - stray, None]
     to_low, to_high = np.abs(places - low), np.abs(high - places)
-    return np.asarray(np.where(np.square(to_low).sum(axis=0) < np.square(to_high).sum(axis=0), to_low, to_high))
+    low_is_nearer = np.square(to_low).sum(axis=1) < np.square(to_high).sum(axis=1)
+    return np.where(low_is_nearer[:, None], to_low, to_high)
