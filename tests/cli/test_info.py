@@ -86,7 +86,7 @@ def test_wrong_options_are_refused(tmp_path, monkeypatch, options, message):
     [("camera=3", 3), ("camera=2,3", (2, 3)), ("sequence=08", "08"), ("truth=false", False), ("scene=a-1", "a-1")],
 )
 def test_options_become_values(text, value):
-    from ldls.cli.info import parse_options
+    from ldls.cli.source_options import parse_options
 
     (found,) = parse_options([text]).values()
     assert found == value and type(found) is type(value)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.progress import progress
+from ldls.cli.source_options import DatasetOption, SourceOption, parse_options
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -27,13 +28,8 @@ SHOWN = 30
 @speaks_plainly
 def info(
     source: Annotated[Path, typer.Argument(help="Folder or file of frames.", exists=True)],
-    dataset: Annotated[
-        str | None, typer.Option(help="Kind of the source, as kitti-raw.", show_default="guessed")
-    ] = None,
-    option: Annotated[
-        list[str] | None,
-        typer.Option(help="NAME=VALUE of the kind, as camera=3 or scene=scene-0061; may be repeated."),
-    ] = None,
+    dataset: DatasetOption = None,
+    option: SourceOption = None,
     every: Annotated[bool, typer.Option("--all", help="Look at every frame, not only at some.")] = False,
     picture: Annotated[
         Path | None,
@@ -70,21 +66,6 @@ def info(
         screen.print(f"wrote {picture}", highlight=False, soft_wrap=True)
     if any(finding.broken for finding in findings):
         raise typer.Exit(1)
-
-
-def parse_options(words: Sequence[str]) -> dict[str, Any]:
-    """Options by name; numbers, lists of numbers such as 2,3, and true and false are taken as such.
-
-    Raises:
-        ParameterError: One is not NAME=VALUE.
-    """
-    options: dict[str, Any] = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        if not name or not equals:
-            raise ParameterError(f"--option: got {word!r}, expected NAME=VALUE")
-        options[name] = _value(value)
-    return options
 
 
 def stamps_of(source: Source) -> tuple[float | None, ...]:
@@ -188,17 +169,6 @@ def write_picture(frame: Frame, path: Path) -> None:
     if not frame.images:
         raise ParameterError(f"--picture: frame {frame.name} has no image")
     save_picture(path, depth_picture(frame))
-
-
-def _value(text: str) -> str | int | bool | tuple[int, ...]:
-    if text in ("true", "false"):
-        return text == "true"
-    parts = text.split(",")
-    if not all(part.isdecimal() for part in parts):
-        return text
-    # 08 names a sequence, 8 is a number
-    padded = len(parts) == 1 and len(text) > 1 and text.startswith("0")
-    return text if padded else int(text) if len(parts) == 1 else tuple(map(int, parts))
 
 
 def _range(low: str, high: str) -> str:

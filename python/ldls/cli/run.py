@@ -11,6 +11,7 @@ from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOpt
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import words
 from ldls.cli.progress import frame_progress
+from ldls.cli.source_options import DatasetOption, SourceArgument, StoredMasksOption
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,19 +25,9 @@ MOST_LISTED = 10
 
 @speaks_plainly
 def run(
-    source: Annotated[
-        Path,
-        typer.Argument(metavar="SOURCE", help="Data set, drive, bag or folder; `ldls info SOURCE` says what it holds."),
-    ],
+    source: SourceArgument,
     out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
-    masks: Annotated[
-        str | None,
-        typer.Option(
-            help="Stored masks: a folder with a file a frame, or a path such as masks/{frame}.json; for several "
-            "cameras masks/{camera}/{frame}.json.",
-            show_default=False,
-        ),
-    ] = None,
+    masks: StoredMasksOption = None,
     segmenter: SegmenterOption = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
@@ -47,9 +38,7 @@ def run(
         str | None,
         typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
     ] = None,
-    dataset: Annotated[
-        str | None, typer.Option(help="Kind of the source, where the path leaves it open.", show_default="guessed")
-    ] = None,
+    dataset: DatasetOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Frames at a time, one a core.", min=1, show_default="all cores")
     ] = None,
