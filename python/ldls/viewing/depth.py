@@ -45,12 +45,19 @@ def depth_colours(depth_m: NDArray[np.float64]) -> NDArray[np.uint8]:
     return colours
 
 
+def depths_m(points: Points, camera: Camera) -> NDArray[np.float64]:
+    """(n,) depths of points (n, >= 3) in the camera frame, in metres."""
+    row = camera.T_camera_lidar[2]
+    depths: NDArray[np.float64] = points[:, :3].astype(np.float64) @ row[:3] + row[3]
+    return depths
+
+
 def _tile(image: NDArray[np.uint8], points: Points, camera: Camera, width: int) -> Image.Image:
     scale = width / image.shape[1]
     small = Image.fromarray(image).resize((width, round(image.shape[0] * scale)), Image.Resampling.BILINEAR)
     canvas = (np.asarray(small) * DIMMED).astype(np.uint8)
     seen, pixels = project(points, camera, image_size=(image.shape[0], image.shape[1]))
-    depth = points[seen, :3].astype(np.float64) @ camera.T_camera_lidar[2, :3] + camera.T_camera_lidar[2, 3]
+    depth = depths_m(points[seen], camera)
     order = np.argsort(-depth)  # the nearest are drawn last
     colours = depth_colours(depth[order])
     at = np.floor((pixels[order] + 0.5) * scale).astype(np.int64)

@@ -1,0 +1,42 @@
+"""Recordings for the Rerun viewer (https://rerun.io): what a segmentation saw and made, in 3D, in images, over time.
+
+    with open_recording("000571.rrd", name="000571") as recording:
+        recording.add(result, images={"image_2": image})
+
+`log` and `log_frame` log into a recording of one's own instead. Entities, "world" being what they are told to call it:
+
+=============================  ==================================================================================
+entity                         what it holds
+=============================  ==================================================================================
+world                          view coordinates (right-handed, z up) and the annotation context: categories as
+                               classes, instances as their keypoints
+world/points                   all finite points: instance colour, class id = category, keypoint id = label
+world/points/direct            points in view, labelled by direct projection
+world/boxes                    upright box of each object, with its name and label
+world/truth                    points by their true class, where the frame has truth
+world/truth/boxes              upright box of each true instance
+world/camera/NAME              pinhole and pose of each camera
+world/camera/NAME/image        its image, as JPEG
+world/camera/NAME/image/masks  labels of its masks' pixels, and an annotation context that names them
+world/camera/NAME/image/points points that it sees
+world/objects                  table of the objects and the report, as Markdown
+world/statistics/...           points of each category, mean confidence, milliseconds of each stage
+diffusion                      view coordinates and the annotation context
+diffusion/points               points in view: winner's colour, the greyer the smaller its share; class id = category
+=============================  ==================================================================================
+
+Positions are in metres in the lidar frame, in single precision. Pixels are those of Rerun, whose pixel centres lie at
+halves: u + 0.5, v + 0.5. A camera with a distorted lens stands in the 3D view as a pinhole without its distortion, for
+Rerun knows no other; points on its image are exact. Keypoint id 0 is background and 65535 out of view.
+
+A `Recording` has the timelines "frame" (0, 1, ...), "time" where frames have stamps and "iteration" where a diffusion
+is recorded; `log` logs at the time that is set. Needs the extra `viz`.
+"""
+
+from ldls.viewing.recording.blueprint import Contents, layout
+from ldls.viewing.recording.diffusion import log_diffusion
+from ldls.viewing.recording.entities import log
+from ldls.viewing.recording.frames import log_frame
+from ldls.viewing.recording.session import Recording, open_recording
+
+__all__ = ["Contents", "Recording", "layout", "log", "log_diffusion", "log_frame", "open_recording"]
