@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ldls.cli import annotate, demo, evaluate, explain, info, masks, reproduce, run, segment, simulate
+from ldls.cli import annotate, demo, evaluate, explain, info, masks, reproduce, run, segment, simulate, view
 
 app = typer.Typer(
     name="ldls",
@@ -20,6 +20,7 @@ app.command(name="explain", context_settings={"ignore_unknown_options": True})(e
 app.command(name="info")(info.info)
 app.command(name="run")(run.run)
 app.add_typer(masks.app, name="masks")
+app.command(name="view")(view.view)
 app.command(name="demo")(demo.demo)
 app.command(name="simulate")(simulate.simulate)
 app.command(name="annotate")(annotate.annotate)

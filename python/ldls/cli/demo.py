@@ -14,6 +14,7 @@ from rich.table import Table
 import ldls
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
+from ldls.cli.recording_options import ONLY_CAMERA, RerunOption, check_recording, record
 
 if TYPE_CHECKING:
     from ldls.simulation import SimulatedFrame
@@ -25,6 +26,7 @@ def demo(
         "ldls-demo"
     ),
     seed: Annotated[int, typer.Option(help="Which street; every number is another one.", min=0)] = 0,
+    rerun: RerunOption = None,
 ) -> None:
     """Run the method on a simulated street: no data needed.
 
@@ -36,6 +38,7 @@ def demo(
     from ldls.simulation import street_scene
     from ldls.viewing import save_pictures
 
+    check_recording(rerun)
     frame = street_scene(seed)
     masks = ldls.InstanceMasks.from_array(
         frame.masks,
@@ -56,6 +59,9 @@ def demo(
     screen.print(accuracy_table(frame, masks, result))
     screen.print("wrote " + " ".join(map(str, written)), highlight=False, soft_wrap=True)
     screen.print(f"the same from files: {command}", highlight=False, soft_wrap=True)
+    if rerun is not None:
+        said = record(result, rerun, name="demo", images={ONLY_CAMERA: frame.image})
+        screen.print(said, highlight=False, soft_wrap=True)
 
 
 def accuracy_table(frame: SimulatedFrame, masks: ldls.InstanceMasks, result: ldls.Segmentation) -> Table:

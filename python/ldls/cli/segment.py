@@ -16,6 +16,7 @@ from ldls.cli.mask_options import (
 )
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
+from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
 from ldls.io import read_image
 from ldls.params import Params
 
@@ -70,6 +71,8 @@ def segment(
         typer.Option("--keep-outliers/--remove-outliers", help="Keep points off an object's main part?"),
     ] = False,
     threads: Annotated[int | None, typer.Option(help="Threads.", show_default="all cores")] = None,
+    rerun: RerunOption = None,
+    diffusion: DiffusionOption = None,
 ) -> None:
     """Label the points of one lidar sweep by the instance masks of one image.
 
@@ -86,6 +89,7 @@ def segment(
     ldls segment --points velodyne/000001.bin --calib calib/000001.txt --image image_2/000001.png
     --segmenter boxes:label_2/000001.txt --out results
     """
+    check_recording(rerun)
     params = Params(
         neighbors=neighbors,
         sigma=sigma,
@@ -121,3 +125,7 @@ def segment(
     if report.n_nonfinite:
         screen.print(f"{report.n_nonfinite:,} points are not finite and were left out", highlight=False)
     screen.print("wrote " + " ".join(map(str, written)), highlight=False, soft_wrap=True)
+    if rerun is not None:
+        pictures = None if pixels is None else {ONLY_CAMERA: pixels}
+        said = record(result, rerun, name=name, images=pictures, diffusion=diffusion)
+        screen.print(said, highlight=False, soft_wrap=True)

@@ -1,0 +1,91 @@
+"""Recordings for the Rerun viewer that commands make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from ldls.segmentation import Segmentation
+
+RerunOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE.rrd|spawn",
+        help="Also record what was done for the Rerun viewer: in a file, or in a viewer that is started. Extra viz.",
+        show_default=False,
+    ),
+]
+DiffusionOption = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        metavar="K",
+        help="Record how labels spread, a picture every K products; 0 for none.",
+        show_default="4 of one frame, none of several",
+    ),
+]
+ONLY_CAMERA = "camera 0"
+"""What recordings call the camera of a frame that does not name it."""
+EVERY = 4
+"""Products from one picture of the diffusion to the next: 50 pictures of 200 products."""
+
+
+def every_of(diffusion: int | None, n_frames: int) -> int | None:
+    """Products from one picture of the diffusion to the next, None for no pictures."""
+    if diffusion is None:
+        return EVERY if n_frames == 1 else None
+    return diffusion or None
+
+
+def check_recording(target: str | None) -> None:
+    """Refuse a target that cannot be recorded to, before any work is done.
+
+    Raises:
+        ParameterError: It is neither a file that ends in .rrd nor "spawn".
+        ImportError: The extra `viz` is not installed.
+    """
+    if target is None:
+        return
+    from ldls.viewing.recording.session import check_target
+    from ldls.viewing.recording.stream import rerun
+
+    check_target(target)
+    rerun()
+
+
+def record(
+    result: Segmentation,
+    target: str,
+    *,
+    name: str,
+    images: Mapping[str, NDArray[np.uint8]] | None = None,
+    diffusion: int | None = None,
+) -> str:
+    """Record one segmentation; what to tell the user."""
+    from ldls.viewing.recording import open_recording
+
+    with open_recording(target, name=name) as recording:
+        recording.add(result, images=images, name=name, diffusion=every_of(diffusion, 1), alone=True)
+    return told(target)
+
+
+def told(target: str) -> str:
+    """Where a recording is, and how to open it."""
+    from ldls.viewing.recording.session import VIEWER
+
+    if target == VIEWER:
+        return "shown in the Rerun viewer"
+    return f"wrote {target} ({Path(target).stat().st_size / 1e6:.1f} MB); open it with: rerun {target}"
+
+
+def default_target(name: str) -> str:
+    """A viewer where there is a display, else NAME.rrd in the working folder."""
+    from ldls.viewing.recording.session import SUFFIX, VIEWER
+    from ldls.viewing.recording.viewer import has_display
+
+    return VIEWER if has_display() else f"{name}{SUFFIX}"

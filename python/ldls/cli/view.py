@@ -1,0 +1,173 @@
+"""`ldls view`: a result, or the frames of a source, in the Rerun viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, names_or_ids
+from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import words
+from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, told
+from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
+from ldls.cli.view_source import MOST_FRAMES, chosen_frames, record_frames
+from ldls.errors import InputError, ParameterError
+
+if TYPE_CHECKING:
+    from ldls.batch import RunSettings
+
+FRAMES_FAILED = 2
+"""Exit status where frames failed and the rest is shown."""
+
+
+@speaks_plainly
+def view(
+    path: Annotated[
+        Path,
+        typer.Argument(metavar="RESULT|SOURCE", help="An .npz that ldls wrote, or whatever `ldls info` takes."),
+    ],
+    image: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[CAMERA=]FILE",
+            help="Image of a RESULT; of several cameras one each, in their order or by name.",
+            show_default=False,
+        ),
+    ] = None,
+    dataset: DatasetOption = None,
+    option: SourceOption = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default=f"the first {MOST_FRAMES}"
+        ),
+    ] = None,
+    masks: StoredMasksOption = None,
+    segmenter: SegmenterOption = None,
+    min_score: MinScoreOption = None,
+    categories: CategoriesOption = None,
+    results: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of an earlier `ldls run --formats npz`: its results are shown, nothing is segmented.",
+            exists=True,
+            file_okay=False,
+            show_default=False,
+        ),
+    ] = None,
+    rerun: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.rrd|spawn",
+            help="Where to: a file, or a viewer that is started.",
+            show_default="spawn, or NAME.rrd where there is no display",
+        ),
+    ] = None,
+    diffusion: DiffusionOption = None,
+) -> None:
+    """Show a result, or the frames of a source, in the Rerun viewer (extra viz).
+
+    Frames of a source are segmented with --masks or --segmenter, or taken from --results; without any of these they
+    are shown as they are, with their truth. A frame that fails is passed over; the exit status is then 2.
+
+    Examples:
+    ldls view results/000571.npz --image image_2/000571.png
+
+    ldls view kitti/training --masks kitti/training/masks --frames 0:20 --rerun kitti.rrd
+    """
+    name = path.resolve().stem
+    target = rerun or default_target(name)
+    check_recording(target)
+    failures: list[str] = []
+    if path.is_file() and path.suffix.lower() == ".npz":
+        of_sources: dict[str, object] = {
+            "dataset": dataset,
+            "option": option,
+            "frames": frames,
+            "masks": masks,
+            "results": results,
+        }
+        of_sources |= {"segmenter": segmenter, "min-score": min_score, "categories": categories}
+        _refuse(of_sources, f"{path} is a result, which has its masks and labels")
+        message = view_result(path, image or [], target, name=name, diffusion=diffusion)
+    else:
+        _refuse({"image": image}, f"{path} is a source, which has its images")
+        settings = settings_of(
+            masks=masks, segmenter=segmenter, min_score=min_score, categories=categories, results=results
+        )
+        source, indices = chosen_frames(path, dataset, option or [], frames)
+        failures = record_frames(
+            source, indices, target, name=name, diffusion=diffusion, settings=settings, results=results
+        )
+        for failure in failures:
+            console().print(failure, highlight=False, soft_wrap=True)
+        count = f"{len(indices) - len(failures):,} of {len(source):,} frames; "
+        message = count + told(target)
+    console().print(message, highlight=False, soft_wrap=True)
+    if failures:
+        raise typer.Exit(FRAMES_FAILED)
+
+
+def view_result(path: Path, images: Sequence[str], target: str, *, name: str, diffusion: int | None) -> str:
+    """Show a stored result; what to tell the user."""
+    from ldls.segmentation import Segmentation
+    from ldls.viewing.recording.cameras import camera_names
+
+    result = Segmentation.from_npz(path)
+    pictures = read_images(images, camera_names(result))
+    return record(result, target, name=name, images=pictures, diffusion=diffusion)
+
+
+def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
+    """Images by camera: FILE for the cameras in their order, CAMERA=FILE for one by name.
+
+    Raises:
+        InputError: There are more images than cameras, or one camera has two.
+    """
+    from ldls.io import read_image
+
+    paths: dict[str, str] = {}
+    for number, text in enumerate(texts):
+        camera, equals, file = text.partition("=")
+        if not equals or camera not in cameras:
+            if number >= len(cameras):
+                raise InputError(f"--image: got {len(texts)} images, the result has cameras {', '.join(cameras)}")
+            camera, file = cameras[number], text
+        if camera in paths:
+            raise InputError(f"--image: camera {camera} has {paths[camera]} and {file}; give one")
+        paths[camera] = file
+    return {camera: read_image(file) for camera, file in paths.items()}
+
+
+def settings_of(
+    *,
+    masks: str | None,
+    segmenter: str | None,
+    min_score: float | None,
+    categories: str | None,
+    results: Path | None,
+) -> RunSettings | None:
+    """How frames are segmented; None where they are not.
+
+    Raises:
+        ParameterError: Labels would come from two places, or options choose among masks and there are none.
+    """
+    from ldls.batch import RunSettings
+
+    if masks is None and segmenter is None:
+        _refuse({"min-score": min_score, "categories": categories}, "they choose among --masks or --segmenter's masks")
+        return None
+    _refuse({"results": results}, "labels come from --masks, --segmenter or --results, one of them")
+    chosen = None if categories is None else tuple(names_or_ids(words(categories)))
+    return RunSettings(masks=masks, segmenter=segmenter, min_score=min_score, categories=chosen)
+
+
+def _refuse(options: Mapping[str, object], why: str) -> None:
+    for name, value in options.items():
+        if value:
+            raise ParameterError(f"--{name}: {why}; leave it out")

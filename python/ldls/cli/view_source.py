@@ -1,0 +1,122 @@
+"""The frames of a source, one after the other into a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ldls.cli.progress import progress
+from ldls.cli.recording_options import every_of
+from ldls.cli.source_options import parse_options
+from ldls.errors import InputError, LdlsError, ParameterError
+
+if TYPE_CHECKING:
+    from ldls.batch import RunSettings
+    from ldls.batch.frame_work import FrameWork
+    from ldls.datasets import Frame, Source
+    from ldls.segmentation import Segmentation
+
+MOST_FRAMES = 100
+"""Frames that are shown where none are chosen."""
+Labelled = Callable[[int], "tuple[Frame, Segmentation | None]"]
+"""Gives the frame of a number in its source, and its labels if it has any."""
+
+
+def chosen_frames(
+    path: Path, dataset: str | None, options: Sequence[str], frames: str | None
+) -> tuple[Source, list[int]]:
+    """The source at a path, and the numbers of the frames to show.
+
+    Raises:
+        LdlsError: It is no source.
+        ParameterError: It has no such frames.
+    """
+    from ldls.batch.plan import parse_frames
+    from ldls.datasets import open_source
+
+    source = open_source(path, kind=dataset, **parse_options(options))
+    chosen = slice(MOST_FRAMES) if frames is None else parse_frames(frames)
+    indices = list(range(len(source)))[chosen]
+    if not indices:
+        raise ParameterError(f"--frames: got {frames}, {path} has {len(source):,} frames, counted from 0")
+    return source, indices
+
+
+def record_frames(
+    source: Source,
+    indices: Sequence[int],
+    target: str,
+    *,
+    name: str,
+    diffusion: int | None,
+    settings: RunSettings | None,
+    results: Path | None,
+) -> list[str]:
+    """Record frames of a source; a line for each that cannot be.
+
+    Raises:
+        LdlsError: None can be; the error is that of the first.
+    """
+    from ldls.viewing.recording import open_recording
+
+    label = _labelled(source, settings, results)
+    every = every_of(diffusion, len(indices))
+    failures: list[tuple[str, Exception]] = []
+    with open_recording(target, name=name) as recording:
+        for index in progress(indices, len(indices), "recording"):
+            try:
+                frame, result = label(index)
+                if result is None:
+                    recording.add_frame(frame)
+                    continue
+                recording.add(
+                    result,
+                    images={image.name: image.read() for image in frame.images},
+                    truth=frame.truth,
+                    name=frame.name,
+                    stamp=frame.stamp,
+                    diffusion=every,
+                    alone=len(indices) == 1,
+                )
+            except (LdlsError, OSError) as error:
+                failures.append((source.names[index], error))
+        if len(failures) == len(indices):
+            raise failures[0][1]
+    return [f"{frame} failed: {error}" for frame, error in failures]
+
+
+def _labelled(source: Source, settings: RunSettings | None, results: Path | None) -> Labelled:
+    if settings is not None:
+        from ldls.batch.frame_work import FrameWork
+
+        # nothing is written, so there is no folder to write to
+        return partial(_segmented, source, FrameWork(source, settings, Path()))
+    if results is not None:
+        if not any(results.glob("*.npz")):
+            raise InputError(f"--results: {results} has no .npz; give `ldls run` --formats npz to have them written")
+        return partial(_stored, source, results)
+    return lambda index: (source[index], None)
+
+
+def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segmentation]:
+    from ldls.batch.frame_work import StageError, Work
+
+    item = Work(index, source.names[index])
+    try:
+        work.read(item)
+        frame = item.frame
+        work.segment(item)
+    except StageError as error:
+        raise error.error from None
+    assert frame is not None and item.result is not None
+    return frame, item.result
+
+
+def _stored(source: Source, results: Path, index: int) -> tuple[Frame, Segmentation]:
+    from ldls.batch.plan import file_name
+    from ldls.segmentation import Segmentation
+
+    path = results / file_name(source.names[index], "npz")
+    return source[index], Segmentation.from_npz(path)

@@ -1,0 +1,181 @@
+"""`ldls view`, and --rerun of other commands, from the outside."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+import ldls
+from datasets import layouts
+from ldls.cli import app
+from ldls.cli.recording_options import default_target
+from viewing.recorded import Recorded, vectors
+
+
+@pytest.fixture(autouse=True)
+def no_display(monkeypatch, tmp_path):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def saved(small_scene, tmp_path):
+    result = ldls.segment(*small_scene)
+    result.save(tmp_path / "frame.npz")
+    Image.new("RGB", (80, 60), (10, 90, 200)).save(tmp_path / "image.png")
+    return result
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["view", *map(str, arguments)])
+
+
+def test_a_result_is_recorded_with_its_diffusion(saved):
+    done = run("frame.npz", "--image", "image.png")
+    assert done.exit_code == 0, done.output
+    assert "open it with: rerun frame.rrd" in done.output
+    found = Recorded("frame.rrd")
+    np.testing.assert_array_equal(vectors(found.last("world/points", "Points3D:positions")), saved.points)
+    assert r"world/camera/camera\ 0/image" in found.entities
+    assert len(found.each("diffusion/points", "Points3D:colors")) == 51
+    assert run("frame.npz", "--rerun", "plain.rrd", "--diffusion", 0).exit_code == 0
+    plain = Recorded("plain.rrd")
+    assert plain.timelines == {"frame"} and not plain.each(r"world/camera/camera\ 0/image/masks", "EncodedImage:blob")
+
+
+def test_a_ring_takes_an_image_for_each_camera(small_scene, saved):
+    points, masks, camera = small_scene
+    views = [ldls.View(masks, camera, "left"), ldls.View(masks, camera, "right")]
+    ldls.segment(points, views).save("ring.npz")
+    for images in (["image.png", "image.png"], ["right=image.png", "left=image.png"]):
+        done = run("ring.npz", *(word for image in images for word in ("--image", image)), "--diffusion", 0)
+        assert done.exit_code == 0, done.output
+        assert {"world/camera/left/image", "world/camera/right/image"} <= Recorded("ring.rrd").entities
+    one = run("ring.npz", "--image", "right=image.png", "--diffusion", 0)
+    assert one.exit_code == 0 and "world/camera/left/image" not in Recorded("ring.rrd").entities
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drive")
+    done = CliRunner().invoke(app, ["simulate", "--layout", "kitti-raw", "--frames", "3", str(folder)])
+    assert done.exit_code == 0, done.output
+    (found,) = folder.glob("*/*_sync")
+    return found
+
+
+def test_a_drive_is_segmented_and_recorded_frame_by_frame(drive):
+    done = run(drive, "--masks", drive / "masks_02", "--rerun", "drive.rrd")
+    assert done.exit_code == 0, done.output
+    assert "3 of 3 frames; wrote drive.rrd" in done.output
+    found = Recorded("drive.rrd")
+    rows = found.each("world/points", "Points3D:positions")
+    assert [row.times["frame"] for row in rows] == [0, 1, 2] and found.timelines == {"frame", "time"}
+    source = ldls.datasets.open_source(drive)
+    for index, row in enumerate(rows):
+        frame = source[index]
+        np.testing.assert_array_equal(vectors(row.values["Points3D:positions"]), frame.points[:, :3])
+        assert row.times["time"] == pytest.approx(frame.stamp * 1e9, abs=1e3)
+        masks = ldls.InstanceMasks.from_file(drive / f"masks_02/{frame.name}.json")
+        expected = ldls.segment(frame.points, masks, frame.images[0].camera).categories
+        np.testing.assert_array_equal(row.values["Points3D:class_ids"].to_numpy(), expected)
+    assert "world/truth" in found.entities and "diffusion" not in found.entities
+
+
+def test_without_masks_frames_are_shown_as_they_are(drive):
+    done = run(drive, "--frames", "1", "--rerun", "raw.rrd")
+    assert done.exit_code == 0 and "1 of 3 frames" in done.output, done.output
+    found = Recorded("raw.rrd")
+    assert "world/truth" in found.entities and "world/objects" not in found.entities
+    assert len(found.each("world/points", "Points3D:positions")) == 1
+
+
+def test_results_of_a_run_are_shown_and_nothing_is_segmented(drive, monkeypatch):
+    command = ["run", drive, "--masks", drive / "masks_02", "--out", "results", "--formats", "npz", "--frames", "0:2"]
+    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    monkeypatch.setattr("ldls.label_diffusion._segment", None)
+    done = run(drive, "--results", "results", "--frames", "0:2", "--rerun", "a.rrd")
+    assert done.exit_code == 0, done.output
+    name = ldls.datasets.open_source(drive).names[1]
+    row = Recorded("a.rrd").each("world/points", "Points3D:class_ids")[1].values
+    with np.load(f"results/{name}.npz") as stored:
+        np.testing.assert_array_equal(row["Points3D:class_ids"].to_numpy(), stored["categories"])
+
+
+def test_frames_that_fail_are_named_and_passed_over(tmp_path):
+    source = layouts.kitti_object(tmp_path / "kitti")
+    (source / "velodyne/000001.bin").write_bytes(b"123")
+    done = run(source, "--rerun", "a.rrd")
+    assert done.exit_code == 2
+    assert "000001 failed" in done.output and "2 of 3 frames" in done.output
+    assert len(Recorded("a.rrd").each("world/points", "Points3D:positions")) == 2
+    for broken in (source / "velodyne").iterdir():
+        broken.write_bytes(b"123")
+    none = run(source, "--rerun", "b.rrd")
+    assert none.exit_code == 1 and "not a multiple" in none.stderr
+    assert not list(tmp_path.glob("*b.rrd*"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        pytest.param(["frame.npz", "--rerun", "a.html"], "expected spawn or a file that ends in .rrd", id="target"),
+        pytest.param(["frame.npz", "--masks", "m"], "frame.npz is a result", id="masks of a result"),
+        pytest.param(["frame.npz", "--image", "image.png", "--image", "image.png"], "got 2 images", id="many images"),
+        pytest.param(["frame.npz", "--image", "nothing.png"], "nothing.png", id="no such image"),
+        pytest.param(["kitti", "--image", "image.png"], "kitti is a source", id="an image of a source"),
+        pytest.param(["kitti", "--min-score", "0.5"], "choose among", id="scores without masks"),
+        pytest.param(["kitti", "--frames", "7:9"], "has 3 frames", id="no such frames"),
+        pytest.param(["kitti", "--masks", "m", "--results", "kitti"], "one of them", id="labels from two places"),
+        pytest.param(["kitti", "--results", "kitti"], "--formats npz", id="results of another format"),
+        pytest.param(["nowhere"], "no such file or folder", id="nothing there"),
+    ],
+)
+def test_wrong_wishes_are_refused(saved, tmp_path, arguments, message):
+    layouts.kitti_object(tmp_path / "kitti")
+    done = run(*arguments)
+    assert done.exit_code == 1 and message in " ".join(done.stderr.split()), done.output
+    assert not list(tmp_path.glob("*.rrd"))
+
+
+def test_the_missing_extra_is_named_before_any_work(saved, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    done = run("frame.npz")
+    assert done.exit_code == 1 and "pip install 'ldls[viz]'" in done.stderr
+
+
+def test_segment_and_demo_record_too(small_scene, saved, tmp_path):
+    points, masks, camera = small_scene
+    np.hstack([points, np.zeros((len(points), 1), np.float32)]).tofile("p.bin")
+    masks.save("m.npz")
+    rows = {"P2": camera.projection, "R0_rect": np.eye(3), "Tr_velo_to_cam": np.eye(4)[:3]}
+    layouts.write_text(tmp_path / "c.txt", "".join(f"{key}: {layouts.row(m)}\n" for key, m in rows.items()))
+    words = (
+        "segment --points p.bin --calib c.txt --masks m.npz --image image.png --out out --rerun s.rrd --diffusion 50"
+    )
+    done = CliRunner().invoke(app, words.split())
+    assert done.exit_code == 0 and "rerun s.rrd" in done.output, done.output
+    found = Recorded("s.rrd")
+    assert r"world/camera/camera\ 0/image" in found.entities
+    assert len(found.each("diffusion/points", "Points3D:colors")) == 5
+    done = CliRunner().invoke(app, ["demo", "--rerun", "d.rrd"])
+    assert done.exit_code == 0 and "world/boxes" in Recorded("d.rrd").entities, done.output
+    bad = CliRunner().invoke(app, words.replace("s.rrd", "s.png").split())
+    assert bad.exit_code == 1
+
+
+def test_where_there_is_a_display_the_viewer_is_the_target(monkeypatch):
+    assert default_target("a") == "a.rrd"
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert default_target("a") == "spawn"
+
+
+def test_the_command_ends_by_itself_and_says_one_line(saved):
+    command = [sys.executable, "-m", "ldls", "view", "frame.npz", "--rerun", "a.rrd"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stderr == "" and len(done.stdout.splitlines()) == 1
