@@ -1,5 +1,7 @@
 """The Python of README.md and docs/: it runs, one block after the other, and does what the page says."""
 
+import re
+
 import numpy as np
 import pages
 import pytest
@@ -133,3 +135,15 @@ def test_viewing(run, demo_files, tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.glob("street*.png")} == {
         "street.png", "street-birds-eye.png", "street-comparison.png",
     }  # fmt: skip
+
+
+def test_rerun(run, demo_files, tmp_path):
+    rerun = pytest.importorskip("rerun")
+    from ldls.viewing import recording
+
+    (tmp_path / "ldls-demo").rename(tmp_path / "street")
+    run("docs/rerun.md")
+    rerun.set_global_data_recording(None)
+    assert all((tmp_path / name).stat().st_size > 100_000 for name in ("street.rrd", "robot.rrd"))
+    rows = re.findall(r"^\| `((?:world|diffusion)\S*)` \|", (pages.ROOT / "docs/rerun.md").read_text(), re.MULTILINE)
+    assert rows == re.findall(r"^(?:world|diffusion)\S*", recording.__doc__, re.MULTILINE)

@@ -24,10 +24,11 @@ ROOT = pages.ROOT
 PAGES = [*pages.pages(), ROOT / "BENCHMARKS.md", ROOT / "CHANGELOG.md"]
 RECIPES = [(page, recipe) for page in pages.pages() for recipe in pages.recipes(page)]
 API = sorted((ROOT / "docs/api").glob("*.md"))
-ROOMS = ["ldls.batch", "ldls.datasets", "ldls.evaluation", "ldls.segmenters", "ldls.simulation", "ldls.viewing"]
+ROOMS = ["ldls.batch", "ldls.datasets", "ldls.evaluation", "ldls.segmenters", "ldls.simulation", "ldls.viewing",
+         "ldls.viewing.recording"]  # fmt: skip
 LINK = re.compile(r"\]\((?P<link>[^)\s]+)\)")
 HEADING = re.compile(r"^#+ (?P<text>.+)$", re.MULTILINE)
-HOSTS = {"huggingface.co", "keepachangelog.com", "rustup.rs", "semver.org", "www.embree.org"}
+HOSTS = {"huggingface.co", "keepachangelog.com", "rerun.io", "rustup.rs", "semver.org", "www.embree.org"}
 
 
 def name_of(page):
