@@ -58,6 +58,14 @@ def test_workers_out_of_range(few, tmp_path, workers):
     assert not (tmp_path / "out").exists()
 
 
+def test_parameters_of_the_method_are_options(few, tmp_path):
+    words = ["--sigma", 0.1, "--neighbors", 4, "--iterations", 7, "--keep-outliers", "--formats", "npz"]
+    outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--frames", "0", *words)
+    assert outcome.exit_code == 0, outcome.output
+    params = ldls.Segmentation.from_npz(tmp_path / "out/000000.npz").params
+    assert params == ldls.Params(sigma=0.1, neighbors=4, iterations=7, remove_outliers=False, threads=params.threads)
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -179,3 +179,16 @@ def test_the_command_ends_by_itself_and_says_one_line(saved):
     command = [sys.executable, "-m", "ldls", "view", "frame.npz", "--rerun", "a.rrd"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert done.stderr == "" and len(done.stdout.splitlines()) == 1
+
+
+def test_a_result_as_pictures_needs_no_recording(saved, tmp_path):
+    done = run("frame.npz", "--image", "image.png", "--picture", "seen.png")
+    assert done.exit_code == 0, done.output
+    assert {path.name for path in tmp_path.glob("seen*")} == {"seen.png", "seen-birds-eye.png", "seen-comparison.png"}
+    assert not list(tmp_path.glob("*.rrd"))
+    assert run("frame.npz", "--picture", "seen.png", "--rerun", "seen.rrd").exit_code == 0
+    assert (tmp_path / "seen.rrd").is_file()
+
+
+def test_a_source_has_no_pictures(tmp_path):
+    assert "pictures show a result" in run(tmp_path, "--picture", "seen.png").output

@@ -5,11 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from ldls.segmentation import Segmentation
+
+PictureOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="NAME.png",
+        help="Write pictures: NAME.png, the image with masks and points; NAME-birds-eye.png; NAME-comparison.png, "
+        "direct projection beside the method.",
+        show_default=False,
+        dir_okay=False,
+    ),
+]
 
 
 class Output(StrEnum):

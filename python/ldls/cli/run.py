@@ -9,6 +9,18 @@ import typer
 
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, names_or_ids
 from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.method_options import (
+    ITERATIONS,
+    PAPER,
+    ConvergeOption,
+    IterationsOption,
+    NeighborsOption,
+    OutliersOption,
+    PixelWeightOption,
+    SigmaOption,
+    WindowOption,
+    params_of,
+)
 from ldls.cli.options import words
 from ldls.cli.progress import frame_progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, StoredMasksOption
@@ -39,6 +51,13 @@ def run(
         typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
     ] = None,
     dataset: DatasetOption = None,
+    neighbors: NeighborsOption = PAPER.neighbors,
+    sigma: SigmaOption = PAPER.sigma,
+    pixel_weight: PixelWeightOption = PAPER.pixel_weight,
+    window: WindowOption = PAPER.window,
+    iterations: IterationsOption = ITERATIONS,
+    converge: ConvergeOption = False,
+    keep_outliers: OutliersOption = False,
     workers: Annotated[
         int | None, typer.Option(help="Frames at a time, one a core.", min=1, show_default="all cores")
     ] = None,
@@ -68,6 +87,15 @@ def run(
         segmenter=segmenter,
         min_score=min_score,
         categories=None if categories is None else tuple(names_or_ids(words(categories))),
+        params=params_of(
+            neighbors=neighbors,
+            sigma=sigma,
+            pixel_weight=pixel_weight,
+            window=window,
+            iterations=iterations,
+            converge=converge,
+            keep_outliers=keep_outliers,
+        ),
         formats=words(formats),
     )
     opened = open_source(source, kind=dataset, truth=False)

@@ -15,10 +15,21 @@ from ldls.cli.mask_options import (
     masks_of,
 )
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
-from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
+from ldls.cli.method_options import (
+    ITERATIONS,
+    PAPER,
+    ConvergeOption,
+    IterationsOption,
+    NeighborsOption,
+    OutliersOption,
+    PixelWeightOption,
+    SigmaOption,
+    WindowOption,
+    params_of,
+)
+from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, PictureOption, write_outputs
 from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
 from ldls.io import read_image
-from ldls.params import Params
 
 
 @speaks_plainly
@@ -47,29 +58,14 @@ def segment(
         list[Output] | None,
         typer.Option("--format", help="What to write; may be repeated.", show_default="npz, label, ply, png"),
     ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="NAME.png",
-            help="Write pictures: NAME.png, the image with masks and points; NAME-birds-eye.png; NAME-comparison.png, "
-            "direct projection beside the method.",
-            show_default=False,
-            dir_okay=False,
-        ),
-    ] = None,
-    neighbors: Annotated[int, typer.Option(help="K: nearest neighbours a point.")] = 10,
-    sigma: Annotated[float, typer.Option(help="Reach of point edges exp(-d^2/sigma), in square metres.")] = 1.0,
-    pixel_weight: Annotated[float, typer.Option(help="lambda: weight of pixel edges.")] = 0.001,
-    window: Annotated[int, typer.Option(help="Side of the pixel window of a point, odd.")] = 5,
-    iterations: Annotated[int, typer.Option(help="Diffusion steps.")] = 200,
-    converge: Annotated[
-        bool,
-        typer.Option("--converge", help="Diffuse until nothing changes, however many steps it takes."),
-    ] = False,
-    outliers: Annotated[
-        bool,
-        typer.Option("--keep-outliers/--remove-outliers", help="Keep points off an object's main part?"),
-    ] = False,
+    picture: PictureOption = None,
+    neighbors: NeighborsOption = PAPER.neighbors,
+    sigma: SigmaOption = PAPER.sigma,
+    pixel_weight: PixelWeightOption = PAPER.pixel_weight,
+    window: WindowOption = PAPER.window,
+    iterations: IterationsOption = ITERATIONS,
+    converge: ConvergeOption = False,
+    keep_outliers: OutliersOption = False,
     threads: Annotated[int | None, typer.Option(help="Threads.", show_default="all cores")] = None,
     rerun: RerunOption = None,
     diffusion: DiffusionOption = None,
@@ -90,13 +86,14 @@ def segment(
     --segmenter boxes:label_2/000001.txt --out results
     """
     check_recording(rerun)
-    params = Params(
+    params = params_of(
         neighbors=neighbors,
         sigma=sigma,
         pixel_weight=pixel_weight,
         window=window,
-        iterations=None if converge else iterations,
-        remove_outliers=not outliers,
+        iterations=iterations,
+        converge=converge,
+        keep_outliers=keep_outliers,
         threads=threads,
     )
     pixels = None if image is None else read_image(image)

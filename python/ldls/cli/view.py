@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, names_or_ids
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import words
+from ldls.cli.outputs import PictureOption
 from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, told
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
 from ldls.cli.view_source import MOST_FRAMES, chosen_frames, record_frames
@@ -69,19 +70,23 @@ def view(
         ),
     ] = None,
     diffusion: DiffusionOption = None,
+    picture: PictureOption = None,
 ) -> None:
-    """Show a result, or the frames of a source, in the Rerun viewer (extra viz).
+    """Show a result, or the frames of a source, in the Rerun viewer (extra viz), or a result as pictures.
 
     Frames of a source are segmented with --masks or --segmenter, or taken from --results; without any of these they
     are shown as they are, with their truth. A frame that fails is passed over; the exit status is then 2.
+    With --picture, pictures are written, and nothing is recorded unless --rerun says so.
 
     Examples:
     ldls view results/000571.npz --image image_2/000571.png
 
+    ldls view results/000571.npz --image image_2/000571.png --picture 000571.png
+
     ldls view kitti/training --masks kitti/training/masks --frames 0:20 --rerun kitti.rrd
     """
     name = path.resolve().stem
-    target = rerun or default_target(name)
+    target = rerun if picture is not None else rerun or default_target(name)
     check_recording(target)
     failures: list[str] = []
     if path.is_file() and path.suffix.lower() == ".npz":
@@ -94,9 +99,11 @@ def view(
         }
         of_sources |= {"segmenter": segmenter, "min-score": min_score, "categories": categories}
         _refuse(of_sources, f"{path} is a result, which has its masks and labels")
-        message = view_result(path, image or [], target, name=name, diffusion=diffusion)
+        message = view_result(path, image or [], target, name=name, diffusion=diffusion, picture=picture)
     else:
         _refuse({"image": image}, f"{path} is a source, which has its images")
+        _refuse({"picture": picture}, f"{path} is a source; pictures show a result")
+        assert target is not None
         settings = settings_of(
             masks=masks, segmenter=segmenter, min_score=min_score, categories=categories, results=results
         )
@@ -113,14 +120,24 @@ def view(
         raise typer.Exit(FRAMES_FAILED)
 
 
-def view_result(path: Path, images: Sequence[str], target: str, *, name: str, diffusion: int | None) -> str:
+def view_result(
+    path: Path, images: Sequence[str], target: str | None, *, name: str, diffusion: int | None, picture: Path | None
+) -> str:
     """Show a stored result; what to tell the user."""
     from ldls.segmentation import Segmentation
     from ldls.viewing.recording.cameras import camera_names
 
     result = Segmentation.from_npz(path)
     pictures = read_images(images, camera_names(result))
-    return record(result, target, name=name, images=pictures, diffusion=diffusion)
+    said = []
+    if picture is not None:
+        from ldls.viewing import save_pictures
+
+        each = [pictures.get(camera) for camera in camera_names(result)]
+        said.append("wrote " + " ".join(map(str, save_pictures(picture, result, each))))
+    if target is not None:
+        said.append(record(result, target, name=name, images=pictures, diffusion=diffusion))
+    return "\n".join(said)
 
 
 def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
