@@ -98,7 +98,7 @@ class Camera:
         """
         projection, transform = kitti.read_calibration(path, camera=camera)
         found = FoundCamera(place=str(path), projection=projection, T_camera_lidar=transform, image_size=image_size)
-        return cls.from_found(found)
+        return cls.of_found(found)
 
     @classmethod
     def from_kitti_raw(cls, folder: str | PathLike[str], *, camera: int = 2) -> Self:
@@ -112,7 +112,7 @@ class Camera:
             CalibrationError: A key is missing or doubled, or a line has too few or too many numbers.
             FileNotFoundError: A file is missing.
         """
-        return cls.from_found(kitti_raw.read(folder, camera))
+        return cls.of_found(kitti_raw.read(folder, camera))
 
     @classmethod
     def from_opencv(cls, path: str | PathLike[str], T_camera_lidar: ArrayLike, *, fisheye: bool = False) -> Self:
@@ -128,7 +128,7 @@ class Camera:
             CalibrationError: It is not YAML, a key is missing, or a value cannot be a camera's.
             FileNotFoundError: There is no such file.
         """
-        return cls.from_found(opencv_yaml.read(path, _transform("T_camera_lidar", T_camera_lidar), fisheye=fisheye))
+        return cls.of_found(opencv_yaml.read(path, _transform("T_camera_lidar", T_camera_lidar), fisheye=fisheye))
 
     @classmethod
     def from_kalibr(
@@ -154,7 +154,7 @@ class Camera:
         """
         to_camera = None if T_camera_lidar is None else _transform("T_camera_lidar", T_camera_lidar)
         to_imu = None if T_imu_lidar is None else _transform("T_imu_lidar", T_imu_lidar)
-        return cls.from_found(kalibr.read(path, camera, to_camera, to_imu))
+        return cls.of_found(kalibr.read(path, camera, to_camera, to_imu))
 
     @classmethod
     def from_camera_info(cls, message: object, T_camera_lidar: ArrayLike, *, rectified: bool = False) -> Self:
@@ -170,7 +170,7 @@ class Camera:
         Raises:
             CalibrationError: The camera is not calibrated, or a field is missing or cannot be a camera's.
         """
-        return cls.from_found(
+        return cls.of_found(
             camera_info.read(message, _transform("T_camera_lidar", T_camera_lidar), rectified=rectified)
         )
 
@@ -197,10 +197,10 @@ class Camera:
             CalibrationError: A key is missing, or a value has the wrong size or is no rotation.
         """
         records = (calibrated_camera, ego_pose_camera, calibrated_lidar, ego_pose_lidar)
-        return cls.from_found(nuscenes.read(*records, image_size))
+        return cls.of_found(nuscenes.read(*records, image_size))
 
     @classmethod
-    def from_found(cls, found: FoundCamera) -> Self:
+    def of_found(cls, found: FoundCamera) -> Self:
         """Camera of what a reader of calibrations found.
 
         Raises:

@@ -214,7 +214,7 @@ class Segmentation:
 
 
 def _stored_view(stored: result_npz.StoredView) -> SeenView:
-    view = View(InstanceMasks.from_records(stored.masks), Camera.from_found(stored.camera), stored.name)
+    view = View(InstanceMasks.of_records(stored.masks), Camera.of_found(stored.camera), stored.name)
     return SeenView(view=view, in_view=stored.in_view, pixels=stored.pixels, labels=stored.labels)
 
 

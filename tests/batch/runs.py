@@ -34,9 +34,18 @@ def finished(arguments, program=("-m", "ldls")):
 
 def has_begun(running, out):
     """Wait until a run holds its folder; False if it ended before."""
+    return _comes_to(running, lambda: (out / LOCK_NAME).exists())
+
+
+def has_written(running, out):
+    """Wait until a run has written its first result; False if it ended before."""
+    return _comes_to(running, lambda: any(out.glob("*.label")))
+
+
+def _comes_to(running, state):
     patience = time.monotonic() + PATIENCE_S
     while running.poll() is None:
-        if (out / LOCK_NAME).exists():
+        if state():
             return True
         assert time.monotonic() < patience
         time.sleep(0.001)

@@ -115,7 +115,7 @@ class InstanceMasks:
             CorruptFileError: The file is not JSON.
             FileNotFoundError: There is no such file.
         """
-        return cls.from_records(coco.read(source, image_id=image_id, image_size=image_size, names=names))
+        return cls.of_records(coco.read(source, image_id=image_id, image_size=image_size, names=names))
 
     @classmethod
     def from_npz(cls, path: str | PathLike[str]) -> Self:
@@ -126,7 +126,7 @@ class InstanceMasks:
             MaskError: The arrays do not fit one another.
             FileNotFoundError: There is no such file.
         """
-        return cls.from_records(npz.read(path))
+        return cls.of_records(npz.read(path))
 
     @classmethod
     def from_file(
@@ -173,7 +173,7 @@ class InstanceMasks:
             scores=scores,
             names=names,
         )
-        return cls.from_records(records)
+        return cls.of_records(records)
 
     @classmethod
     def from_instance_image(
@@ -189,7 +189,7 @@ class InstanceMasks:
         records = instance_image.read(
             image, categories=categories, scores=scores, names=names, class_divisor=class_divisor
         )
-        return cls.from_records(records)
+        return cls.of_records(records)
 
     @classmethod
     def from_boxes(
@@ -216,7 +216,7 @@ class InstanceMasks:
         cls, output: Mapping[str, Any], *, threshold: float = 0.5, names: Mapping[int, str] | None = None
     ) -> Self:
         """Masks from what a torchvision network returns for one image; see `adapters.torchvision.read`."""
-        return cls.from_records(torchvision.read(output, threshold=threshold, names=names))
+        return cls.of_records(torchvision.read(output, threshold=threshold, names=names))
 
     @classmethod
     def from_supervision(
@@ -227,12 +227,12 @@ class InstanceMasks:
         image_size: tuple[int, int] | None = None,
     ) -> Self:
         """Masks from `supervision.Detections`; see `adapters.supervision.read`."""
-        return cls.from_records(supervision.read(detections, names=names, image_size=image_size))
+        return cls.of_records(supervision.read(detections, names=names, image_size=image_size))
 
     @classmethod
     def from_ultralytics(cls, result: Any) -> Self:  # noqa: ANN401
         """Masks from Ultralytics' `Results` of one image; see `adapters.ultralytics.read`."""
-        return cls.from_records(ultralytics.read(result))
+        return cls.of_records(ultralytics.read(result))
 
     @classmethod
     def from_sam(
@@ -244,7 +244,7 @@ class InstanceMasks:
         image_size: tuple[int, int] | None = None,
     ) -> Self:
         """Masks from the list that a mask generator of Segment Anything returns; see `adapters.sam.read`."""
-        return cls.from_records(sam.read(records, categories=categories, names=names, image_size=image_size))
+        return cls.of_records(sam.read(records, categories=categories, names=names, image_size=image_size))
 
     def save(self, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
         """Write a file that `from_file` reads; the suffix chooses the format.
@@ -387,7 +387,7 @@ class InstanceMasks:
         )
 
     @classmethod
-    def from_records(cls, records: MaskRecords) -> Self:
+    def of_records(cls, records: MaskRecords) -> Self:
         """Masks of what a reader found.
 
         Raises:
