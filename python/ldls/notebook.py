@@ -22,7 +22,8 @@ def html_of(result: Segmentation) -> str:
 
     A result does not hold the image; `ldls.viewing.overlay(result, image)` draws on it, and notebooks show that too.
     """
-    from ldls.viewing.birds_eye import ground_of, shown_birds_eye_view
+    from ldls.viewing.birds_eye import shown_birds_eye_view
+    from ldls.viewing.ground import ground_of
     from ldls.viewing.overlay import WIDTH_PX as PAIR_PX
     from ldls.viewing.overlay import overlay
     from ldls.viewing.shown import shown

@@ -6,7 +6,8 @@ import pytest
 import ldls
 from ldls.palette import instance_colours
 from ldls.viewing import birds_eye_view
-from ldls.viewing.birds_eye import BACKGROUND, OUT_OF_VIEW, RINGS, corners_of, ground_of
+from ldls.viewing.birds_eye import BACKGROUND, OUT_OF_VIEW, RINGS
+from ldls.viewing.ground import corners_of, ground_of
 
 # camera axes (x right, y down, z forward) of a lidar whose x is forward and z up, and of one whose y is forward
 X_FORWARD = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
@@ -112,3 +113,9 @@ def test_there_may_be_nothing_to_see(points) -> None:
     camera = ldls.Camera(projection=[[60, 0, 50], [0, 60, 50], [0, 0, 1]], T_camera_lidar=np.array(X_FORWARD, float))
     picture = birds_eye_view(ldls.segment(points, masks, camera))
     assert min(picture.size) > 10
+
+
+@pytest.mark.parametrize("range_m", [0, -5.0, float("nan")])
+def test_a_range_that_shows_nothing_is_refused(range_m) -> None:
+    with pytest.raises(ldls.ParameterError, match="range_m: got"):
+        birds_eye_view(street(X_FORWARD), range_m=range_m)

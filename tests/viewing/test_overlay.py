@@ -108,6 +108,11 @@ def test_images_that_do_not_fit_are_refused(result, images, message) -> None:
         overlay(result, images)
 
 
+def test_a_picture_without_width_is_refused(result) -> None:
+    with pytest.raises(ldls.ParameterError, match="width_px: got 0, expected 1 or more"):
+        overlay(result, width_px=0)
+
+
 def test_an_unknown_stage_is_refused(result) -> None:
     with pytest.raises(ldls.ParameterError, match="stage: got 'diffuse', expected direct, diffused, final"):
         overlay(result, stage="diffuse")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import ceil, cos, floor, sin
+from math import ceil, floor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +12,11 @@ from ldls.objects import SegmentedObject
 from ldls.palette import Colour
 from ldls.segmentation import Segmentation
 from ldls.viewing.grid import INK, PAPER
+from ldls.viewing.ground import Ground, corners_of, ground_of
 from ldls.viewing.marks import disc, stamp
 from ldls.viewing.shown import Shown, Stage, shown
 from ldls.viewing.tags import Box, Tag, draw_tags
 
-WIDTH_PX, HEIGHT_PX = 1800, 1200
-"""Most that a picture measures."""
-LEAST_RANGE_M, MOST_RANGE_M = 10.0, 120.0
-MARGIN_M = 1.5
 RING_STEPS_M = (1, 2, 5, 10, 20, 50)
 MOST_RINGS = 7
 RINGS: Colour = (70, 70, 80)
@@ -37,35 +33,6 @@ FINE = 2
 """How much larger a picture is drawn than it becomes, so that slanting lines are smooth."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Ground:
-    """The part of the ground that a picture shows, and where it lies in it.
-
-    Attributes:
-        forward: (2,) unit vector in the lidar frame that points up in the picture.
-        left_m, right_m, behind_m, ahead_m: Its edges, in metres from the lidar.
-        px_per_m: Scale.
-    """
-
-    forward: NDArray[np.float64]
-    left_m: float
-    right_m: float
-    behind_m: float
-    ahead_m: float
-    px_per_m: float
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """Width and height of the picture."""
-        across, along = self.right_m - self.left_m, self.ahead_m - self.behind_m
-        return round(across * self.px_per_m), round(along * self.px_per_m)
-
-    def at(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, 2) places in the picture, right and down in pixels, of (n, 2) places on the ground in metres."""
-        sideways, ahead = _turned(xy, self.forward).T
-        return np.stack([sideways - self.left_m, self.ahead_m - ahead], axis=1) * self.px_per_m
-
-
 def birds_eye_view(
     result: Segmentation, *, stage: Stage = "final", range_m: float | None = None, boxes: bool = True
 ) -> Image.Image:
@@ -80,37 +47,9 @@ def birds_eye_view(
         boxes: Whether to draw the boxes of the objects; they are those of the final labels.
 
     Raises:
-        ParameterError: There is no such stage.
+        ParameterError: There is no such stage, or the range is not more than 0.
     """
     return shown_birds_eye_view(shown(result, stage), ground_of(result, range_m), boxes=boxes)
-
-
-def ground_of(
-    result: Segmentation,
-    range_m: float | None = None,
-    *,
-    size_px: tuple[int, int] = (WIDTH_PX, HEIGHT_PX),
-    fill: bool = False,
-) -> Ground:
-    """The part of the ground that a picture of a result shows, as large as fits into a width and a height.
-
-    With `fill`, what room is left at the sides shows more of the ground.
-    """
-    forward = _heading(result)
-    seen = _turned(result.points[result.in_view, :2].astype(np.float64), forward)
-    ranges = np.hypot(*seen.T)
-    objects = result.labels[result.in_view] > 0
-    reach = range_m or _reach(ranges[objects] if objects.any() else ranges)
-    corners = [corners_of(found) for found in result.objects if found.box is not None]
-    held = _turned(np.concatenate([np.zeros((1, 2)), *corners]), forward)
-    near = np.concatenate([seen[ranges <= reach], held[np.hypot(*held.T) <= (range_m or MOST_RANGE_M)]])
-    left, behind = near.min(axis=0) - MARGIN_M
-    right, ahead = near.max(axis=0) + MARGIN_M
-    scale = min(size_px[0] / (right - left), size_px[1] / (ahead - behind))
-    if fill:
-        wider = size_px[0] / scale - (right - left)
-        left, right = left - wider / 2, right + wider / 2
-    return Ground(forward=forward, left_m=left, right_m=right, behind_m=behind, ahead_m=ahead, px_per_m=scale)
 
 
 def shown_birds_eye_view(what: Shown, ground: Ground, *, boxes: bool) -> Image.Image:
@@ -136,33 +75,6 @@ def shown_birds_eye_view(what: Shown, ground: Ground, *, boxes: bool) -> Image.I
     ]
     draw_tags(picture, tags, covered, PEN_PX, aversion=AVERSION, taken=written)
     return picture
-
-
-def corners_of(found: SegmentedObject) -> NDArray[np.float64]:
-    """(4, 2) corners of an object's box on the ground, in metres in the lidar frame, in order around it."""
-    assert found.box is not None
-    length, width, _ = found.box.size / 2
-    along = np.array([cos(found.box.yaw), sin(found.box.yaw)])
-    across = np.array([-along[1], along[0]])
-    signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-    return np.asarray(found.box.center[:2] + signs[:, :1] * length * along + signs[:, 1:] * width * across)
-
-
-def _heading(result: Segmentation) -> NDArray[np.float64]:
-    """Where the first camera looks, along the ground of the lidar frame; x if it looks up or down."""
-    axis: NDArray[np.float64] = result.views[0].view.camera.T_camera_lidar[2, :2]
-    length = np.hypot(*axis)
-    return axis / length if length > 1e-6 else np.array([1.0, 0.0])
-
-
-def _turned(xy: NDArray[np.float64], forward: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 2) metres to the right of and along `forward`."""
-    return np.asarray(xy @ np.array([[forward[1], forward[0]], [-forward[0], forward[1]]]))
-
-
-def _reach(ranges_m: NDArray[np.float64]) -> float:
-    farthest = float(np.quantile(ranges_m, 0.995)) if len(ranges_m) else 0.0
-    return min(max(1.12 * farthest, LEAST_RANGE_M), MOST_RANGE_M)
 
 
 def _ring_step(ground: Ground) -> int:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.segmentation import Segmentation
-from ldls.viewing.birds_eye import ground_of, shown_birds_eye_view
+from ldls.viewing.birds_eye import shown_birds_eye_view
 from ldls.viewing.grid import grid, half
+from ldls.viewing.ground import ground_of
 from ldls.viewing.overlay import WIDTH_PX, overlay_of
 from ldls.viewing.shown import Images, Shown, images_of, shown
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
 
+from ldls.errors import ParameterError
 from ldls.masks import InstanceMask, InstanceMasks
 from ldls.palette import Colour, instance_colours
 from ldls.segmentation import Segmentation
@@ -53,8 +54,10 @@ def overlay(
 
     Raises:
         InputError: There are more or fewer images than cameras, or one has not the size of the masks.
-        ParameterError: There is no such stage.
+        ParameterError: There is no such stage, or the width is below 1.
     """
+    if width_px is not None and width_px < 1:
+        raise ParameterError(f"width_px: got {width_px}, expected 1 or more")
     what, each = shown(result, stage), images_of(result, images)
     if len(each) == 1:
         return overlay_of(what, result.views[0], each[0], width_px or WIDTH_PX)
