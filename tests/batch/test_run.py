@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 import ldls
@@ -23,6 +24,7 @@ from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import BatchError, CorruptFileError, InputError, ParameterError, UnsafePathError
 from ldls.io import whole_file
+from ldls.viewing import overlay
 
 STORED = batch.RunSettings(masks="unused")
 
@@ -56,6 +58,39 @@ def test_workers_out_of_range(few, tmp_path, workers):
     with pytest.raises(ParameterError, match=f"workers: got {workers}"):
         run(few, tmp_path / "out", workers=workers)
     assert not (tmp_path / "out").exists()
+
+
+def test_pictures_are_a_format(few, tmp_path):
+    out = tmp_path / "out"
+    outcome = command("run", few, "--masks", few / "masks", "--out", out, "--frames", ":2", "--formats", "png,npz")
+    assert outcome.exit_code == 0, outcome.output
+    result = ldls.Segmentation.from_npz(out / "000001.npz")
+    overlay(result, open_source(few)[1].images[0].read()).save(tmp_path / "expected.png")
+    with Image.open(out / "000001.png") as picture, Image.open(tmp_path / "expected.png") as expected:
+        assert picture.tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("ending", "hint"),
+    [
+        pytest.param("lable", "did you mean label?", id="a slip"),
+        pytest.param(".ply", "did you mean ply?", id="with a dot"),
+        pytest.param("42", "expected some of npz, label, ply", id="nothing like it"),
+    ],
+)
+def test_unknown_formats_are_refused_before_anything_is_done(few, tmp_path, ending, hint):
+    outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--formats", ending)
+    assert outcome.exit_code == 1
+    assert f"formats: '{ending}' is unknown; {hint}" in outcome.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_extra_stops_the_run(few, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "laspy", None)
+    outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--formats", "las")
+    assert outcome.exit_code == 1
+    assert "pip install 'ldls[las]'" in outcome.output
+    assert not (tmp_path / "out/failures.jsonl").exists()
 
 
 def test_parameters_of_the_method_are_options(few, tmp_path):

@@ -15,7 +15,7 @@ import numpy as np
 from ldls.batch.mask_files import MaskFiles
 from ldls.batch.outcome import Outcome
 from ldls.batch.plan import file_name
-from ldls.batch.settings import RunSettings, fill
+from ldls.batch.settings import PICTURE, RunSettings, fill
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.errors import BatchError
 from ldls.label_diffusion import LabelDiffusion
@@ -23,6 +23,7 @@ from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
 from ldls.view import View
+from ldls.viewing import overlay, save_picture
 
 
 class StageError(Exception):
@@ -43,6 +44,7 @@ class Work:
         index: Its number in the source.
         name: Its name.
         frame: What was read.
+        images: The images of the frame, for its picture.
         masks: Stored masks of each image.
         inputs: Size and time of change of the files that it is made of, by path.
         result: What came of it.
@@ -53,6 +55,7 @@ class Work:
     index: int
     name: str
     frame: Frame | None = None
+    images: tuple[CameraImage, ...] = ()
     masks: tuple[InstanceMasks, ...] | None = None
     inputs: dict[str, list[int] | None] = field(default_factory=dict)
     result: Segmentation | None = None
@@ -115,6 +118,7 @@ class FrameWork:
             pairs = zip(work.masks, frame.images, strict=True)
             views = [View(masks, image.camera, image.name) for masks, image in pairs]
             work.result = self._diffusion.segment(frame.points, views, same_object=self._settings.same_object)
+        work.images = frame.images
         work.frame = work.masks = None
 
     def write(self, work: Work) -> None:
@@ -127,7 +131,10 @@ class FrameWork:
             sizes = {}
             for ending in self._settings.formats:
                 path = self.out / file_name(work.name, ending)
-                quiet.save(path)
+                if ending == PICTURE:
+                    save_picture(path, overlay(result, [image.read() for image in work.images]))
+                else:
+                    quiet.save(path)
                 sizes[path.name] = path.stat().st_size
             work.record = {
                 "frame": work.name,
@@ -218,7 +225,8 @@ def _stage(work: Work, stage: str) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        if isinstance(error, MemoryError):
+        if isinstance(error, MemoryError | ImportError):
+            # no frame is at fault if memory or an extra is missing
             raise
         if stage == "write" and isinstance(error, OSError):
             # a full disk is no fault of the frame

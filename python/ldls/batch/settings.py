@@ -6,15 +6,20 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from ldls import _ldls
 from ldls.errors import ParameterError
+from ldls.io.results import WRITERS
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
 
 DEFAULT_FORMATS = ("label",)
+PICTURE = "png"
+"""Ending of the image with masks and points."""
+KNOWN_FORMATS = (*(ending.removeprefix(".") for ending in WRITERS), PICTURE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,11 +32,12 @@ class RunSettings:
         min_score: Lowest score of a mask that counts; the segmenter's own, or 0 of stored masks, without one.
         categories: Categories that count, by name or id; all without them.
         params: Parameters of the method; their number of threads does not matter to the result.
-        formats: Endings of the files written for each frame.
+        formats: Endings of the files written for each frame: those of `Segmentation.save`, and png for the image with
+            masks and points.
         same_object: See `ldls.segment`.
 
     Raises:
-        ParameterError: Neither or both of `masks` and `segmenter` are given, or there is no format.
+        ParameterError: Neither or both of `masks` and `segmenter` are given, or there is no format, or an unknown one.
     """
 
     masks: str | None = None
@@ -48,6 +54,11 @@ class RunSettings:
             raise ParameterError(f"masks, segmenter: give one of them, got {given}")
         if not self.formats:
             raise ParameterError("formats: expected at least one, as label")
+        for ending in self.formats:
+            if ending not in KNOWN_FORMATS:
+                near = get_close_matches(ending.lstrip("."), KNOWN_FORMATS, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"expected some of {', '.join(KNOWN_FORMATS)}"
+                raise ParameterError(f"formats: {ending!r} is unknown; {hint}")
 
     def segmenter_file(self, frame: str, camera: str) -> Path | None:
         """The file that the segmenter of an image is made of, as a model or boxes; None where there is none."""

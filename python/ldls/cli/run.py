@@ -44,7 +44,8 @@ def run(
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
     formats: Annotated[
-        str, typer.Option(help="Files to write for each frame, by their endings: label,ply,npz.")
+        str,
+        typer.Option(help="Files to write for each frame, by their endings: label,ply,npz; png is the picture."),
     ] = "label",
     frames: Annotated[
         str | None,
