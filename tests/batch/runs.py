@@ -1,5 +1,6 @@
 """Runs of `ldls run` in processes of their own, to be killed."""
 
+import signal
 import subprocess
 import sys
 import time
@@ -20,11 +21,17 @@ def arguments(source, out, *more):
 def process(arguments, program=("-m", "ldls")):
     """A run that is at work, and no more when the block ends."""
     command = [sys.executable, *program, *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, preexec_fn=hears_ctrl_c, **pipes) as running:
         try:
             yield running
         finally:
             running.kill()
+
+
+def hears_ctrl_c():
+    """Undo what shells do to processes in the background: they are started deaf to Ctrl-C, and so are theirs."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def finished(arguments, program=("-m", "ldls")):
