@@ -44,9 +44,10 @@ def has_begun(running, out):
     return _comes_to(running, lambda: (out / LOCK_NAME).exists())
 
 
-def has_written(running, out):
-    """Wait until a run has written its first result; False if it ended before."""
-    return _comes_to(running, lambda: any(out.glob("*.label")))
+def has_done_some(running, out):
+    """Wait until a run's journal knows of frames; False if it ended before."""
+    journal = out / "journal.jsonl"
+    return _comes_to(running, lambda: journal.exists() and journal.read_bytes().count(b"\n") > 1)
 
 
 def _comes_to(running, state):
