@@ -11,6 +11,16 @@ from ldls.batch.lock import LOCK_NAME
 
 KILLED_AT = Path(__file__).with_name("killed_at.py")
 PATIENCE_S = 60
+SLOWLY = """
+import time
+from ldls.batch.frame_work import FrameWork
+from ldls.cli import app
+
+read = FrameWork.read
+FrameWork.read = lambda work, frame: (time.sleep(0.02), read(work, frame))
+app()
+"""
+"""A program that does what `ldls` does, at most 50 frames a second a reader."""
 
 
 def arguments(source, out, *more):
