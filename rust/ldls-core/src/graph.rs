@@ -1,6 +1,6 @@
 //! The point graph as a sparse matrix (method, steps 3 and 4).
 
-use crate::neighbors::Adjacency;
+use crate::adjacency::Adjacency;
 use crate::{Error, Memory, Neighbors, PixelLabels, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;

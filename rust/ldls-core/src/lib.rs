@@ -8,8 +8,10 @@
 //! taken by one thread in one order.
 
 mod activity;
+mod adjacency;
 mod blocks;
 mod camera;
+mod candidates;
 mod chebyshev;
 mod cloud;
 mod components;
@@ -18,7 +20,10 @@ mod distortion;
 mod error;
 mod graph;
 mod kdtree;
+mod keys;
 mod lanes;
+mod leaf_search;
+mod lone_search;
 mod masks;
 mod memory;
 mod morphology;

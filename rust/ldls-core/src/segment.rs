@@ -1,8 +1,8 @@
 //! The method on one screen: points, masks and a camera in, one label a point out.
 
+use crate::adjacency::Adjacency;
 use crate::components::keep_largest_by_index;
 use crate::kdtree::{KdTree, arrange};
-use crate::neighbors::Adjacency;
 use crate::{
     Camera, Cloud, Convergence, Error, InstanceMasks, Memory, Params, PixelLabels, PointGraph,
     Real, Result, View, ViewCounts, diffuse,
