@@ -19,6 +19,7 @@ mod diffusion;
 mod distortion;
 mod error;
 mod graph;
+mod images;
 mod kdtree;
 mod keys;
 mod lanes;
@@ -35,9 +36,13 @@ mod products;
 mod real;
 mod ring;
 mod rle;
+mod same_objects;
 mod segment;
+mod sightings;
 mod state;
 mod sweeps;
+#[cfg(test)]
+mod test_wall;
 mod tiles;
 mod values;
 mod winners;
@@ -55,9 +60,10 @@ pub use neighbors::Neighbors;
 pub use params::Params;
 pub use products::Products;
 pub use real::Real;
-pub use ring::{RingSegmentation, RingView, Sighting, segment_ring};
+pub use ring::{RingSegmentation, RingView, segment_ring};
 pub use rle::Rle;
 pub use segment::{Report, Segmentation, Timings, segment};
+pub use sightings::Sighting;
 
 /// Result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;

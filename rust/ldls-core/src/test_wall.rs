@@ -1,0 +1,46 @@
+//! A wall of points before cameras whose masks are rectangles: what the tests of rings segment.
+
+use crate::{
+    Camera, Cloud, InstanceMasks, Memory, Params, RingSegmentation, RingView, Rle, segment_ring,
+};
+
+const IDENTITY: [f64; 16] = [
+    1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
+];
+
+/// A camera whose image begins `left` pixels to the left of the axis, 40 x 30 pixels.
+pub(crate) fn camera(left: f64) -> Camera {
+    let projection = [20., 0., left, 0., 0., 20., 15., 0., 0., 0., 1., 0.];
+    Camera::new(&projection, &IDENTITY, 0.1).unwrap()
+}
+
+pub(crate) fn masks(rectangles: &[[usize; 4]]) -> InstanceMasks {
+    let rle = |&[top, left, height, width]: &[usize; 4]| {
+        let pixels: Vec<bool> = (0..30 * 40)
+            .map(|at| {
+                (top..top + height).contains(&(at / 40))
+                    && (left..left + width).contains(&(at % 40))
+            })
+            .collect();
+        Rle::from_pixels(30, 40, &pixels).unwrap()
+    };
+    InstanceMasks::new(30, 40, rectangles.iter().map(rle).collect()).unwrap()
+}
+
+/// A wall of points at z = 1, one every tenth.
+pub(crate) fn wall() -> Vec<f64> {
+    let steps = |n: i32| (-n..=n).map(|i| f64::from(i) / 10.0);
+    steps(30)
+        .flat_map(|x| steps(6).flat_map(move |y| [x, y, 1.0]))
+        .collect()
+}
+
+pub(crate) fn segment(views: &[RingView]) -> RingSegmentation {
+    let values = wall();
+    let cloud = Cloud::F64 {
+        values: &values,
+        columns: 3,
+    };
+    let memory = &mut Memory::of_one_frame();
+    segment_ring(cloud, views, 0.5, &Params::paper(), false, memory).unwrap()
+}
