@@ -47,9 +47,10 @@ mod sweeps;
 mod test_wall;
 mod tiles;
 mod values;
+mod view;
 mod winners;
 
-pub use camera::{Camera, View, ViewCounts};
+pub use camera::Camera;
 pub use cloud::Cloud;
 pub use components::keep_largest_components;
 pub use diffusion::{Convergence, Diffused, diffuse, likelihoods};
@@ -67,6 +68,7 @@ pub use ring::{RingSegmentation, RingView, segment_ring};
 pub use rle::Rle;
 pub use segment::{Report, Segmentation, Timings, segment};
 pub use sightings::Sighting;
+pub use view::{View, ViewCounts};
 
 /// Result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;

@@ -3,11 +3,11 @@
 //! Every camera adds the pixel edges of the points that it sees, so that where images overlap, they vote. An object that
 //! two images show has an instance in each; the two are one label if the points that both cameras see agree.
 
-use crate::camera::check_points;
 use crate::images::{Images, labels_of};
 use crate::same_objects::same_objects;
 use crate::segment::{Stopwatch, check_edges, label_points};
 use crate::sightings::sight_all;
+use crate::view::check_points;
 use crate::{Camera, Cloud, InstanceMasks, Memory, Params, Result, Segmentation, Sighting};
 
 /// What one camera of a ring took.
