@@ -1,7 +1,7 @@
 //! Label diffusion lidar segmentation (LDLS): instance masks of a camera image become labels of lidar points.
 //!
 //! The method is that of Wang et al., "LDLS: 3-D Object Segmentation Through Label Diffusion From 2-D Images",
-//! RA-L 2019. [`segment`] runs all of it; every step is also a function of its own. Nothing here knows of Python,
+//! RA-L 2019. [`segment()`] runs all of it; every step is also a function of its own. Nothing here knows of Python,
 //! of files or of the 2D segmenter that made the masks.
 //!
 //! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is

@@ -6,8 +6,8 @@ use std::collections::HashMap;
 
 /// Vectors that wait to be used again.
 ///
-/// A stream of frames that hands the same one to [`crate::segment`] allocates, after its first frame of a size, what it
-/// returns and some tens of kilobytes.
+/// A stream of frames that hands the same one to [`crate::segment()`] allocates, after its first frame of a size, what
+/// it returns and some tens of kilobytes.
 #[derive(Debug)]
 pub struct Memory {
     keeps: bool,

@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 
-/// Parameters of [`segment`](crate::segment); [`Params::paper`] has the values of the paper.
+/// Parameters of [`segment`](crate::segment()); [`Params::paper`] has the values of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// K: neighbours that every point is joined to.

@@ -65,7 +65,7 @@ impl Products {
     }
 
     /// Whether all products asked for are done; without a number, whether the last changed no likelihood by more
-    /// than [`CONVERGED`] or [`MOST_SWEEPS`] are done.
+    /// than 1e-5 or 20,000 are done.
     pub fn is_finished(&self) -> bool {
         match self.iterations {
             Some(iterations) => self.done >= iterations,

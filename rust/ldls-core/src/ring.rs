@@ -33,13 +33,13 @@ pub struct RingSegmentation {
 }
 
 /// Segments `cloud` by the instance masks of the images that several cameras took at one moment; otherwise as
-/// [`crate::segment`].
+/// [`crate::segment()`].
 ///
 /// Instances of two images become one object if, of the points that both cameras see and that fall on one of the two
 /// masks, at least the share `same_object` falls on both.
 ///
 /// # Errors
-/// As [`crate::segment`]; [`crate::Error::Mismatch`] where a view has not one category a mask.
+/// As [`crate::segment()`]; [`crate::Error::Mismatch`] where a view has not one category a mask.
 pub fn segment_ring(
     cloud: Cloud,
     views: &[RingView],
