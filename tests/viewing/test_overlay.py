@@ -1,5 +1,7 @@
 """Overlays put colours and names where they belong."""
 
+import importlib
+
 import numpy as np
 import pytest
 
@@ -125,6 +127,19 @@ def test_masks_alone_are_drawn_in_the_same_colours(small_scene) -> None:
     colour = instance_colours([1])[0].astype(int)
     grey = np.asarray(masks_overlay(masks.select([]), photo())).astype(int)[30 * 1800 // 80, 23 * 1800 // 80]
     np.testing.assert_allclose(middle, 0.72 * grey + 0.28 * colour, atol=2)
+
+
+def test_only_objects_with_points_are_named(small_scene, monkeypatch) -> None:
+    points, masks, camera = small_scene
+    nowhere = np.zeros((60, 80), bool)
+    nowhere[:6, :6] = True
+    masks = ldls.InstanceMasks.from_array([nowhere, *masks.to_array()], categories=[18, 1, 3])
+    named = []
+    # the package has a function of the module's name
+    module = importlib.import_module("ldls.viewing.overlay")
+    monkeypatch.setattr(module, "draw_tags", lambda picture, tags, *_: named.extend(tag.text for tag in tags))
+    overlay(ldls.segment(points, masks, camera))
+    assert named == ["person 2", "car 3"]
 
 
 def test_masks_without_pixels_are_no_trouble(small_scene) -> None:

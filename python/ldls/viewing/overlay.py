@@ -28,11 +28,11 @@ MARK: Colour = (255, 255, 255)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Outline:
-    """A mask to be drawn."""
+    """A mask to be drawn, with its name if it has one."""
 
     mask: InstanceMask
     colour: Colour
-    name: str
+    name: str | None
 
 
 def overlay(
@@ -42,7 +42,7 @@ def overlay(
     stage: Stage = "final",
     width_px: int | None = None,
 ) -> Image.Image:
-    """The camera image with masks, points in the colour of their instance, and names with labels.
+    """The camera image with masks, points in the colour of their instance, and the names of those that have points.
 
     Args:
         result: What to show.
@@ -84,8 +84,9 @@ def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) 
 def overlay_of(what: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
     """The picture of one camera's image, marked points with a white rim."""
     colours = _as_colours(what.colours)
+    found = set(what.labels.tolist())
     outlines = [
-        Outline(mask=mask, colour=colours[label - 1], name=what.names[label - 1])
+        Outline(mask=mask, colour=colours[label - 1], name=what.names[label - 1] if label in found else None)
         for mask, label in zip(seen.view.masks, seen.labels.tolist(), strict=True)
     ]
     scale = width_px / image.shape[1]
@@ -106,7 +107,8 @@ def _with_masks(
         if height:
             _draw_mask(picture, crop, outline.colour, (left, top), scale)
         covered[top : top + height, left : left + width] |= crop
-        tags.append(Tag(outline.name, outline.colour, box))
+        if outline.name is not None:
+            tags.append(Tag(outline.name, outline.colour, box))
     return picture, tags, covered
 
 
