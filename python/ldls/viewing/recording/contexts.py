@@ -1,7 +1,7 @@
 """Annotation contexts: which name and colour a number has.
 
-The viewer reads contexts that hold for all times only, while labels mean other objects in every frame. So what a
-recording has named is remembered, new names are added to it, and numbers keep their meaning.
+Of files the viewer reads contexts that hold for all times only, while labels mean other objects in every frame. So what
+a recording has named is remembered, new names are added to it, and numbers keep their meaning.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ldls.evaluation import Labeling
 from ldls.palette import BACKGROUND, Colour, category_colour
 from ldls.segmentation import Instance, Segmentation
 from ldls.viewing.recording.colours import GREATEST_ID, OUT_OF_VIEW_COLOUR, OUT_OF_VIEW_ID, label_colours
+from ldls.viewing.recording.keeping import log_context
 from ldls.viewing.recording.stream import Entity, rerun
 
 CLEAR = (0, 0, 0, 0)
@@ -103,7 +104,7 @@ def log_names(root: Entity, result: Segmentation) -> tuple[Names, bool]:
     names.add(result)
     grown = len(names) > before or not before
     if grown:
-        root.log(names.of_points(), static=True)
+        log_context(root, names.of_points())
     return names, grown
 
 

@@ -15,6 +15,7 @@ from ldls.viewing.recording.boxes import boxes_3d
 from ldls.viewing.recording.cameras import POINT_PX, camera_names, log_camera, log_image, log_masks, log_pixels
 from ldls.viewing.recording.colours import check_ids, class_ids, keypoint_ids, label_colours
 from ldls.viewing.recording.contexts import log_names
+from ldls.viewing.recording.keeping import log_context
 from ldls.viewing.recording.points import finite_rows
 from ldls.viewing.recording.statistics import log_statistics
 from ldls.viewing.recording.stream import Entity, rerun
@@ -65,7 +66,7 @@ def log(
             log_image(place / "image", images[camera], size)
         masks = place / "image" / "masks"
         if new:
-            masks.log(names.of_masks(), static=True)
+            log_context(masks, names.of_masks())
         log_masks(masks, seen, names.mask_ids(result))
         log_pixels(place / "image" / "points", seen, result)
     text = markdown(result, title=name)

@@ -24,6 +24,7 @@ from ldls.viewing.recording.cameras import camera_names
 from ldls.viewing.recording.diffusion import TIMELINE, log_diffusion
 from ldls.viewing.recording.entities import log
 from ldls.viewing.recording.frames import log_frame
+from ldls.viewing.recording.keeping import at_their_times, held_to_the_end
 from ldls.viewing.recording.stream import Entity, rerun
 
 VIEWER = "spawn"
@@ -64,13 +65,15 @@ def open_recording(target: str | PathLike[str], *, name: str = "") -> Iterator[R
             stream.send_recording_name(name)
         if target == VIEWER:
             viewer.connect(stream)
-            yield Recording(stream)
+            with at_their_times(stream):
+                yield Recording(stream)
             viewer.flush(stream)
         else:
             # Rerun's own writer waits for ever once a disk is full
             encoded = stream.binary_stream()
             with whole_file(target) as file:
-                yield Recording(stream)
+                with held_to_the_end(stream):
+                    yield Recording(stream)
                 file.write(encoded.read())
     finally:
         stream.disconnect()

@@ -12,6 +12,7 @@ from ldls.objects import fit_upright_box
 from ldls.viewing.recording import contexts
 from ldls.viewing.recording.boxes import boxes_3d
 from ldls.viewing.recording.cameras import POINT_PX
+from ldls.viewing.recording.keeping import log_context
 from ldls.viewing.recording.points import finite_rows
 from ldls.viewing.recording.stream import Entity, rerun
 
@@ -27,7 +28,7 @@ def log_truth(entity: Entity, points: Points, truth: Labeling) -> None:
     rr = rerun()
     rows = finite_rows(points)
     colours = np.array(contexts.truth_colours(truth), np.uint8)
-    entity.log(contexts.of_truth(truth), static=True)
+    log_context(entity, contexts.of_truth(truth))
     entity.log(
         rr.Points3D(
             points[rows, :3].astype(np.float32),
