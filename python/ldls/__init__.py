@@ -28,7 +28,8 @@ from ldls.io import read_image, read_points
 from ldls.label_diffusion import LabelDiffusion, segment
 from ldls.masks import InstanceMasks
 from ldls.notebook import html_of
-from ldls.objects import OrientedBox, SegmentedObject
+from ldls.objects import SegmentedObject
+from ldls.oriented_box import OrientedBox
 from ldls.params import Params
 from ldls.report import Report
 from ldls.segmentation import Instance, Segmentation

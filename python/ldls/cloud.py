@@ -13,6 +13,11 @@ MAX_COLUMNS = 64
 Points = NDArray[np.float32] | NDArray[np.float64]
 
 
+def finite_rows(points: Points) -> NDArray[np.int64]:
+    """Rows of the points (N, >= 3) whose coordinates are all finite, ascending."""
+    return np.flatnonzero(np.isfinite(points[:, :3]).all(axis=1))
+
+
 def as_points(points: ArrayLike) -> Points:
     """`points` as a C-contiguous (N, >= 3) array of float32 or float64, copied only where it must be.
 

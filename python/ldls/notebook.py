@@ -7,6 +7,7 @@ import io
 from html import escape
 from typing import TYPE_CHECKING
 
+from ldls.object_rows import HEADINGS, cells_of, nearest_first
 from ldls.objects import SegmentedObject
 from ldls.segmentation import Segmentation
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from PIL import Image
 
 WIDTH_PX, HEIGHT_PX = 1200, 700
-COLUMNS = ("", "label", "object", "score", "points", "distance", "length x width x height")
 
 
 def html_of(result: Segmentation) -> str:
@@ -24,11 +24,10 @@ def html_of(result: Segmentation) -> str:
     """
     from ldls.viewing.birds_eye import shown_birds_eye_view
     from ldls.viewing.ground import ground_of
-    from ldls.viewing.overlay import WIDTH_PX as PAIR_PX
     from ldls.viewing.overlay import overlay
     from ldls.viewing.shown import shown
 
-    seen = overlay(result, width_px=WIDTH_PX if len(result.views) == 1 else PAIR_PX // 2)
+    seen = overlay(result, width_px=WIDTH_PX if len(result.views) == 1 else None)
     ground = ground_of(result, size_px=(WIDTH_PX, HEIGHT_PX), fill=True)
     above = shown_birds_eye_view(shown(result, "final"), ground, boxes=True)
     pictures = [_picture(seen, "masks and points"), _picture(above, "the points from above")]
@@ -54,15 +53,11 @@ def _table(result: Segmentation) -> str:
     from ldls.palette import instance_colours
 
     colours = instance_colours(instance.category for instance in result.instances).tolist()
-    nearest = sorted(result.objects, key=lambda each: (each.distance_m is None, each.distance_m))
-    head = "".join(f"<th>{column}</th>" for column in COLUMNS)
-    rows = "".join(_row(each, colours[each.label - 1]) for each in nearest)
+    head = "".join(f"<th>{column}</th>" for column in ("", *HEADINGS))
+    rows = "".join(_row(each, colours[each.label - 1]) for each in nearest_first(result.objects))
     return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
 
 
 def _row(found: SegmentedObject, colour: list[int]) -> str:
     swatch = f'<td style="background: rgb({colour[0]}, {colour[1]}, {colour[2]})">&emsp;</td>'
-    distance = "-" if found.distance_m is None else f"{found.distance_m:.1f} m"
-    size = "-" if found.box is None else " x ".join(f"{side:.1f}" for side in found.box.size) + " m"
-    cells = (str(found.label), escape(found.name), f"{found.score:.2f}", f"{found.n_points:,}", distance, size)
-    return f"<tr>{swatch}{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+    return f"<tr>{swatch}{''.join(f'<td>{escape(cell)}</td>' for cell in cells_of(found))}</tr>"

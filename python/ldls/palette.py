@@ -69,6 +69,11 @@ def instance_colours(categories: Iterable[int]) -> NDArray[np.uint8]:
     return np.array(colours, np.uint8).reshape(-1, 3)
 
 
+def label_colours(categories: Iterable[int], *, out_of_view: Colour = BACKGROUND) -> NDArray[np.uint8]:
+    """(M + 2, 3) uint8 by label: the background, the M instances, and last, where label -1 finds it, out of view."""
+    return np.vstack([[BACKGROUND], instance_colours(categories), [out_of_view]]).astype(np.uint8)
+
+
 def _hue_of(category: int) -> int:
     others = len(HUES) - len(OF_EVERYDAY)
     return OF_EVERYDAY.get(category, len(OF_EVERYDAY) + category % others)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ldls import stages
 from ldls.camera import Camera
 from ldls.segmentation import Segmentation
-from ldls.view import SeenView
+from ldls.view import SeenView, camera_names
 
 Outcome = Literal["in view", "behind", "outside", "beyond the lens", "not finite", "origin"]
 
@@ -61,13 +61,13 @@ class Sight:
 
 def sights_of(result: Segmentation, point: int) -> tuple[Sight, ...]:
     """What each camera of `result` has of the point in row `point` of its cloud."""
-    return tuple(_sight(result, seen, number, point) for number, seen in enumerate(result.views))
+    names = camera_names(result.views)
+    return tuple(_sight(result, seen, name, point) for name, seen in zip(names, result.views, strict=True))
 
 
-def _sight(result: Segmentation, seen: SeenView, number: int, point: int) -> Sight:
+def _sight(result: Segmentation, seen: SeenView, name: str, point: int) -> Sight:
     xyz = result.points[point, :3].astype(np.float64).tolist()
     at = int(np.searchsorted(seen.in_view, point))
-    name = seen.view.name or f"camera {number}"
     if at < len(seen.in_view) and seen.in_view[at] == point:
         return _in_view(result, seen, name, seen.pixels[at], seen.view.camera.core.project(*xyz)[2])
     outcome, depth_m, pixel = _out_of_view(result, seen.view.camera, xyz)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +59,11 @@ class SeenView:
     in_view: NDArray[np.int64]
     pixels: NDArray[np.float64]
     labels: NDArray[np.int32]
+
+
+def camera_names(views: Sequence[SeenView]) -> tuple[str, ...]:
+    """Name of each view: its own, or "camera 0", "camera 1" and so on where it has none."""
+    return tuple(seen.view.name or f"camera {number}" for number, seen in enumerate(views))
 
 
 def check_camera(camera: object) -> None:

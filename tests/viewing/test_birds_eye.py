@@ -87,7 +87,7 @@ def test_the_picture_fits_and_follows_the_range() -> None:
 
 def test_corners_go_around_the_box() -> None:
     (found,) = street(X_FORWARD).objects
-    corners = corners_of(found)
+    corners = corners_of(found.box)
     sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     np.testing.assert_allclose(sides, found.box.size[[1, 0, 1, 0]])
     np.testing.assert_allclose(corners.mean(axis=0), found.box.center[:2])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ldls.errors import InputError, ParameterError
 from ldls.segmentation import Segmentation
-from ldls.view import SeenView
+from ldls.view import SeenView, camera_names
 
 EXPECTED = "a row number as 12345, a pixel U,V as 610,180 or a place X,Y,Z in metres as 12.5,-3,0.2"
 
@@ -70,7 +70,7 @@ def _row(word: str) -> int:
 def _view_of(result: Segmentation, camera: str | None) -> SeenView:
     if not result.views:
         raise InputError("POINT: got a pixel, and there is no camera; give a row number or X,Y,Z")
-    names = [seen.view.name or f"camera {number}" for number, seen in enumerate(result.views)]
+    names = camera_names(result.views)
     if camera is None and len(names) == 1:
         return result.views[0]
     listed = ", ".join(f"{number} {name}" for number, name in enumerate(names))

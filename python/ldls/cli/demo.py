@@ -67,7 +67,7 @@ def demo(
 def accuracy_table(frame: SimulatedFrame, masks: ldls.InstanceMasks, result: ldls.Segmentation) -> Table:
     """Intersection over union of each object with the truth, for direct projection and for the method."""
     truth = frame.truth[result.in_view]
-    direct = ldls.stages.direct_labels(result.pixels, masks)
+    direct = result.direct_labels[result.in_view]
     found = result.labels[result.in_view]
     ious = [(_iou(direct, truth, m), _iou(found, truth, m)) for m in range(1, len(masks) + 1)]
     mean = np.nanmean(ious, axis=0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -61,10 +60,9 @@ def masks_of(
 
 def wanted(masks: InstanceMasks, *, min_score: float | None, categories: str | None) -> InstanceMasks:
     """The masks that score at least `min_score` and are of one of the categories of a list separated by commas."""
-    chosen = None if categories is None else names_or_ids(words(categories))
-    return masks.filter(min_score=min_score or 0.0, categories=chosen)
+    return masks.filter(min_score=min_score or 0.0, categories=chosen_categories(categories))
 
 
-def names_or_ids(texts: Iterable[str]) -> list[int | str]:
-    """Numbers as category ids, the rest as names."""
-    return [int(text) if text.isdecimal() else text for text in texts]
+def chosen_categories(text: str | None) -> tuple[int | str, ...] | None:
+    """The categories of a list separated by commas, numbers as ids and the rest as names; None where there is none."""
+    return None if text is None else tuple(int(word) if word.isdecimal() else word for word in words(text))

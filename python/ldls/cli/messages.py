@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ldls.errors import LdlsError
+from ldls.object_rows import HEADINGS, cells_of, nearest_first
 from ldls.objects import SegmentedObject
 
 P = ParamSpec("P")
@@ -58,19 +59,10 @@ def flowing(text: str) -> str:
 def object_table(objects: Sequence[SegmentedObject]) -> Table:
     """Name, points, distance and size of each object, the nearest first and those without points last."""
     table = Table(title=f"{sum(o.n_points > 0 for o in objects)} of {len(objects)} objects found")
-    table.add_column("label", justify="right")
-    table.add_column("object")
-    for heading in ("score", "points", "distance", "length x width x height"):
-        table.add_column(heading, justify="right")
-    for found in sorted(objects, key=lambda o: (o.distance_m is None, o.distance_m)):
-        table.add_row(
-            str(found.label),
-            found.name,
-            f"{found.score:.2f}",
-            f"{found.n_points:,}",
-            "-" if found.distance_m is None else f"{found.distance_m:.1f} m",
-            _size(found),
-        )
+    for heading in HEADINGS:
+        table.add_column(heading, justify="left" if heading == "object" else "right")
+    for found in nearest_first(objects):
+        table.add_row(*cells_of(found))
     return table
 
 
@@ -91,9 +83,3 @@ def console() -> Console:
     """Where tables go: as wide as the terminal, and wide enough where there is none."""
     found = Console()
     return found if found.is_terminal else Console(width=100)
-
-
-def _size(found: SegmentedObject) -> str:
-    if found.box is None:
-        return "-"
-    return " x ".join(f"{side:.1f}" for side in found.box.size) + " m"

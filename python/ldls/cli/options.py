@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
+
+from ldls.errors import ParameterError
 
 
 class SuitePart(StrEnum):
@@ -12,6 +15,21 @@ class SuitePart(StrEnum):
     TUNING = "tuning"
 
 
+FRAMES_FAILED = 2
+"""Exit status where frames failed and the rest is done."""
+
+
 def words(text: str) -> tuple[str, ...]:
     """The words of a list separated by commas, without the blanks around them."""
     return tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def refuse(options: Mapping[str, object], why: str) -> None:
+    """Refuse options, by their names, that were given and have no place here.
+
+    Raises:
+        ParameterError: One was.
+    """
+    for name, value in options.items():
+        if value:
+            raise ParameterError(f"--{name}: {why}; leave it out")

@@ -31,12 +31,12 @@ DiffusionOption = Annotated[
 ]
 ONLY_CAMERA = "camera 0"
 """What recordings call the camera of a frame that does not name it."""
-EVERY = 4
-"""Products from one picture of the diffusion to the next: 50 pictures of 200 products."""
 
 
 def every_of(diffusion: int | None, n_frames: int) -> int | None:
     """Products from one picture of the diffusion to the next, None for no pictures."""
+    from ldls.viewing.recording.diffusion import EVERY
+
     if diffusion is None:
         return EVERY if n_frames == 1 else None
     return diffusion or None

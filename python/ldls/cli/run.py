@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, names_or_ids
+from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import (
     ITERATIONS,
@@ -21,7 +21,7 @@ from ldls.cli.method_options import (
     WindowOption,
     params_of,
 )
-from ldls.cli.options import words
+from ldls.cli.options import FRAMES_FAILED, words
 from ldls.cli.progress import frame_progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, StoredMasksOption
 
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from ldls.batch import Summary
 
-FRAMES_FAILED = 2
-"""Exit status where frames failed and the rest is done."""
 MOST_LISTED = 10
 
 
@@ -87,7 +85,7 @@ def run(
         masks=masks,
         segmenter=segmenter,
         min_score=min_score,
-        categories=None if categories is None else tuple(names_or_ids(words(categories))),
+        categories=chosen_categories(categories),
         params=params_of(
             neighbors=neighbors,
             sigma=sigma,

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
-from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, names_or_ids
+from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import words
+from ldls.cli.options import FRAMES_FAILED, refuse
 from ldls.cli.outputs import PictureOption
-from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, told
+from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, told
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
-from ldls.cli.view_source import MOST_FRAMES, chosen_frames, record_frames
-from ldls.errors import InputError, ParameterError
-
-if TYPE_CHECKING:
-    from ldls.batch import RunSettings
-
-FRAMES_FAILED = 2
-"""Exit status where frames failed and the rest is shown."""
+from ldls.cli.view_result import view_result
+from ldls.cli.view_source import MOST_FRAMES, chosen_frames, record_frames, settings_of
 
 
 @speaks_plainly
@@ -98,11 +89,11 @@ def view(
             "results": results,
         }
         of_sources |= {"segmenter": segmenter, "min-score": min_score, "categories": categories}
-        _refuse(of_sources, f"{path} is a result, which has its masks and labels")
+        refuse(of_sources, f"{path} is a result, which has its masks and labels")
         message = view_result(path, image or [], target, name=name, diffusion=diffusion, picture=picture)
     else:
-        _refuse({"image": image}, f"{path} is a source, which has its images")
-        _refuse({"picture": picture}, f"{path} is a source; pictures show a result")
+        refuse({"image": image}, f"{path} is a source, which has its images")
+        refuse({"picture": picture}, f"{path} is a source; pictures show a result")
         assert target is not None
         settings = settings_of(
             masks=masks, segmenter=segmenter, min_score=min_score, categories=categories, results=results
@@ -118,73 +109,3 @@ def view(
     console().print(message, highlight=False, soft_wrap=True)
     if failures:
         raise typer.Exit(FRAMES_FAILED)
-
-
-def view_result(
-    path: Path, images: Sequence[str], target: str | None, *, name: str, diffusion: int | None, picture: Path | None
-) -> str:
-    """Show a stored result; what to tell the user."""
-    from ldls.segmentation import Segmentation
-    from ldls.viewing.recording.cameras import camera_names
-
-    result = Segmentation.from_npz(path)
-    pictures = read_images(images, camera_names(result))
-    said = []
-    if picture is not None:
-        from ldls.viewing import save_pictures
-
-        each = [pictures.get(camera) for camera in camera_names(result)]
-        said.append("wrote " + " ".join(map(str, save_pictures(picture, result, each))))
-    if target is not None:
-        said.append(record(result, target, name=name, images=pictures, diffusion=diffusion))
-    return "\n".join(said)
-
-
-def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
-    """Images by camera: FILE for the cameras in their order, CAMERA=FILE for one by name.
-
-    Raises:
-        InputError: There are more images than cameras, or one camera has two.
-    """
-    from ldls.io import read_image
-
-    paths: dict[str, str] = {}
-    for number, text in enumerate(texts):
-        camera, equals, file = text.partition("=")
-        if not equals or camera not in cameras:
-            if number >= len(cameras):
-                raise InputError(f"--image: got {len(texts)} images, the result has cameras {', '.join(cameras)}")
-            camera, file = cameras[number], text
-        if camera in paths:
-            raise InputError(f"--image: camera {camera} has {paths[camera]} and {file}; give one")
-        paths[camera] = file
-    return {camera: read_image(file) for camera, file in paths.items()}
-
-
-def settings_of(
-    *,
-    masks: str | None,
-    segmenter: str | None,
-    min_score: float | None,
-    categories: str | None,
-    results: Path | None,
-) -> RunSettings | None:
-    """How frames are segmented; None where they are not.
-
-    Raises:
-        ParameterError: Labels would come from two places, or options choose among masks and there are none.
-    """
-    from ldls.batch import RunSettings
-
-    if masks is None and segmenter is None:
-        _refuse({"min-score": min_score, "categories": categories}, "they choose among --masks or --segmenter's masks")
-        return None
-    _refuse({"results": results}, "labels come from --masks, --segmenter or --results, one of them")
-    chosen = None if categories is None else tuple(names_or_ids(words(categories)))
-    return RunSettings(masks=masks, segmenter=segmenter, min_score=min_score, categories=chosen)
-
-
-def _refuse(options: Mapping[str, object], why: str) -> None:
-    for name, value in options.items():
-        if value:
-            raise ParameterError(f"--{name}: {why}; leave it out")

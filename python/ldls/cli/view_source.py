@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ldls.cli.mask_options import chosen_categories
+from ldls.cli.options import refuse
 from ldls.cli.progress import progress
 from ldls.cli.recording_options import every_of
 from ldls.cli.source_options import parse_options
@@ -42,6 +44,29 @@ def chosen_frames(
     if not indices:
         raise ParameterError(f"--frames: got {frames}, {path} has {len(source):,} frames, counted from 0")
     return source, indices
+
+
+def settings_of(
+    *,
+    masks: str | None,
+    segmenter: str | None,
+    min_score: float | None,
+    categories: str | None,
+    results: Path | None,
+) -> RunSettings | None:
+    """How frames are segmented; None where they are not.
+
+    Raises:
+        ParameterError: Labels would come from two places, or options choose among masks and there are none.
+    """
+    from ldls.batch import RunSettings
+
+    if masks is None and segmenter is None:
+        refuse({"min-score": min_score, "categories": categories}, "they choose among --masks or --segmenter's masks")
+        return None
+    refuse({"results": results}, "labels come from --masks, --segmenter or --results, one of them")
+    chosen = chosen_categories(categories)
+    return RunSettings(masks=masks, segmenter=segmenter, min_score=min_score, categories=chosen)
 
 
 def record_frames(

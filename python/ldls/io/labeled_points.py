@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.palette import BACKGROUND, instance_colours
+from ldls.palette import label_colours
 
 if TYPE_CHECKING:
     from ldls.segmentation import Segmentation
@@ -28,10 +28,8 @@ def instances(result: Segmentation) -> NDArray[np.uint32]:
 
 def colors(result: Segmentation) -> NDArray[np.uint8]:
     """(N, 3) uint8: red, green and blue of each point, grey for background and out of view."""
-    own = instance_colours(instance.category for instance in result.instances)
-    # label -1, out of view, picks the last entry
-    by_label = np.vstack([[BACKGROUND], own, [BACKGROUND]])
-    return by_label[result.labels].astype(np.uint8)
+    colours: NDArray[np.uint8] = label_colours(instance.category for instance in result.instances)[result.labels]
+    return colours
 
 
 def names(result: Segmentation) -> list[str | None]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
+from ldls.cloud import finite_rows
 from ldls.objects import SegmentedObject
 from ldls.palette import Colour
 from ldls.segmentation import Segmentation
@@ -60,19 +61,17 @@ def shown_birds_eye_view(what: Shown, ground: Ground, *, boxes: bool) -> Image.I
     step = _ring_step(ground)
     _draw_rings(draw, ground, step)
     fine = _with_points(fine, what, ground)
-    found = [found for found in what.result.objects if found.box is not None] if boxes else []
-    corners = [FINE * ground.at(corners_of(one)) for one in found]
+    boxed = [(one, one.box) for one in what.result.objects if one.box is not None] if boxes else []
+    found = [(_colour(what, one), what.names[one.label - 1], ground.at(corners_of(box))) for one, box in boxed]
     draw = ImageDraw.Draw(fine)
-    for one, corner in zip(found, corners, strict=True):
-        outline = [tuple(place) for place in [*corner.tolist(), corner[0].tolist()]]
-        draw.line(outline, _colour(what, one), 2 * FINE, joint="curve")
+    for colour, _, corners in found:
+        draw.line(
+            [tuple(place) for place in (FINE * corners[[0, 1, 2, 3, 0]]).tolist()], colour, 2 * FINE, joint="curve"
+        )
     picture = fine.reduce(FINE)
     written = _write_ranges(picture, ground, step)
     covered = _covered(picture, what, ground)
-    tags = [
-        Tag(what.names[one.label - 1], _colour(what, one), _around(corner / FINE))
-        for one, corner in zip(found, corners, strict=True)
-    ]
+    tags = [Tag(name, colour, _around(corners)) for colour, name, corners in found]
     draw_tags(picture, tags, covered, PEN_PX, aversion=AVERSION, taken=written)
     return picture
 
@@ -116,8 +115,7 @@ def _write_ranges(picture: Image.Image, ground: Ground, step_m: int) -> list[Box
 def _with_points(fine: Image.Image, what: Shown, ground: Ground) -> Image.Image:
     canvas = np.array(fine)
     points = what.result.points
-    finite = np.isfinite(points[:, :3]).all(axis=1)
-    rows = np.flatnonzero(finite)
+    rows = finite_rows(points)
     # the lowest first: what stands on the ground covers it
     rows = rows[np.argsort(points[rows, 2], kind="stable")]
     at_px = np.floor(FINE * ground.at(points[rows, :2].astype(np.float64))).astype(np.int64)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import ParameterError
-from ldls.objects import SegmentedObject
+from ldls.oriented_box import OrientedBox
 from ldls.segmentation import Segmentation
 
 WIDTH_PX, HEIGHT_PX = 1800, 1200
@@ -68,7 +68,7 @@ def ground_of(
     ranges = np.hypot(*seen.T)
     objects = result.labels[result.in_view] > 0
     reach = range_m or _reach(ranges[objects] if objects.any() else ranges)
-    corners = [corners_of(found) for found in result.objects if found.box is not None]
+    corners = [corners_of(found.box) for found in result.objects if found.box is not None]
     held = _turned(np.concatenate([np.zeros((1, 2)), *corners]), forward)
     near = np.concatenate([seen[ranges <= reach], held[np.hypot(*held.T) <= (range_m or MOST_RANGE_M)]])
     left, behind = near.min(axis=0) - MARGIN_M
@@ -80,14 +80,13 @@ def ground_of(
     return Ground(forward=forward, left_m=left, right_m=right, behind_m=behind, ahead_m=ahead, px_per_m=scale)
 
 
-def corners_of(found: SegmentedObject) -> NDArray[np.float64]:
-    """(4, 2) corners of an object's box on the ground, in metres in the lidar frame, in order around it."""
-    assert found.box is not None
-    length, width, _ = found.box.size / 2
-    along = np.array([cos(found.box.yaw), sin(found.box.yaw)])
+def corners_of(box: OrientedBox) -> NDArray[np.float64]:
+    """(4, 2) corners of a box on the ground, in metres in the lidar frame, in order around it."""
+    length, width, _ = box.size / 2
+    along = np.array([cos(box.yaw), sin(box.yaw)])
     across = np.array([-along[1], along[0]])
     signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-    return np.asarray(found.box.center[:2] + signs[:, :1] * length * along + signs[:, 1:] * width * across)
+    return np.asarray(box.center[:2] + signs[:, :1] * length * along + signs[:, 1:] * width * across)
 
 
 def _heading(result: Segmentation) -> NDArray[np.float64]:

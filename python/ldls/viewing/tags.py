@@ -11,6 +11,8 @@ from PIL import Image, ImageDraw, ImageFont
 from ldls.palette import Colour
 
 I64 = NDArray[np.int64]
+AVERSION = 4.0
+"""How many of its heights a tag goes aside rather than lie where it had better not be."""
 Box = tuple[int, int, int, int]  # left, top, right, bottom, in pixels of the picture
 
 
@@ -28,7 +30,7 @@ def draw_tags(
     covered: NDArray[np.bool_],
     pen_px: float,
     *,
-    aversion: float = 4.0,
+    aversion: float = AVERSION,
     taken: Sequence[Box] = (),
 ) -> None:
     """Draw tags onto the picture; one for which no room is left is not drawn.
@@ -60,7 +62,7 @@ def place_tags(
     sizes: Sequence[tuple[int, int]],
     covered: NDArray[np.bool_],
     picture: tuple[int, int],
-    aversion: float = 4.0,
+    aversion: float = AVERSION,
     taken: Sequence[Box] = (),
 ) -> list[Box | None]:
     """Return where each tag goes: inside the picture and apart; None where no room is left."""

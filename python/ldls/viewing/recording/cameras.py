@@ -25,11 +25,6 @@ BACKGROUND_POINT_PX = 0.5
 """Points without an object are small on an image, which they would hide."""
 
 
-def camera_names(result: Segmentation) -> tuple[str, ...]:
-    """Name of each camera of a result: that of its view, or "camera 0", "camera 1" and so on."""
-    return tuple(seen.view.name or f"camera {number}" for number, seen in enumerate(result.views))
-
-
 def log_camera(entity: Entity, camera: Camera, image_size: tuple[int, int]) -> None:
     """Log pinhole and pose."""
     rr = rerun()

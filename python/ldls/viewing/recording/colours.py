@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls import palette
 from ldls.errors import LimitError
-from ldls.palette import BACKGROUND, instance_colours
 from ldls.segmentation import Segmentation
 
-OUT_OF_VIEW_COLOUR = tuple(channel // 2 for channel in BACKGROUND)
+OUT_OF_VIEW_COLOUR: palette.Colour = (64, 64, 64)
 """Darker than background: no camera says what these points are."""
 OUT_OF_VIEW_ID = 2**16 - 1
 """Keypoint id of points out of view."""
@@ -18,8 +18,8 @@ GREATEST_ID = OUT_OF_VIEW_ID - 1
 
 def label_colours(result: Segmentation) -> NDArray[np.uint8]:
     """(M + 2, 3) colours by label: background, the instances, and last, where label -1 finds it, out of view."""
-    own = instance_colours([instance.category for instance in result.instances]).reshape(-1, 3)
-    return np.vstack([[BACKGROUND], own, [OUT_OF_VIEW_COLOUR]]).astype(np.uint8)
+    categories = (instance.category for instance in result.instances)
+    return palette.label_colours(categories, out_of_view=OUT_OF_VIEW_COLOUR)
 
 
 def class_ids(categories: NDArray[np.int32]) -> NDArray[np.uint16]:

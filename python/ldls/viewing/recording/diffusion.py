@@ -21,6 +21,7 @@ from ldls.viewing.recording.stream import Entity, rerun
 
 TIMELINE = "iteration"
 EVERY = 4
+"""Products from one picture to the next: 50 pictures of 200 products."""
 OF_CONVERGED = 200
 """Products that are shown of a result that was diffused until it converged."""
 

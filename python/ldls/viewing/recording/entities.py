@@ -8,15 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.cloud import finite_rows
 from ldls.errors import InputError
 from ldls.evaluation import Labeling
 from ldls.segmentation import Segmentation
+from ldls.view import camera_names
 from ldls.viewing.recording.boxes import boxes_3d
-from ldls.viewing.recording.cameras import POINT_PX, camera_names, log_camera, log_image, log_masks, log_pixels
+from ldls.viewing.recording.cameras import POINT_PX, log_camera, log_image, log_masks, log_pixels
 from ldls.viewing.recording.colours import check_ids, class_ids, keypoint_ids, label_colours
 from ldls.viewing.recording.contexts import log_names
 from ldls.viewing.recording.keeping import log_context
-from ldls.viewing.recording.points import finite_rows
 from ldls.viewing.recording.statistics import log_statistics
 from ldls.viewing.recording.stream import Entity, rerun
 from ldls.viewing.recording.tables import markdown
@@ -51,14 +52,14 @@ def log(
     """
     root = Entity(entity, recording)
     check_ids(result)
-    _check_images(images or {}, camera_names(result))
+    _check_images(images or {}, camera_names(result.views))
     root.log(rerun().ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     names, new = log_names(root, result)
     _log_points(root, result)
     _log_boxes(root / "boxes", result)
     if truth is not None:
         log_truth(root / "truth", result.points, truth)
-    for camera, seen in zip(camera_names(result), result.views, strict=True):
+    for camera, seen in zip(camera_names(result.views), result.views, strict=True):
         place = root / "camera" / camera
         size = seen.view.masks.image_size
         log_camera(place, seen.view.camera, size)

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ldls.cloud import Points
+from ldls.cloud import Points, finite_rows
 from ldls.datasets import CameraImage, Frame
 from ldls.stages import project
 from ldls.viewing.depth import depth_colours, depths_m
 from ldls.viewing.recording.cameras import POINT_PX, log_camera, log_image
 from ldls.viewing.recording.pinholes import PIXEL_CENTRE
-from ldls.viewing.recording.points import finite_rows
 from ldls.viewing.recording.stream import Entity, rerun
 from ldls.viewing.recording.truth import log_truth
 

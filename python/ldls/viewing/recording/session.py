@@ -18,9 +18,9 @@ from ldls.errors import ParameterError
 from ldls.evaluation import Labeling
 from ldls.io.whole_file import whole_file
 from ldls.segmentation import Segmentation
+from ldls.view import camera_names
 from ldls.viewing.recording import viewer
 from ldls.viewing.recording.blueprint import Contents, eye_behind, layout
-from ldls.viewing.recording.cameras import camera_names
 from ldls.viewing.recording.diffusion import TIMELINE, log_diffusion
 from ldls.viewing.recording.entities import log
 from ldls.viewing.recording.frames import log_frame
@@ -130,7 +130,7 @@ class Recording:
         Raises:
             LdlsError: See `log` and `log_diffusion`.
         """
-        names = camera_names(result)
+        names = camera_names(result.views)
         pictures = [("camera", camera, "image") for camera in images or ()]
         masks = [("camera", camera, "image", "masks") for camera in names]
         self._begin(stamp, [*OF_RESULTS, *masks, *pictures, *_branches(names, truth)])

@@ -4,31 +4,21 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from ldls.objects import SegmentedObject
+from ldls.object_rows import HEADINGS, cells_of, nearest_first
 from ldls.segmentation import Segmentation
-
-HEADINGS = ("label", "object", "score", "points", "distance", "length x width x height")
 
 
 def markdown(result: Segmentation, *, title: str = "") -> str:
     """The objects, the nearest first and those without points last, and what was noticed."""
-    in_order = sorted(result.objects, key=lambda found: (found.distance_m is None, found.distance_m))
+    in_order = nearest_first(result.objects)
     found = sum(o.n_points > 0 for o in in_order)
     parts = [f"# {title}"] if title else []
     parts.append(f"{found} of {len(in_order)} objects found")
     if in_order:
-        parts.append(_table(HEADINGS, [_row(o) for o in in_order]))
+        parts.append(_table(HEADINGS, [cells_of(o) for o in in_order]))
     noticed = {name: value for name, value in asdict(result.report).items() if value is not None}
     parts.append(_table(("report", ""), [(name.replace("_", " "), _text(value)) for name, value in noticed.items()]))
     return "\n\n".join(parts) + "\n"
-
-
-def _row(found: SegmentedObject) -> tuple[str, ...]:
-    distance, size = "-", "-"
-    if found.box is not None:
-        distance = f"{found.distance_m:.1f} m"
-        size = " x ".join(f"{side:.1f}" for side in found.box.size) + " m"
-    return str(found.label), found.name, f"{found.score:.2f}", f"{found.n_points:,}", distance, size
 
 
 def _text(value: object) -> str:

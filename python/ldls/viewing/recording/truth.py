@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.cloud import Points
+from ldls.cloud import Points, finite_rows
 from ldls.errors import InputError
 from ldls.evaluation import Labeling
-from ldls.objects import fit_upright_box
+from ldls.oriented_box import fit_upright_box
 from ldls.viewing.recording import contexts
 from ldls.viewing.recording.boxes import boxes_3d
 from ldls.viewing.recording.cameras import POINT_PX
 from ldls.viewing.recording.keeping import log_context
-from ldls.viewing.recording.points import finite_rows
 from ldls.viewing.recording.stream import Entity, rerun
 
 
