@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 import ldls
 from ldls import stages
-from ldls.rebuilt import rebuild
+from ldls.explaining import rebuild
 
 
 def system(seed, n=60, labels=4):

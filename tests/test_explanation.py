@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.explanation import Explanation
+from ldls.explaining import Explanation
 from ring_samples import as_views, random_ring
 
 PARAMS = ldls.Params(neighbors=6, sigma=0.3, pixel_weight=0.01, iterations=40)
@@ -258,7 +258,7 @@ def test_verdicts_are_sentences_with_both_sizes(ring):
 
 
 def explanation(**changes):
-    from ldls.explanation import Components, Likelihood
+    from ldls.explaining import Components, Likelihood
 
     fields = {
         "point": 7, "xyz": (1.0, 2.0, 3.0), "label": 1, "diffused_label": 1, "sights": (),
@@ -270,13 +270,13 @@ def explanation(**changes):
 
 
 def tied(own):
-    from ldls.explanation import Components
+    from ldls.explaining import Components
 
     return Components(label=1, sizes=(5, 5, 1), own=own, removal=True)
 
 
 def likelihoods(*values):
-    from ldls.explanation import Likelihood
+    from ldls.explaining import Likelihood
 
     total = sum(values) or 1
     return tuple(Likelihood(label=1 - i, value=value, share=value / total) for i, value in enumerate(values))
@@ -341,8 +341,7 @@ def test_without_outlier_removal_nothing_is_removed(ring):
 
 @pytest.mark.parametrize("iterations", [1, 7, 40, None])
 def test_influences_times_seeds_are_likelihoods(ring, iterations):
-    from ldls.influence import influences
-    from ldls.rebuilt import rebuild
+    from ldls.explaining import influences, rebuild
 
     _, _, result = ring
     system = rebuild(result)
@@ -352,7 +351,7 @@ def test_influences_times_seeds_are_likelihoods(ring, iterations):
 
 
 def test_provenance_is_where_the_pixels_are_that_decide(ring):
-    from ldls.rebuilt import rebuild
+    from ldls.explaining import rebuild
 
     points, _, result = ring
     point = int(np.flatnonzero(result.labels > 0)[9])

@@ -6,7 +6,7 @@ from scipy.sparse import csr_array
 
 import ldls
 from ldls import stages
-from ldls.rebuilt import rebuild
+from ldls.explaining import rebuild
 from ldls.simulation import street_scene
 from ring_samples import as_views, random_ring
 

@@ -50,7 +50,7 @@ def test_boxes_have_the_heading_of_two_sides_that_meet(yaw_deg):
     local = np.vstack(
         [corners, np.hstack([2 * share, np.ones_like(share)]), np.hstack([np.full_like(share, 2), share])]
     )
-    box = ldls.oriented_box.fit_upright_box(turned(local, yaw_deg, generator))
+    box = ldls.segmentation.fit_upright_box(turned(local, yaw_deg, generator))
     np.testing.assert_allclose(box.size[:2], [4, 2], atol=1e-9)
     np.testing.assert_allclose(box.center[:2], [10, -3], atol=1e-9)
     assert np.rad2deg(box.yaw) == pytest.approx(yaw_deg)
@@ -59,7 +59,7 @@ def test_boxes_have_the_heading_of_two_sides_that_meet(yaw_deg):
 @pytest.mark.parametrize("yaw_deg", [-45, 0, 33])
 def test_boxes_of_points_all_over_are_right_to_some_degrees(yaw_deg):
     generator = np.random.default_rng(1)
-    box = ldls.oriented_box.fit_upright_box(turned(generator.uniform([-2, -1], [2, 1], (400, 2)), yaw_deg, generator))
+    box = ldls.segmentation.fit_upright_box(turned(generator.uniform([-2, -1], [2, 1], (400, 2)), yaw_deg, generator))
     assert abs(np.rad2deg(box.yaw) - yaw_deg) <= 8
     np.testing.assert_allclose(box.size[:2], [4, 2], atol=0.4)
 
@@ -68,7 +68,7 @@ def test_boxes_of_points_all_over_are_right_to_some_degrees(yaw_deg):
 def test_a_stray_point_widens_a_box_and_does_not_turn_it(yaw_deg):
     generator = np.random.default_rng(2)
     side, rear = generator.uniform([-2, 1], [2, 1.05], (200, 2)), generator.uniform([-2, -1], [-1.95, 1], (100, 2))
-    box = ldls.oriented_box.fit_upright_box(turned(np.vstack([side, rear, [[1.5, -2.5]]]), yaw_deg, generator))
+    box = ldls.segmentation.fit_upright_box(turned(np.vstack([side, rear, [[1.5, -2.5]]]), yaw_deg, generator))
     assert abs(np.rad2deg(box.yaw) - yaw_deg) <= 1
     np.testing.assert_allclose(box.size[:2], [4, 3.55], atol=0.15)
 
@@ -84,7 +84,7 @@ def test_a_stray_point_widens_a_box_and_does_not_turn_it(yaw_deg):
 )
 def test_boxes_of_few_points_have_no_width(places, size):
     ground = np.array(places, float)
-    box = ldls.oriented_box.fit_upright_box(np.hstack([ground, np.zeros((len(ground), 1))]))
+    box = ldls.segmentation.fit_upright_box(np.hstack([ground, np.zeros((len(ground), 1))]))
     np.testing.assert_allclose(box.size, [*size, 0], atol=1e-9)
 
 

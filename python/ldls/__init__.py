@@ -2,8 +2,7 @@
 
 from ldls import stages
 from ldls._ldls import __version__
-from ldls.camera import Camera
-from ldls.distortion import Distortion
+from ldls.camera import Camera, Distortion
 from ldls.errors import (
     CalibrationError,
     CorruptFileError,
@@ -23,16 +22,13 @@ from ldls.errors import (
     UnsafePathError,
     UnsupportedFormatError,
 )
-from ldls.explanation import Explanation, explain
+from ldls.explaining import Explanation, explain
 from ldls.io import read_image, read_points
 from ldls.label_diffusion import LabelDiffusion, segment
 from ldls.masks import InstanceMasks
 from ldls.notebook import html_of
-from ldls.objects import SegmentedObject
-from ldls.oriented_box import OrientedBox
 from ldls.params import Params
-from ldls.report import Report
-from ldls.segmentation import Instance, Segmentation
+from ldls.segmentation import Instance, OrientedBox, Report, Segmentation, SegmentedObject
 from ldls.view import SeenView, View
 
 # pictures lie above the nouns, which know nothing of them

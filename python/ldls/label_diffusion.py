@@ -23,8 +23,7 @@ from ldls.errors import (
 )
 from ldls.masks import InstanceMasks
 from ldls.params import Params
-from ldls.report import Report
-from ldls.segmentation import Instance, Segmentation
+from ldls.segmentation import Instance, Report, Segmentation
 from ldls.view import SeenView, View, check_camera
 
 COARSEST_STEP_M = 0.01

@@ -8,8 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ldls.object_rows import HEADINGS, cells_of, nearest_first
-from ldls.objects import SegmentedObject
-from ldls.segmentation import Segmentation
+from ldls.segmentation import Segmentation, SegmentedObject
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ldls.objects import SegmentedObject
+from ldls.segmentation import SegmentedObject
 
 HEADINGS = ("label", "object", "score", "points", "distance", "length x width x height")
 """What the cells of a row are."""

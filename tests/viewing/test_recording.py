@@ -21,8 +21,8 @@ import ldls
 from conftest import pinhole
 from ldls import stages
 from ldls.evaluation import Labeling
+from ldls.explaining import rebuild
 from ldls.palette import BACKGROUND, category_colour, instance_colours
-from ldls.rebuilt import rebuild
 from ldls.viewing import recording
 from ldls.viewing.depth import depth_colours
 from ldls.viewing.recording import log, log_diffusion, log_frame, open_recording, viewer

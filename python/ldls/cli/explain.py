@@ -71,7 +71,7 @@ def explain(
     ldls explain 12.5,-3,0.2 --points velodyne/000571.bin --calib calib/000571.txt --masks masks/000571.json
     """
     from ldls.cli.chosen_point import chosen_point
-    from ldls.explanation import explain as explain_point
+    from ldls.explaining import explain as explain_point
 
     if result is not None:
         _refuse_files(points, calib, masks, image_id)

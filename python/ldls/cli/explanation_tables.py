@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from rich.markup import escape
 from rich.table import Table
 
-from ldls.explanation import Components, Explanation, Likelihood, Neighbor
-from ldls.sight import Sight
-from ldls.verdict import count_points, named, percent
+from ldls.explaining import Components, Explanation, Likelihood, Neighbor, Sight
+from ldls.explaining.explanation import count_points, named, percent
 
 SHOWN_SHARE = 0.0005
 """Share below which a likelihood is not listed, for it would read 0.0 %."""

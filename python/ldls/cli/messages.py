@@ -14,7 +14,7 @@ from rich.table import Table
 
 from ldls.errors import LdlsError
 from ldls.object_rows import HEADINGS, cells_of, nearest_first
-from ldls.objects import SegmentedObject
+from ldls.segmentation import SegmentedObject
 
 P = ParamSpec("P")
 R = TypeVar("R")

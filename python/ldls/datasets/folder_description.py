@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ldls.camera import Camera
-from ldls.distortion import Distortion
+from ldls.camera import Camera, Distortion
 from ldls.errors import CalibrationError, CorruptFileError, ParameterError
 
 FILE = "ldls.toml"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.distortion import Distortion
+from ldls.camera.distortion import Distortion
 from ldls.errors import CorruptFileError, LdlsError, UnsupportedFormatError
 from ldls.io.cameras.found import FoundCamera
 from ldls.io.masks.npz import mask_arrays, records_of
@@ -20,8 +20,7 @@ from ldls.io.npz import read_npz, write_npz
 
 if TYPE_CHECKING:
     from ldls.camera import Camera
-    from ldls.objects import SegmentedObject
-    from ldls.segmentation import Segmentation
+    from ldls.segmentation import Segmentation, SegmentedObject
 
 Arrays = Mapping[str, NDArray[Any]]
 MASKS = "masks_"

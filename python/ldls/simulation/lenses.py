@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.distortion import Distortion
+from ldls.camera import Distortion
 from ldls.errors import CalibrationError
 from ldls.simulation.cameras import CameraModel, MountedCamera
 

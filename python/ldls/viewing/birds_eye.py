@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from ldls.cloud import finite_rows
-from ldls.objects import SegmentedObject
 from ldls.palette import Colour
-from ldls.segmentation import Segmentation
+from ldls.segmentation import Segmentation, SegmentedObject
 from ldls.viewing.grid import INK, PAPER
 from ldls.viewing.ground import Ground, corners_of, ground_of
 from ldls.viewing.marks import disc, stamp

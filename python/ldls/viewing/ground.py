@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import ParameterError
-from ldls.oriented_box import OrientedBox
-from ldls.segmentation import Segmentation
+from ldls.segmentation import OrientedBox, Segmentation
 
 WIDTH_PX, HEIGHT_PX = 1800, 1200
 """Most that a picture measures."""

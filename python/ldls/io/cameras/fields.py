@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.distortion import Distortion
+from ldls.camera.distortion import Distortion
 from ldls.errors import CalibrationError
 
 

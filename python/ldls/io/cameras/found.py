@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.distortion import Distortion
+from ldls.camera.distortion import Distortion
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

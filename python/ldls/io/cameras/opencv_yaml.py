@@ -11,7 +11,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.distortion import Distortion
+from ldls.camera.distortion import Distortion
 from ldls.io.cameras.fields import Fields
 from ldls.io.cameras.found import FoundCamera
 from ldls.io.cameras.yaml_file import read_yaml

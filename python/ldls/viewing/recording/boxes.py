@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.oriented_box import OrientedBox
+from ldls.segmentation import OrientedBox
 from ldls.viewing.recording.stream import rerun
 
 

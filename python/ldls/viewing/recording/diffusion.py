@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ldls import stages
 from ldls._optional import require
 from ldls.errors import ParameterError
+from ldls.explaining import rebuild
 from ldls.palette import BACKGROUND
-from ldls.rebuilt import rebuild
 from ldls.segmentation import Segmentation
 from ldls.viewing.recording.cameras import POINT_PX
 from ldls.viewing.recording.colours import check_ids, class_ids, keypoint_ids, label_colours

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ldls.cloud import Points, finite_rows
 from ldls.errors import InputError
 from ldls.evaluation import Labeling
-from ldls.oriented_box import fit_upright_box
+from ldls.segmentation import fit_upright_box
 from ldls.viewing.recording import contexts
 from ldls.viewing.recording.boxes import boxes_3d
 from ldls.viewing.recording.cameras import POINT_PX

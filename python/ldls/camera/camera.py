@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls import _ldls
-from ldls.distortion import Distortion
+from ldls.camera.distortion import Distortion
 from ldls.errors import CalibrationError
 from ldls.io import kitti
 from ldls.io.cameras import camera_info, kalibr, kitti_raw, nuscenes, opencv_yaml

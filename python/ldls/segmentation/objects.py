@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.oriented_box import OrientedBox
+from ldls.segmentation.oriented_box import OrientedBox
 
 
 @dataclass(frozen=True, kw_only=True)

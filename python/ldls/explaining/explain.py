@@ -1,10 +1,8 @@
-"""Why a point has its label."""
+"""Why a point has its label: its pixels, its edges and whose pixels its likelihood comes from."""
 
 from __future__ import annotations
 
-import math
 import operator
-from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,168 +10,17 @@ from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.errors import InputError, ParameterError
-from ldls.influence import influences
-from ldls.rebuilt import Rebuilt, rebuild
+from ldls.explaining.explanation import Components, Edges, Explanation, Island, Likelihood, Neighbor, Provenance
+from ldls.explaining.rebuilt import Rebuilt, rebuild
+from ldls.explaining.sight import sights_of
 from ldls.segmentation import Segmentation
-from ldls.sight import Sight, sights_of
-from ldls.verdict import verdict_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-
-@dataclass(frozen=True, kw_only=True)
-class Neighbor:
-    """One of the nearest neighbours of a point, an edge from which label flows to it.
-
-    Attributes:
-        point: Its row in the cloud.
-        distance_m: How far it is, in metres.
-        weight: exp(-d^2 / sigma).
-        share: That weight over the sum of all edges of the point, its pixel edges included.
-        label: Its label in the result.
-        diffused_label: The same before outlier removal.
-    """
-
-    point: int
-    distance_m: float
-    weight: float
-    share: float
-    label: int
-    diffused_label: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Likelihood:
-    """Likelihood of one label at a point.
-
-    Attributes:
-        label: The label; 0 is the background.
-        value: z after the last product.
-        share: That over the sum of all labels.
-    """
-
-    label: int
-    value: float
-    share: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Edges:
-    """What the edges of a point weigh, as shares of their sum.
-
-    Attributes:
-        own: Edge to itself.
-        neighbors: Edges to its nearest neighbours.
-        pixels: Edges to the pixels of its windows.
-    """
-
-    own: float
-    neighbors: float
-    pixels: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Provenance:
-    """Whose pixels the likelihood of a point's diffused label comes from.
-
-    Attributes:
-        own_share: Share that its own pixels bring; the others' came along edges.
-        half_within_m: Distance from it within which half of the likelihood begins, in metres.
-    """
-
-    own_share: float
-    half_within_m: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Components:
-    """The connected components of the points of one diffused label.
-
-    Attributes:
-        label: The label.
-        sizes: Points of each, the largest first; of equal ones the one with the lowest row of the cloud first.
-        own: Which of them the point lies in, from 0.
-        removal: Whether outliers were removed, so that number 0 alone was kept.
-    """
-
-    label: int
-    sizes: tuple[int, ...]
-    own: int
-    removal: bool
-
-    @property
-    def removed(self) -> bool:
-        """Whether the point lost its label."""
-        return self.removal and self.own > 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Island:
-    """The part of the whole point graph that a point lies in; no label crosses to another.
-
-    Attributes:
-        points: Points of it.
-        islands: Such parts of the graph.
-    """
-
-    points: int
-    islands: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Explanation:
-    """What decided the label of one point; `print(explanation.verdict)` says it in a sentence.
-
-    Attributes:
-        point: Its row in the cloud.
-        xyz: Its coordinates in the lidar frame in metres.
-        label: Its label: -1 out of view, 0 background, m instance m.
-        diffused_label: The same before outlier removal.
-        names: Name of every label of the result, -1 and 0 included.
-        sights: What each camera has of it.
-        edges: What its edges weigh; None out of view, as all that follows.
-        neighbors: Its nearest neighbours, the nearest first; empty out of view.
-        likelihoods: Likelihoods of all labels that have any, the highest first; empty out of view.
-        provenance: Where the likelihood of the diffused label comes from.
-        components: Those of its diffused label, if that is an instance.
-        island: The part of the graph it lies in.
-    """
-
-    point: int
-    xyz: tuple[float, float, float]
-    label: int
-    diffused_label: int
-    names: dict[int, str]
-    sights: tuple[Sight, ...]
-    edges: Edges | None = None
-    neighbors: tuple[Neighbor, ...] = ()
-    likelihoods: tuple[Likelihood, ...] = ()
-    provenance: Provenance | None = None
-    components: Components | None = None
-    island: Island | None = None
-
-    @property
-    def winner(self) -> Likelihood | None:
-        """The likelihood of the diffused label; None out of view."""
-        return next((each for each in self.likelihoods if each.label == self.diffused_label), None)
-
-    @property
-    def runner_up(self) -> Likelihood | None:
-        """The highest likelihood of another label; None where there is none."""
-        return next((each for each in self.likelihoods if each.label != self.diffused_label), None)
-
-    @property
-    def verdict(self) -> str:
-        """Why the point has its label, in a sentence."""
-        return verdict_of(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The same as plain values that JSON can hold, the verdict first; numbers that are not finite are None."""
-        return {"verdict": self.verdict, **_finite(asdict(self))}
-
-    def __str__(self) -> str:
-        return self.verdict
+LEFT = 1e-9
+"""What one more product brings, 1 at first, below which a converged solution leaves out the rest."""
+MOST_PRODUCTS = 20_000
 
 
 def explain(result: Segmentation, point: int) -> Explanation:
@@ -317,9 +164,25 @@ def _connected(graph: csr_array) -> NDArray[np.int32]:
     return found
 
 
-def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever asdict yields
-    if isinstance(value, dict):
-        return {str(key): _finite(each) for key, each in value.items()}
-    if isinstance(value, tuple | list):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def influences(A: csr_array, row: int, iterations: int | None) -> NDArray[np.float64]:
+    """What the pixels of each point count for the point in `row`: (n,) r, with which its likelihoods are r b.
+
+    Likelihoods are z = (1 + A + ... + A^(iterations - 1)) b (step 5); r is one row of that polynomial, the sum of the
+    products of the transpose of A with a unit vector, in double precision. It costs one vector instead of one for each
+    label, and tells where a label comes from.
+
+    Args:
+        A: (n, n) of `stages.normalize_rows`.
+        row: The point.
+        iterations: Number of products; None until what comes is lost in rounding.
+    """
+    transpose = A.T.tocsr().astype(np.float64)
+    own = np.zeros(A.shape[0])
+    own[row] = 1.0
+    total = own.copy()
+    for _ in range(1, MOST_PRODUCTS if iterations is None else iterations):
+        own = transpose @ own
+        total += own
+        if iterations is None and own.sum() < LEFT:
+            break
+    return total

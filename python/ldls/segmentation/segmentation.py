@@ -17,10 +17,10 @@ from ldls.cloud import Points, as_points
 from ldls.errors import CorruptFileError, InputError, LdlsError
 from ldls.io import result_npz, results
 from ldls.masks import InstanceMasks
-from ldls.objects import SegmentedObject
-from ldls.oriented_box import fit_upright_box
 from ldls.params import Params
-from ldls.report import Report
+from ldls.segmentation.objects import SegmentedObject
+from ldls.segmentation.oriented_box import fit_upright_box
+from ldls.segmentation.report import Report
 from ldls.view import SeenView, View
 
 

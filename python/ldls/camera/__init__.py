@@ -1,0 +1,6 @@
+"""The camera that took the image, and the distortion of its lens."""
+
+from ldls.camera.camera import Camera
+from ldls.camera.distortion import Distortion
+
+__all__ = ["Camera", "Distortion"]

@@ -1,0 +1,255 @@
+"""The record of what decided the label of a point, and the sentence that sums it up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ldls.explaining.sight import Sight
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neighbor:
+    """One of the nearest neighbours of a point, an edge from which label flows to it.
+
+    Attributes:
+        point: Its row in the cloud.
+        distance_m: How far it is, in metres.
+        weight: exp(-d^2 / sigma).
+        share: That weight over the sum of all edges of the point, its pixel edges included.
+        label: Its label in the result.
+        diffused_label: The same before outlier removal.
+    """
+
+    point: int
+    distance_m: float
+    weight: float
+    share: float
+    label: int
+    diffused_label: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Likelihood:
+    """Likelihood of one label at a point.
+
+    Attributes:
+        label: The label; 0 is the background.
+        value: z after the last product.
+        share: That over the sum of all labels.
+    """
+
+    label: int
+    value: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edges:
+    """What the edges of a point weigh, as shares of their sum.
+
+    Attributes:
+        own: Edge to itself.
+        neighbors: Edges to its nearest neighbours.
+        pixels: Edges to the pixels of its windows.
+    """
+
+    own: float
+    neighbors: float
+    pixels: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Whose pixels the likelihood of a point's diffused label comes from.
+
+    Attributes:
+        own_share: Share that its own pixels bring; the others' came along edges.
+        half_within_m: Distance from it within which half of the likelihood begins, in metres.
+    """
+
+    own_share: float
+    half_within_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Components:
+    """The connected components of the points of one diffused label.
+
+    Attributes:
+        label: The label.
+        sizes: Points of each, the largest first; of equal ones the one with the lowest row of the cloud first.
+        own: Which of them the point lies in, from 0.
+        removal: Whether outliers were removed, so that number 0 alone was kept.
+    """
+
+    label: int
+    sizes: tuple[int, ...]
+    own: int
+    removal: bool
+
+    @property
+    def removed(self) -> bool:
+        """Whether the point lost its label."""
+        return self.removal and self.own > 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Island:
+    """The part of the whole point graph that a point lies in; no label crosses to another.
+
+    Attributes:
+        points: Points of it.
+        islands: Such parts of the graph.
+    """
+
+    points: int
+    islands: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explanation:
+    """What decided the label of one point; `print(explanation.verdict)` says it in a sentence.
+
+    Attributes:
+        point: Its row in the cloud.
+        xyz: Its coordinates in the lidar frame in metres.
+        label: Its label: -1 out of view, 0 background, m instance m.
+        diffused_label: The same before outlier removal.
+        names: Name of every label of the result, -1 and 0 included.
+        sights: What each camera has of it.
+        edges: What its edges weigh; None out of view, as all that follows.
+        neighbors: Its nearest neighbours, the nearest first; empty out of view.
+        likelihoods: Likelihoods of all labels that have any, the highest first; empty out of view.
+        provenance: Where the likelihood of the diffused label comes from.
+        components: Those of its diffused label, if that is an instance.
+        island: The part of the graph it lies in.
+    """
+
+    point: int
+    xyz: tuple[float, float, float]
+    label: int
+    diffused_label: int
+    names: dict[int, str]
+    sights: tuple[Sight, ...]
+    edges: Edges | None = None
+    neighbors: tuple[Neighbor, ...] = ()
+    likelihoods: tuple[Likelihood, ...] = ()
+    provenance: Provenance | None = None
+    components: Components | None = None
+    island: Island | None = None
+
+    @property
+    def winner(self) -> Likelihood | None:
+        """The likelihood of the diffused label; None out of view."""
+        return next((each for each in self.likelihoods if each.label == self.diffused_label), None)
+
+    @property
+    def runner_up(self) -> Likelihood | None:
+        """The highest likelihood of another label; None where there is none."""
+        return next((each for each in self.likelihoods if each.label != self.diffused_label), None)
+
+    @property
+    def verdict(self) -> str:
+        """Why the point has its label, in a sentence."""
+        return verdict_of(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as plain values that JSON can hold, the verdict first; numbers that are not finite are None."""
+        return {"verdict": self.verdict, **_finite(asdict(self))}
+
+    def __str__(self) -> str:
+        return self.verdict
+
+
+def verdict_of(explanation: Explanation) -> str:
+    """Why the point has its label, in a sentence."""
+    point = f"Point {explanation.point}"
+    if explanation.label < 0:
+        return f"{point} is out of view: {_why_unseen(explanation.sights)}."
+    found = explanation.components
+    if found is not None and found.removed:
+        given = named(explanation, found.label)
+        return f"{point} is background: diffusion gave it to {given}, but it lies in a {_where(found)}."
+    return f"{point} is {named(explanation, explanation.label)}: {_lead(explanation)}."
+
+
+def named(explanation: Explanation, label: int) -> str:
+    """Name of a label, and of an instance its number too."""
+    name = explanation.names[label]
+    return f"{name} (label {label})" if label > 0 else name
+
+
+def percent(share: float) -> str:
+    """A share in percent with one decimal; one too small for it is no 0.0."""
+    return "< 0.1 %" if 0 < share < 0.0005 else f"{100 * share:.1f} %"
+
+
+def count_points(count: int) -> str:
+    """A number of points."""
+    return f"{count:,} point{'' if count == 1 else 's'}"
+
+
+def _where(found: Components) -> str:
+    own, largest = found.sizes[found.own], found.sizes[0]
+    if own == largest:
+        return f"component of {count_points(own)}, as large as the one kept, which has the lowest row: removed"
+    return f"component of {count_points(own)}, the largest has {largest:,}: removed"
+
+
+def _lead(explanation: Explanation) -> str:
+    winner, other = explanation.winner, explanation.runner_up
+    if winner is None or winner.value <= 0:
+        return "no label reached it"
+    if other is None:
+        return "no other label reached it"
+    next_one = f"{named(explanation, other.label)} {_behind(winner, other)}"
+    return f"{percent(winner.share)} of its likelihood, {next_one}"
+
+
+def _behind(winner: Likelihood, other: Likelihood) -> str:
+    if percent(winner.share) != percent(other.share):
+        return f"comes next with {percent(other.share)}"
+    ratio = (winner.value - other.value) / winner.value
+    return f"comes next, {ratio:.1e} of that behind" if ratio > 0 else "has as much"
+
+
+def _why_unseen(sights: tuple[Sight, ...]) -> str:
+    if not sights:
+        return "there is no camera"
+    if sights[0].outcome == "not finite":
+        return "a coordinate is not finite"
+    if sights[0].outcome == "origin":
+        return "it lies at (0, 0, 0), which stands for a missing return"
+    if len(sights) == 1:
+        return _unseen_by(sights[0])
+    return f"no camera sees it; {'; '.join(_each_unseen(sights))}"
+
+
+def _unseen_by(sight: Sight) -> str:
+    if sight.outcome == "behind":
+        return f"it is behind the camera, at a depth of {sight.depth_m:.2f} m"
+    if sight.pixel is None:
+        return f"it is beyond the lens of the camera, at a depth of {sight.depth_m:.2f} m"
+    height, width = sight.image_size
+    u, v = sight.pixel
+    return f"it falls at u {u:.1f}, v {v:.1f}, outside the {width} x {height} pixels of the image"
+
+
+def _each_unseen(sights: tuple[Sight, ...]) -> Iterator[str]:
+    words = {"behind": "behind", "outside": "outside the image of", "beyond the lens": "beyond the lens of"}
+    for outcome, where in words.items():
+        cameras = [sight.camera for sight in sights if sight.outcome == outcome]
+        if cameras:
+            *first, last = cameras
+            yield f"it is {where} {', '.join(first) + ' and ' if first else ''}{last}"
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401 - whatever asdict yields
+    if isinstance(value, dict):
+        return {str(key): _finite(each) for key, each in value.items()}
+    if isinstance(value, tuple | list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
