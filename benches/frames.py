@@ -40,8 +40,8 @@ def frame() -> Frame:
     return Frame(
         name="KITTI object 000571",
         points=np.asarray(ldls.read_points(training / "velodyne/000571.bin"), np.float32),
-        masks=ldls.InstanceMasks.from_coco(training / "masks/000571.json"),
-        camera=ldls.Camera.from_kitti(training / "calib/000571.txt"),
+        masks=ldls.read_masks(training / "masks/000571.json"),
+        camera=ldls.read_camera(training / "calib/000571.txt"),
     )
 
 

@@ -34,7 +34,7 @@ def write_frames(folder: Path, frame: Frame, count: int) -> tuple[Path, Path]:
     lines = (f"{key}: {' '.join(map(repr, matrix.ravel().tolist()))}\n" for key, matrix in rows.items())
     paths[training / "calib"].write_text("".join(lines))
     Image.new("RGB", (width, height)).save(paths[training / "image_2"])
-    frame.masks.save(paths[masks])
+    ldls.save(frame.masks, paths[masks])
     for parent, path in paths.items():
         for number in range(count):
             (parent / f"{number:06d}{path.suffix}").symlink_to(path)

@@ -26,7 +26,7 @@ print(f"\n{source.kind}: {len(source)} frames, cameras {', '.join(source.camera_
 stream = ldls.LabelDiffusion()
 for frame in source:
     (image,) = frame.images
-    masks = ldls.InstanceMasks.from_file(masks_folder / f"{frame.name}.json")
+    masks = ldls.read_masks(masks_folder / f"{frame.name}.json")
     start = time.perf_counter()
     result = stream.segment(frame.points, [ldls.View(masks, image.camera, image.name)])
     took_ms = 1e3 * (time.perf_counter() - start)

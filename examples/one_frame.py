@@ -5,8 +5,8 @@
 The frame is simulated; with files of your own it begins with
 
     points = ldls.read_points("velodyne/000571.bin")
-    masks = ldls.InstanceMasks.from_file("masks/000571.json")
-    camera = ldls.Camera.from_kitti("calib/000571.txt")
+    masks = ldls.read_masks("masks/000571.json")
+    camera = ldls.read_camera("calib/000571.txt")
     image = ldls.read_image("image_2/000571.png")
 """
 
@@ -40,7 +40,7 @@ nearest = min((each for each in result.objects if each.box is not None), key=lam
 cloud = points[result.labels == nearest.label, :3]  # the points of one object
 print(f"the nearest is {nearest.name} {nearest.label}: x from {cloud[:, 0].min():.2f} to {cloud[:, 0].max():.2f} m")
 
-result.save(out / "frame.npz")  # everything, for ldls.Segmentation.from_npz, `ldls view` and `ldls explain`
-result.save(out / "frame.label")  # SemanticKITTI; docs/formats.md has the others
+ldls.save(result, out / "frame.npz")  # everything, for ldls.read_result, `ldls view` and `ldls explain`
+ldls.save(result, out / "frame.label")  # SemanticKITTI; docs/formats.md has the others
 for path in save_pictures(out / "frame.png", result, image):
     print("wrote", path)

@@ -28,7 +28,7 @@ for number, frame in enumerate(frames):
         (out / folder).mkdir(parents=True, exist_ok=True)
     frame.points.tofile(out / "lidar" / f"{number:04}.bin")  # x y z intensity, float32, metres
     Image.fromarray(frame.image).save(out / "front" / f"{number:04}.png")
-    frame.masks.save(out / "masks" / f"{number:04}.json")
+    ldls.save(frame.masks, out / "masks" / f"{number:04}.json")
 
 # The calibration. T_camera_lidar takes lidar coordinates to camera coordinates (x right, y down, z forward). Most
 # sheets say the opposite, where the camera sits in the lidar's frame: turn that around, do not copy it.

@@ -44,8 +44,8 @@ def load_frame(folder: Path, name: str) -> Frame:
             masks_path=masks,
             image_path=training / f"image_2/{name}.png",
             points=ldls.read_points(points),
-            masks=ldls.InstanceMasks.from_coco(masks),
-            camera=ldls.Camera.from_kitti(calib),
+            masks=ldls.read_masks(masks),
+            camera=ldls.read_camera(calib),
             expected=dict(expected),
         )
 

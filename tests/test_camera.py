@@ -28,10 +28,10 @@ def write(tmp_path):
 
 
 def test_kitti_calibration_composes_projection_and_transform(write):
-    camera = ldls.Camera.from_kitti(write(calibration()))
+    camera = ldls.read_camera(write(calibration()))
     assert camera.projection.tolist() == [[100, 0, 50, 4], [0, 100, 40, -1], [0, 0, 1, 0.01]]
     assert camera.T_camera_lidar[0].tolist() == [0, -1, 0, 0.1]
-    assert ldls.Camera.from_kitti(write(calibration()), camera=0).projection[0, 3] == 0
+    assert ldls.read_camera(write(calibration()), camera=0).projection[0, 3] == 0
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_kitti_calibration_composes_projection_and_transform(write):
     ],
 )
 def test_spellings_of_a_calibration_that_are_understood(write, text):
-    camera = ldls.Camera.from_kitti(write(text))
+    camera = ldls.read_camera(write(text))
     assert camera.T_camera_lidar[2].tolist() == [1, 0, 0, -0.3]
 
 
@@ -75,13 +75,13 @@ def test_spellings_of_a_calibration_that_are_understood(write, text):
 )
 def test_faults_of_a_calibration_are_named_with_their_place(write, text, message):
     with pytest.raises(ldls.CalibrationError, match=message) as caught:
-        ldls.Camera.from_kitti(write(text))
+        ldls.read_camera(write(text))
     assert "calib.txt" in str(caught.value)
 
 
 def test_a_missing_calibration_stays_file_not_found(tmp_path):
     with pytest.raises(FileNotFoundError):
-        ldls.Camera.from_kitti(tmp_path / "none.txt")
+        ldls.read_camera(tmp_path / "none.txt")
 
 
 @pytest.mark.parametrize(

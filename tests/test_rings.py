@@ -76,7 +76,7 @@ def test_streams_and_files_take_rings(tmp_path):
         found = stream.segment(WALL, [view.masks for view in views])
         np.testing.assert_array_equal(found.labels, expected.labels)
     for suffix in ("npz", "label", "ply"):
-        expected.save(tmp_path / f"ring.{suffix}")
+        ldls.save(expected, tmp_path / f"ring.{suffix}")
     labels = np.fromfile(tmp_path / "ring.label", "<u4")
     np.testing.assert_array_equal(labels >> 16, np.maximum(expected.labels, 0))
 

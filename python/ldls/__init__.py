@@ -23,7 +23,7 @@ from ldls.errors import (
     UnsupportedFormatError,
 )
 from ldls.explaining import Explanation, explain
-from ldls.io import read_image, read_points
+from ldls.io import read_camera, read_image, read_masks, read_points, read_result, save
 from ldls.label_diffusion import LabelDiffusion, segment
 from ldls.masks import InstanceMasks
 from ldls.notebook import html_of
@@ -67,8 +67,12 @@ __all__ = [
     "View",
     "__version__",
     "explain",
+    "read_camera",
     "read_image",
+    "read_masks",
     "read_points",
+    "read_result",
+    "save",
     "segment",
     "stages",
 ]

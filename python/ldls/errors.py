@@ -6,7 +6,9 @@ Messages name the argument or file, what was found, what was expected, and how t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from os import PathLike
 from typing import ClassVar
 
 
@@ -153,3 +155,12 @@ class RecoveredFileWarning(LdlsWarning):
 
 class LeftOutWarning(LdlsWarning):
     """Sweeps that no frame is made of, for something that belongs to them is missing."""
+
+
+@contextmanager
+def within(place: str | PathLike[str]) -> Iterator[None]:
+    """Begin the message of an error of `ldls` that leaves the block with the file or argument that it is about."""
+    try:
+        yield
+    except LdlsError as error:
+        raise type(error)(f"{place}: {error}") from None

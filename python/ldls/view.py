@@ -35,7 +35,7 @@ class View:
         if not isinstance(self.masks, InstanceMasks):
             raise InputError(
                 f"masks: expected InstanceMasks, got {type(self.masks).__name__}; "
-                "make them with InstanceMasks.from_array, from_coco or from_file"
+                "make them with InstanceMasks.from_array, or ldls.read_masks of a file"
             )
         check_camera(self.camera)
         expected, found = self.camera.image_size, self.masks.image_size
@@ -75,5 +75,5 @@ def check_camera(camera: object) -> None:
     if not isinstance(camera, Camera):
         raise InputError(
             f"camera: expected Camera, got {type(camera).__name__}; "
-            "make one with Camera(projection=..., T_camera_lidar=...) or Camera.from_kitti"
+            "make one with Camera(projection=..., T_camera_lidar=...), or ldls.read_camera of a file"
         )

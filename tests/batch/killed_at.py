@@ -9,7 +9,7 @@ from pathlib import Path
 from ldls.batch import journal
 from ldls.batch.lock import LOCK_NAME
 from ldls.cli import app
-from ldls.io import whole_file
+from ldls.io import files
 
 FSYNC, REPLACE, UNLINK = os.fsync, Path.replace, Path.unlink
 WRITE_LINES = journal.Journal._append
@@ -56,7 +56,7 @@ def is_lock(path, **_):
 
 
 STEPS = {
-    "file written, not synced": lambda: setattr(whole_file.os, "fsync", before(FSYNC)),
+    "file written, not synced": lambda: setattr(files.os, "fsync", before(FSYNC)),
     "file synced, not renamed": lambda: setattr(Path, "replace", before(REPLACE)),
     "file renamed": lambda: setattr(Path, "replace", after(REPLACE)),
     "folder not synced": lambda: setattr(journal, "sync_folder", before(journal.sync_folder)),

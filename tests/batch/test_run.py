@@ -23,7 +23,7 @@ from ldls.batch.plan import check_names, parse_frames
 from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import BatchError, CorruptFileError, InputError, ParameterError, UnsafePathError
-from ldls.io import whole_file
+from ldls.io import files
 from ldls.viewing import overlay
 
 STORED = batch.RunSettings(masks="unused")
@@ -40,8 +40,8 @@ def run(source, out, **options):
 
 def test_outputs_are_those_of_segment_frame_by_frame(source, undisturbed, tmp_path):
     frame = open_source(source)[7]
-    masks = ldls.InstanceMasks.from_file(source / "masks/000007.json")
-    ldls.segment(frame.points, masks, frame.images[0].camera).save(tmp_path / "one.label")
+    masks = ldls.read_masks(source / "masks/000007.json")
+    ldls.save(ldls.segment(frame.points, masks, frame.images[0].camera), tmp_path / "one.label")
     assert undisturbed["000007.label"] == (tmp_path / "one.label").read_bytes()
     assert len({undisturbed[f"{number:06d}.label"] for number in range(300)}) > 250
     assert set(undisturbed) == {"journal.jsonl", *(f"{number:06d}.label" for number in range(300))}
@@ -64,7 +64,7 @@ def test_pictures_are_a_format(few, tmp_path):
     out = tmp_path / "out"
     outcome = command("run", few, "--masks", few / "masks", "--out", out, "--frames", ":2", "--formats", "png,npz")
     assert outcome.exit_code == 0, outcome.output
-    result = ldls.Segmentation.from_npz(out / "000001.npz")
+    result = ldls.read_result(out / "000001.npz")
     overlay(result, open_source(few)[1].images[0].read()).save(tmp_path / "expected.png")
     with Image.open(out / "000001.png") as picture, Image.open(tmp_path / "expected.png") as expected:
         assert picture.tobytes() == expected.tobytes()
@@ -97,7 +97,7 @@ def test_parameters_of_the_method_are_options(few, tmp_path):
     words = ["--sigma", 0.1, "--neighbors", 4, "--iterations", 7, "--keep-outliers", "--formats", "npz"]
     outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--frames", "0", *words)
     assert outcome.exit_code == 0, outcome.output
-    params = ldls.Segmentation.from_npz(tmp_path / "out/000000.npz").params
+    params = ldls.read_result(tmp_path / "out/000000.npz").params
     assert params == ldls.Params(sigma=0.1, neighbors=4, iterations=7, remove_outliers=False, threads=params.threads)
 
 
@@ -147,9 +147,9 @@ def test_rings_with_masks_of_each_camera(tmp_path):
         summary = batch.run(ring, out, batch.RunSettings(masks=str(place)))
         assert summary.n_done == 3
         frame = ring[1]
-        masks = [ldls.InstanceMasks.from_file(source / f"masks/image_{camera}/000001.json") for camera in (2, 3)]
+        masks = [ldls.read_masks(source / f"masks/image_{camera}/000001.json") for camera in (2, 3)]
         views = [ldls.View(own, image.camera) for own, image in zip(masks, frame.images, strict=True)]
-        ldls.segment(frame.points, views).save(tmp_path / "one.label")
+        ldls.save(ldls.segment(frame.points, views), tmp_path / "one.label")
         assert (out / "000001.label").read_bytes() == (tmp_path / "one.label").read_bytes()
 
 
@@ -237,7 +237,7 @@ def test_files_that_went_missing_or_shrank_are_made_again(source, undisturbed, t
 def test_left_over_parts_are_swept(few, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
-    (out / f".000001.label.0123{whole_file.UNFINISHED}").write_bytes(b"half")
+    (out / f".000001.label.0123{files.UNFINISHED}").write_bytes(b"half")
     (out / "notes.txt").write_text("the user's own")
     run(few, out)
     assert not list(out.glob(".*"))

@@ -33,7 +33,7 @@ def frame(tmp_path_factory):
     camera = ldls.Camera(projection=[[100, 0, 40], [0, 100, 30], [0, 0, 1]])
     result = ldls.segment(points, masks, camera)
     path = tmp_path_factory.mktemp("explain") / "frame.npz"
-    result.save(path)
+    ldls.save(result, path)
     return result, path
 
 
@@ -43,7 +43,7 @@ def ring(tmp_path_factory):
     views = [ldls.View(view.masks, view.camera, name) for view, name in zip(as_views(views), "abc", strict=True)]
     result = ldls.segment(points, views, params=ldls.Params(neighbors=6, sigma=0.3))
     path = tmp_path_factory.mktemp("explain") / "ring.npz"
-    result.save(path)
+    ldls.save(result, path)
     return result, path
 
 
@@ -124,7 +124,7 @@ def test_files_without_a_result_give_the_same(frame_571, tmp_path):
     outcome = explain(point, *files)
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.splitlines()[0] == ldls.explain(result, point).verdict
-    result.save(tmp_path / "571.npz")
+    ldls.save(result, tmp_path / "571.npz")
     assert outcome.output == explain(point, tmp_path / "571.npz").output
     other = explain(point, *files, "--camera", 3)
     assert other.exit_code == 0
@@ -221,11 +221,11 @@ def test_misuse_of_rings_is_one_line(ring, words, message):
 
 def test_files_of_another_kind_and_missing_ones_are_named(frame, tmp_path):
     masks = tmp_path / "masks.npz"
-    frame[0].masks.save(masks)
+    ldls.save(frame[0].masks, masks)
     outcome = explain(3, masks)
     assert outcome.exit_code == 1
     assert "masks.npz: " in outcome.stderr
-    assert "Segmentation.save" in outcome.stderr
+    assert "expected those of ldls.save" in outcome.stderr
     assert explain(3, tmp_path / "none.npz").exit_code == 2
     assert "none.npz" in explain(3, tmp_path / "none.npz").stderr.replace("\n", "")
     assert "RESULT: missing; give an .npz file" in explain(3).stderr

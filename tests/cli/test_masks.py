@@ -22,14 +22,14 @@ def masks(tmp_path):
     pixels[1, 10:38, 20:50] = True
     pixels[2, 0:3, 50:53] = True
     made = ldls.InstanceMasks.from_array(pixels, categories=[3, 1, 18], scores=[0.9, 0.5, 0.75])
-    made.save(tmp_path / "masks.json")
+    ldls.save(made, tmp_path / "masks.json")
     return made, tmp_path
 
 
 def test_masks_go_through_every_format_and_stay_what_they_are(masks):
     made, folder = masks
     resolved = made.resolve_overlaps()
-    resolved.save(folder / "start.json")
+    ldls.save(resolved, folder / "start.json")
     stops = ["a.png", "b.npz", "c.json", "d.npz"]
     before = "start.json"
     for stop in stops:
@@ -37,7 +37,7 @@ def test_masks_go_through_every_format_and_stay_what_they_are(masks):
         assert outcome.exit_code == 0, outcome.output
         assert f"wrote 3 of 3 masks to {folder / stop}" in outcome.output
         before = stop
-    found = ldls.InstanceMasks.from_file(folder / before)
+    found = ldls.read_masks(folder / before)
     np.testing.assert_array_equal(found.to_array(), resolved.to_array())
     assert found.categories.tolist() == made.categories.tolist()
     assert found.scores.tolist() == made.scores.tolist()
@@ -58,7 +58,7 @@ def test_masks_change_on_the_way(masks, options, change):
     made, folder = masks
     outcome = ldls_masks("convert", folder / "masks.json", folder / "out.npz", *options)
     assert outcome.exit_code == 0, outcome.output
-    expected, found = change(made), ldls.InstanceMasks.from_file(folder / "out.npz")
+    expected, found = change(made), ldls.read_masks(folder / "out.npz")
     np.testing.assert_array_equal(found.to_array(), expected.to_array())
     assert found.categories.tolist() == expected.categories.tolist()
 
@@ -75,7 +75,7 @@ def test_variants_are_written(masks):
     np.save(folder / "last.npy", np.moveaxis(stack, 0, -1))
     outcome = ldls_masks("convert", folder / "last.npy", folder / "back.npz", "--instance-axis", "last")
     assert outcome.exit_code == 0, outcome.output
-    np.testing.assert_array_equal(ldls.InstanceMasks.from_file(folder / "back.npz").to_array(), made.to_array())
+    np.testing.assert_array_equal(ldls.read_masks(folder / "back.npz").to_array(), made.to_array())
 
 
 @pytest.mark.parametrize(
@@ -119,18 +119,18 @@ def test_make_saves_what_a_segmenter_finds(tmp_path):
     segmenter = f"boxes:{tmp_path / 'label.txt'}"
     outcome = ldls_masks("make", tmp_path / "image.png", tmp_path / "masks.npz", "--segmenter", segmenter)
     assert outcome.exit_code == 0, outcome.output
-    found = ldls.InstanceMasks.from_file(tmp_path / "masks.npz")
+    found = ldls.read_masks(tmp_path / "masks.npz")
     assert [mask.name for mask in found] == ["car", "person"]
     assert found[0].bounding_box == (6, 5, 25, 16)
     wanted = ["--min-score", "0.5", "--categories", "car,person"]
     ldls_masks("make", tmp_path / "image.png", tmp_path / "some.npz", "--segmenter", segmenter, *wanted)
-    assert [mask.name for mask in ldls.InstanceMasks.from_file(tmp_path / "some.npz")] == ["car"]
+    assert [mask.name for mask in ldls.read_masks(tmp_path / "some.npz")] == ["car"]
 
 
 @pytest.mark.parametrize("count", [0, 300])
 def test_any_number_of_masks(count, tmp_path):
     pixels = np.zeros((count, 40, 60), bool)
     pixels.reshape(count, 2400)[np.arange(count), 7 * np.arange(count)] = True
-    ldls.InstanceMasks.from_array(pixels).save(tmp_path / "masks.json")
+    ldls.save(ldls.InstanceMasks.from_array(pixels), tmp_path / "masks.json")
     assert ldls_masks("convert", tmp_path / "masks.json", tmp_path / "masks.png").exit_code == 0
-    np.testing.assert_array_equal(ldls.InstanceMasks.from_file(tmp_path / "masks.png").to_array(), pixels)
+    np.testing.assert_array_equal(ldls.read_masks(tmp_path / "masks.png").to_array(), pixels)

@@ -19,15 +19,15 @@ def test_frames_are_written_and_counted(tmp_path):
     assert "person" in result.output and "2 frames" in result.output
     training = tmp_path / "out/training"
     assert sorted(p.name for p in (training / "velodyne").iterdir()) == ["000000.bin", "000001.bin"]
-    assert ldls.InstanceMasks.from_coco(training / "masks/000001.json").image_size == (480, 640)
+    assert ldls.read_masks(training / "masks/000001.json").image_size == (480, 640)
     assert "kept 2" in run(tmp_path / "out", "--frames", 2, "--scene", "campus", "--seed", 4, *SMALL).output
 
 
 def test_no_errors_means_perfect_masks_and_calibration(tmp_path):
     assert run(tmp_path, "--frames", 1, "--no-errors", *SMALL).exit_code == 0
-    masks = ldls.InstanceMasks.from_coco(tmp_path / "training/masks/000000.json")
+    masks = ldls.read_masks(tmp_path / "training/masks/000000.json")
     assert (masks.scores == 1).all()
-    rotation = ldls.Camera.from_kitti(tmp_path / "training/calib/000000.txt").T_camera_lidar[:3, :3]
+    rotation = ldls.read_camera(tmp_path / "training/calib/000000.txt").T_camera_lidar[:3, :3]
     assert abs(rotation).max(axis=1) == pytest.approx(1)
 
 

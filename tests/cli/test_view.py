@@ -26,7 +26,7 @@ def no_display(monkeypatch, tmp_path):
 @pytest.fixture
 def saved(small_scene, tmp_path):
     result = ldls.segment(*small_scene)
-    result.save(tmp_path / "frame.npz")
+    ldls.save(result, tmp_path / "frame.npz")
     Image.new("RGB", (80, 60), (10, 90, 200)).save(tmp_path / "image.png")
     return result
 
@@ -51,7 +51,7 @@ def test_a_result_is_recorded_with_its_diffusion(saved):
 def test_a_ring_takes_an_image_for_each_camera(small_scene, saved):
     points, masks, camera = small_scene
     views = [ldls.View(masks, camera, "left"), ldls.View(masks, camera, "right")]
-    ldls.segment(points, views).save("ring.npz")
+    ldls.save(ldls.segment(points, views), "ring.npz")
     for images in (["image.png", "image.png"], ["right=image.png", "left=image.png"]):
         done = run("ring.npz", *(word for image in images for word in ("--image", image)), "--diffusion", 0)
         assert done.exit_code == 0, done.output
@@ -81,7 +81,7 @@ def test_a_drive_is_segmented_and_recorded_frame_by_frame(drive):
         frame = source[index]
         np.testing.assert_array_equal(vectors(row.values["Points3D:positions"]), frame.points[:, :3])
         assert row.times["time"] == pytest.approx(frame.stamp * 1e9, abs=1e3)
-        masks = ldls.InstanceMasks.from_file(drive / f"masks_02/{frame.name}.json")
+        masks = ldls.read_masks(drive / f"masks_02/{frame.name}.json")
         expected = ldls.segment(frame.points, masks, frame.images[0].camera).categories
         np.testing.assert_array_equal(row.values["Points3D:class_ids"].to_numpy(), expected)
     assert "world/truth" in found.entities and "diffusion" not in found.entities
@@ -152,7 +152,7 @@ def test_the_missing_extra_is_named_before_any_work(saved, monkeypatch):
 def test_segment_and_demo_record_too(small_scene, saved, tmp_path):
     points, masks, camera = small_scene
     np.hstack([points, np.zeros((len(points), 1), np.float32)]).tofile("p.bin")
-    masks.save("m.npz")
+    ldls.save(masks, "m.npz")
     rows = {"P2": camera.projection, "R0_rect": np.eye(3), "Tr_velo_to_cam": np.eye(4)[:3]}
     layouts.write_text(tmp_path / "c.txt", "".join(f"{key}: {layouts.row(m)}\n" for key, m in rows.items()))
     words = (

@@ -68,7 +68,7 @@ def test_drives_that_cannot_be_are_refused(options):
 
 
 def _stored_masks(drive, name):
-    return ldls.InstanceMasks.from_coco(drive / f"masks_02/{name}.json")
+    return ldls.read_masks(drive / f"masks_02/{name}.json")
 
 
 def _scored(frame, masks):

@@ -147,7 +147,7 @@ def test_folder_has_distortion_stamps_and_masks(tmp_path):
     folder = layouts.plain_folder(tmp_path)
     pixels = np.zeros((1, *layouts.SIZE), bool)
     (folder / "masks").mkdir()
-    ldls.InstanceMasks.from_array(pixels, categories=[1], scores=[1]).save(folder / "masks/b.npz")
+    ldls.save(ldls.InstanceMasks.from_array(pixels, categories=[1], scores=[1]), folder / "masks/b.npz")
     source = open_source(folder)
     assert source.names == ("a", "b") and source.stamps == (0.0, 0.1)
     assert source[0].images[0].camera.distortion.model == "plumb_bob"

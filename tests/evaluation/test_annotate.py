@@ -73,7 +73,7 @@ def test_a_turned_box_tilts_with_the_road():
 def test_real_objects_lose_their_ground_and_keep_the_rest(data_folder):
     training = data_folder / "kitti/training"
     points = ldls.read_points(training / "velodyne/000003.bin")
-    camera = ldls.Camera.from_kitti(training / "calib/000003.txt")
+    camera = ldls.read_camera(training / "calib/000003.txt")
     objects = read_kitti_objects(training / "label_2/000003.txt")
     whole = annotate(objects, points, camera, clean=False)
     cleaned = annotate(objects, points, camera)

@@ -120,7 +120,7 @@ def test_no_objects_are_all_background():
 def test_real_boxes_hold_points(data_folder, name, classes):
     training = data_folder / "kitti/training"
     points = ldls.read_points(training / f"velodyne/{name}.bin")
-    camera = ldls.Camera.from_kitti(training / f"calib/{name}.txt")
+    camera = ldls.read_camera(training / f"calib/{name}.txt")
     found = read_kitti_boxes(training / f"label_2/{name}.txt", points=points, camera=camera)
     counts = {name for name, count in found.counts().items() if count} - {"background"}
     assert counts == classes

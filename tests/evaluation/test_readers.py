@@ -110,7 +110,7 @@ def test_semantic_kitti_faults(tmp_path):
 
 def test_the_writer_and_the_reader_of_label_files_agree(small_scene, tmp_path):
     result = ldls.segment(*small_scene)
-    result.save(tmp_path / "a.label")
+    ldls.save(result, tmp_path / "a.label")
     found = read_semantic_kitti(tmp_path / "a.label")
     np.testing.assert_array_equal(found.instances, np.maximum(result.labels, 0))
     expected = {0: "unlabeled", 1: "person", 3: "car"}
@@ -146,7 +146,7 @@ def test_nuscenes_faults(tmp_path):
 def test_segmentations_are_read_as_they_were_written(small_scene, tmp_path):
     points, masks, camera = small_scene
     result = ldls.segment(np.vstack([points, [[0, 0, -5]]]).astype(np.float32), masks, camera)
-    result.save(tmp_path / "a.npz")
+    ldls.save(result, tmp_path / "a.npz")
     found = read_results(tmp_path / "a.npz")
     expected = {0: "background", 1: "person", 3: "car"}
     assert class_names(found) == [expected[c] for c in result.categories.tolist()]

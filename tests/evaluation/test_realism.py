@@ -25,8 +25,8 @@ def real(data_folder):
         labelled_by_boxes(
             read_kitti_objects(training / f"label_2/{name}.txt"),
             ldls.read_points(training / f"velodyne/{name}.bin"),
-            ldls.InstanceMasks.from_coco(training / f"masks/{name}.json"),
-            ldls.Camera.from_kitti(training / f"calib/{name}.txt"),
+            ldls.read_masks(training / f"masks/{name}.json"),
+            ldls.read_camera(training / f"calib/{name}.txt"),
         )
         for name in FRAMES
     ]

@@ -39,7 +39,7 @@ def result(small_scene):
 def test_pcd_files_open_elsewhere(small_scene, tmp_path, dtype):
     pypcd4 = pytest.importorskip("pypcd4", reason="the extra pcd is not installed")
     result = segmented(small_scene, dtype)
-    result.save(tmp_path / "a.pcd")
+    ldls.save(result, tmp_path / "a.pcd")
     cloud = pypcd4.PointCloud.from_path(tmp_path / "a.pcd")
     assert cloud.fields == ("x", "y", "z", "intensity", "label", "instance", "confidence", "rgb")
     assert cloud.types == (*[dtype] * 4, np.uint32, np.uint32, np.float32, np.float32)
@@ -62,7 +62,7 @@ def test_las_files_open_elsewhere(small_scene, tmp_path, suffix, dtype, shift):
     laspy = pytest.importorskip("laspy", reason="the extra las is not installed")
     result = segmented(small_scene, dtype, shift)
     assert (result.labels == 1).sum() > 50
-    result.save(tmp_path / f"a{suffix}")
+    ldls.save(result, tmp_path / f"a{suffix}")
     las = laspy.read(tmp_path / f"a{suffix}")
     assert las.header.are_points_compressed == (suffix == ".laz")
     np.testing.assert_allclose(las.xyz, result.points[:, :3], rtol=0, atol=6e-5)
@@ -80,7 +80,7 @@ def test_las_keeps_larger_intensities_as_they_are(result, tmp_path):
     laspy = pytest.importorskip("laspy", reason="the extra las is not installed")
     points = result.points.copy()
     points[:, 3] = np.arange(len(points))
-    replace(result, points=points).save(tmp_path / "a.las")
+    ldls.save(replace(result, points=points), tmp_path / "a.las")
     np.testing.assert_array_equal(laspy.read(tmp_path / "a.las").intensity, points[:, 3])
 
 
@@ -89,19 +89,19 @@ def test_las_says_what_it_cannot_hold(result, tmp_path):
     points = result.points.copy()
     points[7, 1] = np.nan
     with pytest.raises(ldls.NonFiniteError, match=r"a.las: 1 of 501 points are not finite, the first in row 7"):
-        replace(result, points=points).save(tmp_path / "a.las")
+        ldls.save(replace(result, points=points), tmp_path / "a.las")
     points[7, 1] = 5e5
     with pytest.raises(ldls.LimitError, match="the cloud is 50000. m wide"):
-        replace(result, points=points).save(tmp_path / "a.las")
+        ldls.save(replace(result, points=points), tmp_path / "a.las")
     many = tuple(replace(instance, category=70_000) for instance in result.instances)
     with pytest.raises(ldls.LimitError, match="category ids 0 to 70000"):
-        replace(result, instances=many).save(tmp_path / "a.las")
+        ldls.save(replace(result, instances=many), tmp_path / "a.las")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_parquet_files_are_tables(result, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet", reason="the extra arrow is not installed")
-    result.save(tmp_path / "a.parquet")
+    ldls.save(result, tmp_path / "a.parquet")
     table = parquet.read_table(tmp_path / "a.parquet")
     for column, name in enumerate(("x", "y", "z", "intensity")):
         np.testing.assert_array_equal(table[name].to_numpy(), result.points[:, column])
@@ -118,7 +118,7 @@ def test_parquet_files_are_tables(result, tmp_path):
 
 def test_csv_files_are_tables(result, tmp_path):
     result = renamed(result, 'person, "tall"', "car")
-    result.save(tmp_path / "a.csv")
+    ldls.save(result, tmp_path / "a.csv")
     with (tmp_path / "a.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     for column, name in enumerate(("x", "y", "z", "intensity")):
@@ -142,7 +142,7 @@ def test_csv_files_are_tables(result, tmp_path):
     ],
 )
 def test_lidarseg_files_are_nuscenes(result, tmp_path, names, expected):
-    renamed(result, *names).save(tmp_path / "a_lidarseg.bin")
+    ldls.save(renamed(result, *names), tmp_path / "a_lidarseg.bin")
     classes = np.fromfile(tmp_path / "a_lidarseg.bin", np.uint8)
     np.testing.assert_array_equal(classes, np.array([0, *expected, 0])[result.labels])
 
@@ -155,7 +155,7 @@ def test_lidarseg_files_are_nuscenes(result, tmp_path, names, expected):
     ],
 )
 def test_panoptic_files_are_nuscenes(result, tmp_path, names, expected):
-    renamed(result, *names).save(tmp_path / "a_panoptic.npz")
+    ldls.save(renamed(result, *names), tmp_path / "a_panoptic.npz")
     with np.load(tmp_path / "a_panoptic.npz") as stored:
         assert stored.files == ["data"]
         assert stored["data"].dtype == np.uint16
@@ -165,14 +165,14 @@ def test_panoptic_files_are_nuscenes(result, tmp_path, names, expected):
 def test_panoptic_files_have_a_limit(result, tmp_path):
     crowded = replace(result, instances=result.instances[:1] * 1000)
     with pytest.raises(ldls.LimitError, match="1000 instances of human.pedestrian.adult, expected at most 999"):
-        crowded.save(tmp_path / "a_panoptic.npz")
+        ldls.save(crowded, tmp_path / "a_panoptic.npz")
 
 
 def test_nuscenes_files_are_what_the_evaluation_reads(result, tmp_path):
     from ldls.evaluation import read_lidarseg, read_panoptic
 
     for ending, read in (("_lidarseg.bin", read_lidarseg), ("_panoptic.npz", read_panoptic)):
-        result.save(tmp_path / f"a{ending}")
+        ldls.save(result, tmp_path / f"a{ending}")
         assert len(read(tmp_path / f"a{ending}")) == len(result.labels)
 
 
@@ -180,7 +180,7 @@ def test_nuscenes_files_are_what_the_evaluation_reads(result, tmp_path):
 def test_an_empty_cloud_is_a_file_too(small_scene, tmp_path, ending):
     _, masks, camera = small_scene
     result = ldls.segment(np.zeros((0, 4), np.float32), masks, camera)
-    result.save(tmp_path / f"a{ending}")
+    ldls.save(result, tmp_path / f"a{ending}")
     if ending in (".pcd", ".las", ".laz", ".csv"):
         assert ldls.read_points(tmp_path / f"a{ending}").shape == (0, 4)
 
@@ -197,5 +197,5 @@ def test_an_empty_cloud_is_a_file_too(small_scene, tmp_path, ending):
 def test_missing_libraries_name_their_extra(result, tmp_path, monkeypatch, suffix, module, extra):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(ImportError, match=rf"ldls\[{extra}\]"):
-        result.save(tmp_path / f"a{suffix}")
+        ldls.save(result, tmp_path / f"a{suffix}")
     assert list(tmp_path.iterdir()) == []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.io.npz import read_npz, write_npz
+from ldls.io.arrays import read_npz, write_npz
 
 PLAIN = ("labels", "diffused_labels", "confidence", "in_view", "points", "categories")
 
@@ -30,8 +30,8 @@ def same(one: ldls.Segmentation, other: ldls.Segmentation) -> None:
 
 
 def through_file(result: ldls.Segmentation, path) -> ldls.Segmentation:
-    result.save(path)
-    return ldls.Segmentation.from_npz(path)
+    ldls.save(result, path)
+    return ldls.read_result(path)
 
 
 @pytest.fixture
@@ -92,30 +92,30 @@ def test_no_points_and_no_masks(scene, tmp_path):
 )
 def test_arrays_that_do_not_fit_are_refused(scene, tmp_path, spoil, message):
     path = tmp_path / "a.npz"
-    ldls.segment(*scene).save(path)
+    ldls.save(ldls.segment(*scene), path)
     write_npz(path, read_npz(path) | spoil)
     with pytest.raises(ldls.LdlsError, match=message) as error:
-        ldls.Segmentation.from_npz(path)
+        ldls.read_result(path)
     assert str(error.value).startswith(str(path))
 
 
 def test_a_missing_array_is_named(scene, tmp_path):
     path = tmp_path / "a.npz"
-    ldls.segment(*scene).save(path)
+    ldls.save(ldls.segment(*scene), path)
     write_npz(path, {name: array for name, array in read_npz(path).items() if name != "view_names"})
     with pytest.raises(ldls.CorruptFileError, match="view_names"):
-        ldls.Segmentation.from_npz(path)
+        ldls.read_result(path)
 
 
 def test_other_files_are_refused_by_what_they_are(scene, tmp_path):
-    scene[1].save(tmp_path / "masks.npz")
-    with pytest.raises(ldls.UnsupportedFormatError, match=r"expected those of Segmentation.save"):
-        ldls.Segmentation.from_npz(tmp_path / "masks.npz")
-    ldls.segment(*scene).save(tmp_path / "old.npz")
+    ldls.save(scene[1], tmp_path / "masks.npz")
+    with pytest.raises(ldls.UnsupportedFormatError, match=r"expected those of ldls.save"):
+        ldls.read_result(tmp_path / "masks.npz")
+    ldls.save(ldls.segment(*scene), tmp_path / "old.npz")
     arrays = read_npz(tmp_path / "old.npz")
     del arrays["points"]
     write_npz(tmp_path / "old.npz", arrays)
     with pytest.raises(ldls.UnsupportedFormatError, match="segment the frame again"):
-        ldls.Segmentation.from_npz(tmp_path / "old.npz")
+        ldls.read_result(tmp_path / "old.npz")
     with pytest.raises(FileNotFoundError):
-        ldls.Segmentation.from_npz(tmp_path / "none.npz")
+        ldls.read_result(tmp_path / "none.npz")

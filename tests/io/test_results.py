@@ -15,7 +15,7 @@ def result(small_scene):
 
 
 def test_npz_holds_all_fields(result, tmp_path):
-    result.save(tmp_path / "a.npz")
+    ldls.save(result, tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as stored:
         for name in ("labels", "diffused_labels", "categories", "confidence", "in_view", "pixels"):
             np.testing.assert_array_equal(stored[name], getattr(result, name))
@@ -28,7 +28,7 @@ def test_npz_holds_all_fields(result, tmp_path):
 
 
 def test_label_files_are_semantic_kittis(result, tmp_path):
-    result.save(tmp_path / "a.label")
+    ldls.save(result, tmp_path / "a.label")
     values = np.fromfile(tmp_path / "a.label", "<u4")
     np.testing.assert_array_equal(values >> 16, np.maximum(result.labels, 0))
     expected = {0: 0, 1: 30, 3: 10}
@@ -37,7 +37,7 @@ def test_label_files_are_semantic_kittis(result, tmp_path):
 
 
 def test_ply_files_hold_points_labels_and_colours(result, tmp_path):
-    result.save(tmp_path / "a.ply")
+    ldls.save(result, tmp_path / "a.ply")
     header, _, body = (tmp_path / "a.ply").read_bytes().partition(b"end_header\n")
     lines = header.decode().splitlines()
     assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
@@ -56,14 +56,14 @@ def test_ply_files_hold_points_labels_and_colours(result, tmp_path):
 
 def test_unknown_suffixes_are_refused(result, tmp_path):
     with pytest.raises(ldls.UnsupportedFormatError, match="expected .npz, .label, .ply"):
-        result.save(tmp_path / "a.xyz")
+        ldls.save(result, tmp_path / "a.xyz")
     with pytest.raises(ldls.UnsupportedFormatError, match="cannot write '.bin' files"):
-        result.save(tmp_path / "a.bin")
+        ldls.save(result, tmp_path / "a.bin")
 
 
 def test_nothing_is_left_behind_where_writing_fails(result, tmp_path, monkeypatch):
     monkeypatch.setattr("os.fsync", lambda _: (_ for _ in ()).throw(OSError(28, "No space left")))
     for ending in WRITERS:
         with pytest.raises(OSError, match="No space left"):
-            result.save(tmp_path / f"a{ending}")
+            ldls.save(result, tmp_path / f"a{ending}")
     assert list(tmp_path.iterdir()) == []

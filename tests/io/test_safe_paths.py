@@ -3,7 +3,7 @@
 import pytest
 
 import ldls
-from ldls.io.safe_paths import below, strictly_below
+from ldls.io.files import below, strictly_below
 
 
 @pytest.mark.parametrize("name", ["a/b.bin", "./a.bin", "a/..b/c"])

@@ -130,12 +130,12 @@ def test_polygons_cover_the_pixels_that_the_coco_tools_give_them(seed):
 def test_both_files_of_a_real_frame_are_read(frame_571):
     path = frame_571.masks_path
     document = json.loads(path.read_text())
-    masks = ldls.InstanceMasks.from_coco(path)
+    masks = ldls.read_masks(path)
     for mask, annotation in zip(masks, document["annotations"], strict=True):
         np.testing.assert_array_equal(mask.to_array(), cocomask.decode(annotation["segmentation"]))
         assert mask.category == annotation["category_id"]
         assert mask.score == pytest.approx(annotation["score"])
-    polygons = ldls.InstanceMasks.from_coco(path.with_name("000571_polygons.json"))
+    polygons = ldls.read_masks(path.with_name("000571_polygons.json"))
     both = (polygons.to_array() & masks.to_array()).sum(axis=(1, 2))
     either = (polygons.to_array() | masks.to_array()).sum(axis=(1, 2))
     assert (both / either > 0.8).all()
@@ -206,7 +206,7 @@ def test_files_that_are_not_coco_json_are_refused(tmp_path, text):
     path = tmp_path / "masks.json"
     path.write_text(text)
     with pytest.raises(ldls.CorruptFileError, match=r"masks\.json"):
-        ldls.InstanceMasks.from_coco(path)
+        ldls.read_masks(path)
 
 
 def test_own_npz_keeps_everything(tmp_path):
@@ -214,14 +214,14 @@ def test_own_npz_keeps_everything(tmp_path):
     masks = ldls.InstanceMasks.from_array(
         pixels, categories=[7, 8, 7, 8], scores=[1, 0.5, 0, 0.25], names={7: "crane", 8: "barrow"}
     )
-    masks.save(tmp_path / "masks.npz")
-    again = ldls.InstanceMasks.from_npz(tmp_path / "masks.npz")
+    ldls.save(masks, tmp_path / "masks.npz")
+    again = ldls.read_masks(tmp_path / "masks.npz")
     np.testing.assert_array_equal(again.to_array(), pixels)
     np.testing.assert_array_equal(again.scores, masks.scores)
     assert again.names == {7: "crane", 8: "barrow"}
     empty = ldls.InstanceMasks.from_array([], image_size=(4, 5))
-    empty.save(tmp_path / "empty.npz")
-    assert ldls.InstanceMasks.from_npz(tmp_path / "empty.npz").image_size == (4, 5)
+    ldls.save(empty, tmp_path / "empty.npz")
+    assert ldls.read_masks(tmp_path / "empty.npz").image_size == (4, 5)
 
 
 def research_arrays(pixels, class_ids):
@@ -237,7 +237,7 @@ def research_arrays(pixels, class_ids):
 def test_masks_of_the_research_code_get_coco_ids(tmp_path):
     pixels = random_pixels()
     np.savez(tmp_path / "old.npz", **research_arrays(pixels, [1, 3, 17, 80]))
-    masks = ldls.InstanceMasks.from_npz(tmp_path / "old.npz")
+    masks = ldls.read_masks(tmp_path / "old.npz")
     np.testing.assert_array_equal(masks.to_array(), pixels)
     assert [mask.name for mask in masks] == ["person", "car", "dog", "toothbrush"]
     assert len(CONTIGUOUS_IDS) == len(COCO_NAMES) == 80
@@ -255,15 +255,15 @@ def test_masks_of_the_research_code_get_coco_ids(tmp_path):
 def test_faults_of_npz_files_are_named(tmp_path, arrays, error, message):
     np.savez(tmp_path / "masks.npz", **arrays)
     with pytest.raises(error, match=message):
-        ldls.InstanceMasks.from_npz(tmp_path / "masks.npz")
+        ldls.read_masks(tmp_path / "masks.npz")
 
 
 def test_a_cut_npz_is_corrupt(tmp_path):
     path = tmp_path / "masks.npz"
-    ldls.InstanceMasks.from_array(random_pixels()).save(path)
+    ldls.save(ldls.InstanceMasks.from_array(random_pixels()), path)
     path.write_bytes(path.read_bytes()[:-30])
     with pytest.raises(ldls.CorruptFileError, match="not a whole"):
-        ldls.InstanceMasks.from_npz(path)
+        ldls.read_masks(path)
 
 
 def disk(radius):

@@ -124,7 +124,7 @@ def test_the_command_reaches_the_same_labels(build, kind, least_iou, scene, tmp_
     outcome = CliRunner().invoke(app, ["segment", *words, "--segmenter", f"onnx:{model}", "--out", str(tmp_path)])
     assert outcome.exit_code == 0, outcome.output
     masks = OnnxSegmenter(model, kind=kind)(scene.image)
-    expected = ldls.segment(scene.points, masks, ldls.Camera.from_kitti(files["calib"])).labels
+    expected = ldls.segment(scene.points, masks, ldls.read_camera(files["calib"])).labels
     with np.load(tmp_path / "points.npz") as written:
         np.testing.assert_array_equal(written["labels"], expected)
 

@@ -45,13 +45,13 @@ def test_points_come_back(frame, training):
 
 def test_the_calibration_comes_back(frame, training):
     for number in range(4):
-        camera = ldls.Camera.from_kitti(training / "calib/000021.txt", camera=number)
+        camera = ldls.read_camera(training / "calib/000021.txt", camera=number)
         np.testing.assert_allclose(camera.projection, frame.camera.projection, atol=1e-9)
         np.testing.assert_allclose(camera.T_camera_lidar, frame.camera.T_camera_lidar, atol=1e-9)
 
 
 def test_masks_come_back(frame, training):
-    masks = ldls.InstanceMasks.from_coco(training / "masks/000021.json")
+    masks = ldls.read_masks(training / "masks/000021.json")
     np.testing.assert_array_equal(masks.to_array(), frame.masks.to_array())
     np.testing.assert_array_equal(masks.categories, frame.masks.categories)
     np.testing.assert_allclose(masks.scores, frame.masks.scores, atol=1e-4)
@@ -112,8 +112,8 @@ def test_image_boxes_lie_in_the_image_and_around_the_pixels(frame, training):
 def test_the_method_runs_on_the_files(training):
     result = ldls.segment(
         ldls.read_points(training / "velodyne/000021.bin"),
-        ldls.InstanceMasks.from_coco(training / "masks/000021.json"),
-        ldls.Camera.from_kitti(training / "calib/000021.txt"),
+        ldls.read_masks(training / "masks/000021.json"),
+        ldls.read_camera(training / "calib/000021.txt"),
     )
     assert (result.labels > 0).sum() > 200
 
@@ -124,10 +124,10 @@ def test_a_ring_has_a_folder_for_each_camera(tmp_path):
     views = [project(frame.points, view.camera, image_size=(900, 1600))[0] for view in frame.views]
     assert len(np.unique(np.concatenate(views))) > 0.5 * len(frame.points)
     for k in range(1, 6):
-        camera = ldls.Camera.from_kitti(tmp_path / f"training/calib_ring_{k}/000000.txt")
+        camera = ldls.read_camera(tmp_path / f"training/calib_ring_{k}/000000.txt")
         assert camera.projection[0, 0] == pytest.approx(809.2 if k == 3 else 1266.4)
         assert (tmp_path / f"training/image_ring_{k}/000000.png").stat().st_size > 10_000
-        assert ldls.InstanceMasks.from_coco(tmp_path / f"training/masks_ring_{k}/000000.json").image_size == (900, 1600)
+        assert ldls.read_masks(tmp_path / f"training/masks_ring_{k}/000000.json").image_size == (900, 1600)
 
 
 def orders(count):

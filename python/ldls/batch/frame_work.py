@@ -18,6 +18,7 @@ from ldls.batch.plan import file_name
 from ldls.batch.settings import PICTURE, RunSettings, fill
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.errors import BatchError
+from ldls.io import read_masks, save
 from ldls.label_diffusion import LabelDiffusion
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
@@ -134,7 +135,7 @@ class FrameWork:
                 if ending == PICTURE:
                     save_picture(path, overlay(result, [image.read() for image in work.images]))
                 else:
-                    quiet.save(path)
+                    save(quiet, path)
                 sizes[path.name] = path.stat().st_size
             work.record = {
                 "frame": work.name,
@@ -174,7 +175,7 @@ class FrameWork:
         assert work.frame is not None
         path = self._files.path(work.name, image.name, len(work.frame.images) == 1)
         work.inputs.update(_states([path]))
-        return self._wanted(InstanceMasks.from_file(path, image_size=image.camera.image_size))
+        return self._wanted(read_masks(path, image_size=image.camera.image_size))
 
     def _wanted(self, masks: InstanceMasks) -> InstanceMasks:
         return masks.filter(min_score=self._settings.min_score or 0.0, categories=self._settings.categories)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ldls.errors import BatchError, CorruptFileError
-from ldls.io.whole_file import names_file, sync_folder, whole_file
+from ldls.io.files import names_file, sync_folder, whole_file
 
 JOURNAL_NAME = "journal.jsonl"
 Record = Mapping[str, Any]

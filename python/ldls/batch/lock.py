@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from ldls.errors import BatchError
-from ldls.io.whole_file import names_file
+from ldls.io.files import names_file
 
 LOCK_NAME = ".ldls-lock"
 

@@ -17,7 +17,7 @@ from ldls.batch.plan import check_names
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import Summary, count_objects, failures_of, write_failures
 from ldls.datasets import Source, open_source
-from ldls.io.whole_file import sweep
+from ldls.io.files import sweep
 
 GROUP_S = 0.5
 """Frames finished within this time share a wait for the disk."""

@@ -32,7 +32,7 @@ class RunSettings:
         min_score: Lowest score of a mask that counts; the segmenter's own, or 0 of stored masks, without one.
         categories: Categories that count, by name or id; all without them.
         params: Parameters of the method; their number of threads does not matter to the result.
-        formats: Endings of the files written for each frame: those of `Segmentation.save`, and png for the image with
+        formats: Endings of the files written for each frame: those of `ldls.save`, and png for the image with
             masks and points.
         same_object: See `ldls.segment`.
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ldls.io.whole_file import whole_file
+from ldls.io.files import whole_file
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import ldls
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
 from ldls.cli.recording_options import ONLY_CAMERA, RerunOption, check_recording, record
+from ldls.io import save
 
 if TYPE_CHECKING:
     from ldls.simulation import SimulatedFrame
@@ -87,7 +88,7 @@ def write_inputs(out: Path, frame: SimulatedFrame, masks: ldls.InstanceMasks) ->
     folder = out / "input"
     folder.mkdir(parents=True, exist_ok=True)
     frame.points.tofile(folder / "points.bin")
-    masks.save(folder / "masks.npz")
+    save(masks, folder / "masks.npz")
     Image.fromarray(frame.image).save(folder / "image.png")
     matrices = {
         "P2": frame.projection,

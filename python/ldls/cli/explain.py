@@ -11,6 +11,7 @@ import typer
 from ldls.cli.frame_files import CALIB, COLOUR_CAMERA, EXISTING, IMAGE_ID, MASKS, POINTS, segment_files
 from ldls.cli.messages import console, speaks_plainly
 from ldls.errors import InputError, ParameterError
+from ldls.io import read_result
 from ldls.segmentation import Segmentation
 
 
@@ -75,7 +76,7 @@ def explain(
 
     if result is not None:
         _refuse_files(points, calib, masks, image_id)
-        found, view = Segmentation.from_npz(result), camera
+        found, view = read_result(result), camera
     else:
         found, view = _segmented(points, calib, masks, camera, image_id), None
     chosen = chosen_point(point, found, view)

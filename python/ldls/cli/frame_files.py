@@ -7,8 +7,7 @@ from typing import Any
 
 import typer
 
-from ldls.camera import Camera
-from ldls.io import read_points
+from ldls.io import read_camera, read_points
 from ldls.label_diffusion import segment
 from ldls.masks import InstanceMasks
 from ldls.params import Params
@@ -30,4 +29,4 @@ COLOUR_CAMERA = 2
 
 def segment_files(points: Path, masks: InstanceMasks, calib: Path, *, camera: int, params: Params) -> Segmentation:
     """The labels of the points of a sweep by the masks of the image of one of the cameras of a KITTI calibration."""
-    return segment(read_points(points), masks, Camera.from_kitti(calib, camera=camera), params=params)
+    return segment(read_points(points), masks, read_camera(calib, camera=camera), params=params)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.cli.options import words
 from ldls.errors import InputError
+from ldls.io import read_masks
 from ldls.masks import InstanceMasks
 
 SEGMENTER_HELP = (
@@ -47,7 +48,7 @@ def masks_of(
         raise InputError(f"give --masks FILE or --segmenter NAME, got {given}; see --help for the segmenters")
     if masks is not None:
         size = None if image is None else (image.shape[0], image.shape[1])
-        found = InstanceMasks.from_file(masks, image_id=image_id, image_size=size)
+        found = read_masks(masks, image_id=image_id, image_size=size)
         return wanted(found, min_score=min_score, categories=categories)
     from ldls.segmenters import open_segmenter
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of, wanted
 from ldls.cli.messages import console, speaks_plainly
 from ldls.errors import ParameterError
-from ldls.io import read_image
+from ldls.io import read_image, read_masks, save
 from ldls.masks import InstanceMasks
 
 app = typer.Typer(help="Make, show and convert instance masks.", no_args_is_help=True)
@@ -106,7 +106,7 @@ def convert(
 
     Example: ldls masks convert masks/000571.json masks/000571.png --resolve score --min-score 0.7
     """
-    found = InstanceMasks.from_file(
+    found = read_masks(
         masks,
         image_id=image_id,
         image_size=parsed_size(image_size),
@@ -120,7 +120,7 @@ def convert(
         kept = kept.grow(grow)
     if resolve is not None:
         kept = kept.resolve_overlaps(resolve.value)
-    kept.save(out, **(VARIANTS[variant] if variant else {}))
+    save(kept, out, **(VARIANTS[variant] if variant else {}))
     console().print(f"wrote {len(kept)} of {len(found)} masks to {out}", highlight=False, soft_wrap=True)
 
 
@@ -145,7 +145,7 @@ def make(
     """
     pixels = read_image(image)
     made = masks_of(pixels, masks=None, segmenter=segmenter, min_score=min_score, categories=categories)
-    made.save(out)
+    save(made, out)
     _show(made, pixels, picture)
     console().print(f"wrote {out}", highlight=False, soft_wrap=True)
 

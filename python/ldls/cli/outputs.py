@@ -11,6 +11,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from ldls.io import save
 from ldls.segmentation import Segmentation
 
 PictureOption = Annotated[
@@ -66,5 +67,5 @@ def write_outputs(
         if output is Output.PNG:
             save_picture(path, overlay(result, image))
         else:
-            result.save(path)
+            save(result, path)
     return list(paths.values())

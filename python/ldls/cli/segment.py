@@ -29,7 +29,7 @@ from ldls.cli.method_options import (
 )
 from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, PictureOption, write_outputs
 from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
-from ldls.io import read_image
+from ldls.io import read_image, save
 
 
 @speaks_plainly
@@ -106,7 +106,7 @@ def segment(
         categories=categories,
     )
     if save_masks is not None:
-        chosen.save(save_masks)
+        save(chosen, save_masks)
     result = segment_files(points, chosen, calib, camera=camera, params=params)
     name = points.stem.removesuffix(".pcd")
     written = write_outputs(out, name, result, pixels, formats or DEFAULT_OUTPUTS)

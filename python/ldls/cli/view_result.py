@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from ldls.cli.recording_options import record
 from ldls.errors import InputError
+from ldls.io import read_result
 
 
 def view_result(
     path: Path, images: Sequence[str], target: str | None, *, name: str, diffusion: int | None, picture: Path | None
 ) -> str:
     """Show a stored result; what to tell the user."""
-    from ldls.segmentation import Segmentation
     from ldls.view import camera_names
 
-    result = Segmentation.from_npz(path)
+    result = read_result(path)
     pictures = read_images(images, camera_names(result.views))
     said = []
     if picture is not None:

@@ -13,6 +13,7 @@ from ldls.cli.progress import progress
 from ldls.cli.recording_options import every_of
 from ldls.cli.source_options import parse_options
 from ldls.errors import InputError, LdlsError, ParameterError
+from ldls.io import read_result
 
 if TYPE_CHECKING:
     from ldls.batch import RunSettings
@@ -141,7 +142,6 @@ def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segm
 
 def _stored(source: Source, results: Path, index: int) -> tuple[Frame, Segmentation]:
     from ldls.batch.plan import file_name
-    from ldls.segmentation import Segmentation
 
     path = results / file_name(source.names[index], "npz")
-    return source[index], Segmentation.from_npz(path)
+    return source[index], read_result(path)

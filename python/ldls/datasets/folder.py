@@ -18,10 +18,9 @@ from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.truth import of_points
 from ldls.errors import CorruptFileError, ParameterError, SourceError
 from ldls.evaluation import Labeling, read_labeling
-from ldls.io import read_points
+from ldls.io import read_camera, read_masks, read_points
+from ldls.io.files import read_lines, strictly_below
 from ldls.io.images import read_image, read_image_size
-from ldls.io.safe_paths import strictly_below
-from ldls.io.text import read_lines
 from ldls.masks import InstanceMasks
 
 __all__ = ["FolderSource", "template"]
@@ -116,7 +115,7 @@ class FolderSource:
         missing = [camera for camera, each in self._cameras.items() if each.masks is None]
         if missing:
             raise SourceError(f'{self._file}: names no masks of {", ".join(missing)}; add masks = "..."')
-        return tuple(InstanceMasks.from_file(self._one(each.masks or "", name)) for each in self._cameras.values())
+        return tuple(read_masks(self._one(each.masks or "", name)) for each in self._cameras.values())
 
     def _image(self, camera: str, index: int) -> CameraImage:
         name = self.names[index]
@@ -130,7 +129,7 @@ class FolderSource:
         if each.inline is not None:
             return each.inline
         path = self._one(each.calibration or "", name)
-        return Camera.from_kitti(path, camera=each.number, image_size=each.image_size)
+        return read_camera(path, format="kitti", camera=each.number, image_size=each.image_size)
 
     def _read_truth(self, name: str, points: Points) -> Labeling | None:
         pattern = self._described.truth

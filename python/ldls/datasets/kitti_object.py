@@ -17,7 +17,7 @@ from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.kitti_cameras import camera_numbers, image_from_file
 from ldls.datasets.truth import of_points
 from ldls.evaluation import Labeling, label_by_boxes, read_annotations
-from ldls.io import read_points
+from ldls.io import read_camera, read_points
 from ldls.io.kitti_objects import read_kitti_objects
 
 SPLITS = ("training", "testing")
@@ -101,7 +101,7 @@ class KittiObjectSource:
         return image_from_file(
             f"image_{number}",
             self._images[number][name],
-            lambda size: Camera.from_kitti(calib, camera=number, image_size=size),
+            lambda size: read_camera(calib, format="kitti", camera=number, image_size=size),
         )
 
     def _read_truth(self, name: str, points: Points, camera: Camera) -> Labeling | None:

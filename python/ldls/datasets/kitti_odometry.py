@@ -11,7 +11,6 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets.files import IMAGE_SUFFIXES, POINT_SUFFIXES, choose, find_files, whole_frames
 from ldls.datasets.frame import CameraImage, Frame
@@ -19,8 +18,8 @@ from ldls.datasets.kitti_cameras import camera_numbers, image_from_file
 from ldls.datasets.truth import of_points
 from ldls.errors import CorruptFileError, SourceError
 from ldls.evaluation import Labeling, read_semantic_kitti
-from ldls.io import read_points
-from ldls.io.text import read_lines
+from ldls.io import read_camera, read_points
+from ldls.io.files import read_lines
 
 
 class KittiOdometrySource:
@@ -65,7 +64,7 @@ class KittiOdometrySource:
         self._images = {n: find_files(self.path / f"image_{n}", IMAGE_SUFFIXES) for n in numbers}
         images = {f"image_{n}": files for n, files in self._images.items()}
         frames = whole_frames(self.path, {"velodyne": self._points, **images})
-        self._cameras = {n: Camera.from_kitti(self.path / "calib.txt", camera=n) for n in numbers}
+        self._cameras = {n: read_camera(self.path / "calib.txt", format="kitti", camera=n) for n in numbers}
         self.names, self.left_out = frames.names, frames.left_out
         self.stamps = _stamps(self.path / "times.txt", self.names)
         self._truth = truth

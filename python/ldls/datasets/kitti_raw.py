@@ -13,16 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ldls.camera import Camera
 from ldls.datasets.files import IMAGE_SUFFIXES, POINT_SUFFIXES, check_folders, choose, find_files, whole_frames
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.kitti_cameras import camera_numbers
 from ldls.datasets.truth import of_points
 from ldls.errors import CorruptFileError, SourceError
 from ldls.evaluation import read_annotations
-from ldls.io import read_points
+from ldls.io import read_camera, read_points
+from ldls.io.files import read_lines
 from ldls.io.images import read_image
-from ldls.io.text import read_lines
 
 LIDAR = "velodyne_points"
 
@@ -69,7 +68,7 @@ class KittiRawSource:
         self.path = _drive(Path(path), drive)
         folders = {f"image_{n:02d}": n for n in camera_numbers(camera)}
         check_folders(self.path, [LIDAR, *folders])
-        self._cameras = {name: Camera.from_kitti_raw(self.path.parent, camera=n) for name, n in folders.items()}
+        self._cameras = {name: read_camera(self.path.parent, camera=n) for name, n in folders.items()}
         self._points = find_files(self.path / LIDAR / "data", POINT_SUFFIXES)
         self._images = {name: find_files(self.path / name / "data", IMAGE_SUFFIXES) for name in folders}
         frames = whole_frames(self.path, {LIDAR: self._points, **self._images})

@@ -26,8 +26,8 @@ from ldls.errors import CorruptFileError, LdlsError
 from ldls.evaluation import Labeling
 from ldls.evaluation.vocabularies import BACKGROUND
 from ldls.io import read_points
+from ldls.io.files import below
 from ldls.io.images import read_image, read_image_size
-from ldls.io.safe_paths import below
 
 FILE = "frame.json"
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.camera.rigid import from_parts, from_quaternion
 from ldls.datasets.files import choose, some
 from ldls.errors import CalibrationError, CorruptFileError, SourceError
-from ldls.io.cameras.rigid import from_parts, from_quaternion
 from ldls.io.json_rows import read_json_rows
 
 TABLES = ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
-from ldls.io.cameras.camera_info import MESSAGE_FIELDS
+from ldls.camera.camera_info import MESSAGE_FIELDS
 from ldls.io.ros.messages import InfoMessage
 
 ROTATION = ("R", "r")

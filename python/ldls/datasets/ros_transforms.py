@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.camera.rigid import from_parts, from_quaternion
 from ldls.errors import CalibrationError
-from ldls.io.cameras.rigid import from_parts, from_quaternion
 from ldls.io.ros.messages import RigidMessage, TransformsMessage, nanoseconds
 
 Matrix = NDArray[np.float64]

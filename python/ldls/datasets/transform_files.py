@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.errors import CalibrationError
-from ldls.io.text import read_lines
+from ldls.io.files import read_lines
 
 
 def read_transform(given: ArrayLike | str | PathLike[str]) -> NDArray[np.float64]:

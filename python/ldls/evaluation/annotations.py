@@ -13,8 +13,7 @@ import numpy as np
 from ldls.errors import CorruptFileError
 from ldls.evaluation.labeling import MAX_LABEL, Labeling
 from ldls.evaluation.vocabularies import BACKGROUND
-from ldls.io.text import read_lines
-from ldls.io.whole_file import whole_file
+from ldls.io.files import read_lines, whole_file
 
 DONT_CARE = "DontCare"
 

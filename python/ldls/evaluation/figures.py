@@ -12,7 +12,7 @@ from typing import Any
 from ldls._optional import require
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts
-from ldls.io.whole_file import whole_file
+from ldls.io.files import whole_file
 
 DPI = 150
 FONT_SIZE = 11

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.errors import InputError
-from ldls.io import read_points
+from ldls.io import read_camera, read_points
 from ldls.io.images import read_image_size
 
 POINT_ENDINGS = (".bin", ".pcd.bin", ".npy")
@@ -53,7 +53,7 @@ class FrameInputs:
         """
         if self.calib is None:
             raise InputError(f"frame {name}: needs its calibration; name the folder (--calib)")
-        camera = Camera.from_kitti(self.calib / f"{name}.txt")
+        camera = read_camera(self.calib / f"{name}.txt", format="kitti")
         return replace(camera, image_size=self._image_size(name))
 
     def _image_size(self, name: str) -> tuple[int, int] | None:

@@ -15,7 +15,7 @@ from ldls.errors import InputError
 from ldls.evaluation.annotations import read_annotations
 from ldls.evaluation.kitti_boxes import read_kitti_boxes
 from ldls.evaluation.labeling import Labeling
-from ldls.io import read_points
+from ldls.io import read_camera, read_masks, read_points
 from ldls.masks import InstanceMasks
 
 
@@ -63,8 +63,8 @@ class KittiFrames:
     def __getitem__(self, at: int) -> LabelledFrame:
         name = self.names[at]
         points = np.asarray(read_points(self.folder / "velodyne" / f"{name}.bin"), np.float32)
-        masks = InstanceMasks.from_coco(self.folder / "masks" / f"{name}.json")
-        camera = Camera.from_kitti(self.folder / "calib" / f"{name}.txt")
+        masks = read_masks(self.folder / "masks" / f"{name}.json")
+        camera = read_camera(self.folder / "calib" / f"{name}.txt", format="kitti")
         camera = replace(camera, image_size=masks.image_size)
         return LabelledFrame(name, points, masks, camera, self._read_truth(name, points, camera))
 

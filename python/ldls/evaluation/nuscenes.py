@@ -10,7 +10,7 @@ import numpy as np
 from ldls.errors import CorruptFileError, InputError
 from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.vocabularies import NUSCENES
-from ldls.io.npz import read_npz
+from ldls.io.arrays import read_npz
 from ldls.io.nuscenes_labels import INSTANCES_A_CLASS
 
 

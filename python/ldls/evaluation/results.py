@@ -1,4 +1,4 @@
-"""Labels in `.npz` files: what `Segmentation.save` writes, and plain arrays of anyone's own."""
+"""Labels in `.npz` files: what `ldls.save` writes, and plain arrays of anyone's own."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ldls.errors import CorruptFileError, InputError, UnsupportedFormatError
 from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.vocabularies import BACKGROUND
-from ldls.io.npz import read_npz, write_npz
+from ldls.io.arrays import read_npz, write_npz
 
 if TYPE_CHECKING:
     from ldls.segmentation import Segmentation

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ldls.errors import ParameterError
 from ldls.evaluation.evaluate import Evaluation
-from ldls.io.whole_file import whole_file
+from ldls.io.files import whole_file
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable

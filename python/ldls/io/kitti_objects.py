@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from ldls.errors import CorruptFileError, TruncatedFileError
-from ldls.io.text import read_lines
+from ldls.io.files import read_lines
 
 N_FIELDS = 15
 

@@ -6,20 +6,18 @@ from collections.abc import Collection
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import LimitError, UnsupportedFormatError
-from ldls.io.labeled_points import colors
+from ldls.io.labelled_points import colors
 from ldls.io.ros.bags import Topic, open_bag
 from ldls.io.ros.messages import POINTS, Header
 from ldls.io.ros.point_cloud2 import encode
 from ldls.io.ros.writer import BagWriter
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.segmentation import Segmentation
 
 HIGHEST_CLASS = 255
 TOPIC = "/points_labelled"

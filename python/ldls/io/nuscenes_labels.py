@@ -7,17 +7,14 @@ from __future__ import annotations
 
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import LimitError
-from ldls.io.npz import write_npz
-from ldls.io.whole_file import whole_file
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.io.arrays import write_npz
+from ldls.io.files import whole_file
+from ldls.segmentation import Segmentation
 
 INSTANCES_A_CLASS = 1000
 

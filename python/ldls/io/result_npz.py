@@ -4,64 +4,32 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.distortion import Distortion
-from ldls.errors import CorruptFileError, LdlsError, UnsupportedFormatError
-from ldls.io.cameras.found import FoundCamera
-from ldls.io.masks.npz import mask_arrays, records_of
-from ldls.io.masks.records import MaskRecords
-from ldls.io.npz import read_npz, write_npz
-
-if TYPE_CHECKING:
-    from ldls.camera import Camera
-    from ldls.segmentation import Segmentation, SegmentedObject
+from ldls.camera import Camera, Distortion
+from ldls.cloud import as_points
+from ldls.errors import CorruptFileError, InputError, LdlsError, UnsupportedFormatError
+from ldls.io.arrays import read_npz, write_npz
+from ldls.io.masks.npz import mask_arrays, masks_of
+from ldls.params import Params
+from ldls.segmentation import Instance, Report, Segmentation, SegmentedObject
+from ldls.view import SeenView, View
 
 Arrays = Mapping[str, NDArray[Any]]
 MASKS = "masks_"
 """How the names of the arrays begin that hold the masks of a view."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class StoredView:
-    """A view of a file, before it is checked as a whole; fields are those of `SeenView` and `View`."""
-
-    name: str
-    camera: FoundCamera
-    masks: MaskRecords
-    in_view: NDArray[np.int64]
-    pixels: NDArray[np.float64]
-    labels: NDArray[np.int32]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class StoredResult:
-    """A segmentation of a file, before it is checked as a whole; fields are those of `Segmentation` and `Instance`."""
-
-    labels: NDArray[np.int32]
-    diffused_labels: NDArray[np.int32]
-    confidence: NDArray[np.float32]
-    in_view: NDArray[np.int64]
-    points: NDArray[Any]
-    views: tuple[StoredView, ...]
-    categories: list[int]
-    names: list[str]
-    scores: list[float]
-    params: dict[str, Any]
-    report: dict[str, Any]
-    timings: dict[str, float]
-
-
 def write(path: str | PathLike[str], result: Segmentation) -> None:
     """Write the arrays of `result` under their names, its objects as `object_*`, the rest as JSON text.
 
     `view_names` has a name for each camera. With one, `pixels` belongs to `in_view`, `camera` is its calibration, and
-    `masks_size`, `masks_runs` and so on are what `InstanceMasks.save` writes; with several, `view0_in_view`,
+    `masks_size`, `masks_runs` and so on are those of a `.npz` of masks; with several, `view0_in_view`,
     `view0_pixels`, `view0_labels`, `view0_camera`, `view0_masks_size` and so on are those of each.
     `object_box` has a row for each object: x y z of the middle, length, width, height in metres, yaw in radians; NaN
     where the object has no point.
@@ -90,25 +58,25 @@ def write(path: str | PathLike[str], result: Segmentation) -> None:
     )
 
 
-def read(path: str | PathLike[str]) -> StoredResult:
-    """What `write` wrote.
+def read(path: str | PathLike[str]) -> Segmentation:
+    """The segmentation that `write` wrote.
 
     Raises:
         UnsupportedFormatError: It is not a result of ldls, or of a version that did not store the points.
-        CorruptFileError: It is not a whole `.npz` file, or something is missing from it.
+        CorruptFileError: It is not a whole `.npz` file, or its arrays do not fit one another.
         FileNotFoundError: There is no such file.
     """
     arrays = read_npz(path)
     if not {"labels", "diffused_labels", "object_name"} <= arrays.keys():
-        raise UnsupportedFormatError(f"{path}: found arrays {sorted(arrays)}, expected those of Segmentation.save")
+        raise UnsupportedFormatError(f"{path}: found arrays {sorted(arrays)}, expected those of ldls.save")
     if "points" not in arrays:
         raise UnsupportedFormatError(f"{path}: holds no points, as earlier versions wrote it; segment the frame again")
     try:
-        return _stored(str(path), arrays)
-    except LdlsError as error:
-        raise type(error)(f"{path}: {error}") from None
-    except (KeyError, ValueError, TypeError, IndexError) as error:
+        result = _result(arrays)
+        _check(result)
+    except (LdlsError, KeyError, ValueError, TypeError, IndexError) as error:
         raise CorruptFileError(f"{path}: not a whole result ({error})") from None
+    return result
 
 
 def _views(result: Segmentation) -> dict[str, NDArray[Any]]:
@@ -136,54 +104,88 @@ def _given(prefix: str, camera: Camera, masks: Arrays) -> dict[str, NDArray[Any]
     return {f"{prefix}camera": _json(parts), **{f"{prefix}{MASKS}{name}": array for name, array in masks.items()}}
 
 
-def _stored(place: str, arrays: Arrays) -> StoredResult:
-    return StoredResult(
+def _result(arrays: Arrays) -> Segmentation:
+    views = _read_views(arrays)
+    report = json.loads(str(arrays["report"]))
+    return Segmentation(
         labels=arrays["labels"],
         diffused_labels=arrays["diffused_labels"],
         confidence=arrays["confidence"],
         in_view=arrays["in_view"],
-        points=arrays["points"],
-        views=_stored_views(place, arrays),
-        categories=arrays["object_category"].tolist(),
-        names=arrays["object_name"].tolist(),
-        scores=arrays["object_score"].tolist(),
-        params=json.loads(str(arrays["params"])),
-        report=json.loads(str(arrays["report"])),
+        instances=_instances(arrays, views),
+        views=views,
+        report=Report(**report | {"empty_masks": tuple(report["empty_masks"])}),
         timings=json.loads(str(arrays["timings"])),
+        points=as_points(arrays["points"]),
+        params=Params(**json.loads(str(arrays["params"]))),
     )
 
 
-def _stored_views(place: str, arrays: Arrays) -> tuple[StoredView, ...]:
+def _instances(arrays: Arrays, views: tuple[SeenView, ...]) -> tuple[Instance, ...]:
+    names = arrays["object_name"].tolist()
+    sources: list[list[tuple[int, int]]] = [[] for _ in names]
+    for number, seen in enumerate(views):
+        for mask, label in enumerate(seen.labels.tolist()):
+            sources[label - 1].append((number, mask))
+    parts = zip(arrays["object_category"].tolist(), names, arrays["object_score"].tolist(), sources, strict=True)
+    return tuple(
+        Instance(label=label, category=category, name=name, score=score, sources=tuple(own))
+        for label, (category, name, score, own) in enumerate(parts, start=1)
+    )
+
+
+def _read_views(arrays: Arrays) -> tuple[SeenView, ...]:
     names = arrays["view_names"].tolist()
     if len(names) != 1:
-        return tuple(_stored_view(place, arrays, f"view{i}_", name) for i, name in enumerate(names))
+        return tuple(_read_view(arrays, f"view{i}_", name) for i, name in enumerate(names))
     every_mask = {"labels": np.arange(1, len(arrays["object_name"]) + 1, dtype=np.int32)}
-    return (_stored_view(place, {**arrays, **every_mask}, "", names[0]),)
+    return (_read_view({**arrays, **every_mask}, "", names[0]),)
 
 
-def _stored_view(place: str, arrays: Arrays, prefix: str, name: str) -> StoredView:
+def _read_view(arrays: Arrays, prefix: str, name: str) -> SeenView:
     start = prefix + MASKS
     masks = {name.removeprefix(start): array for name, array in arrays.items() if name.startswith(start)}
-    return StoredView(
-        name=name,
-        camera=_camera(place, json.loads(str(arrays[f"{prefix}camera"]))),
-        masks=records_of(place, masks),
+    return SeenView(
+        view=View(masks_of(masks), _camera(json.loads(str(arrays[f"{prefix}camera"]))), name),
         in_view=arrays[f"{prefix}in_view"],
         pixels=arrays[f"{prefix}pixels"],
         labels=arrays[f"{prefix}labels"],
     )
 
 
-def _camera(place: str, parts: dict[str, Any]) -> FoundCamera:
+def _camera(parts: dict[str, Any]) -> Camera:
     size = parts["image_size"]
-    return FoundCamera(
-        place=place,
+    return Camera(
         projection=np.array(parts["projection"]),
         T_camera_lidar=np.array(parts["T_camera_lidar"]),
         distortion=Distortion(**parts["distortion"]),
         image_size=None if size is None else (int(size[0]), int(size[1])),
         min_depth_m=float(parts["min_depth_m"]),
     )
+
+
+def _check(result: Segmentation) -> None:
+    """Refuse arrays that do not fit one another.
+
+    Raises:
+        InputError: They do not.
+    """
+    n, most = len(result.points), len(result.instances)
+    _expect("labels", result.labels, np.int32, (n,), -1, most)
+    _expect("diffused_labels", result.diffused_labels, np.int32, (n,), -1, most)
+    _expect("confidence", result.confidence, np.float32, (n,), 0, 1)
+    _expect("in_view", result.in_view, np.int64, (len(result.in_view),), 0, n - 1)
+    for seen in result.views:
+        _expect("in_view of a view", seen.in_view, np.int64, (len(seen.in_view),), 0, n - 1)
+        _expect("pixels", seen.pixels, np.float64, (len(seen.in_view), 2), -np.inf, np.inf)
+        _expect("labels of a view", seen.labels, np.int32, (len(seen.view.masks),), 1, most)
+
+
+def _expect(name: str, array: NDArray[Any], kind: type, shape: tuple[int, ...], low: float, high: float) -> None:
+    if array.dtype != kind or array.shape != shape:
+        raise InputError(f"{name}: expected {shape} {np.dtype(kind)}, got {array.shape} {array.dtype}")
+    if array.size and not (array.min() >= low and array.max() <= high):
+        raise InputError(f"{name}: expected {low} to {high}, got {array.min()} to {array.max()}")
 
 
 def _json(parts: Mapping[str, Any]) -> NDArray[np.str_]:

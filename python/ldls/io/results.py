@@ -1,17 +1,19 @@
-"""Segmentations to files: the ending of the name chooses the format."""
+"""Segmentations and masks to files: the ending of the name chooses the format."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from ldls.errors import UnsupportedFormatError
-from ldls.io import csv, las, nuscenes_labels, parquet, pcd, ply, result_npz, semantic_kitti
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.errors import InputError, UnsupportedFormatError
+from ldls.io import nuscenes_labels, result_npz, semantic_kitti, tables
+from ldls.io.masks.formats import write_masks
+from ldls.io.options import check_options
+from ldls.io.points import las, pcd, ply
+from ldls.masks import InstanceMasks
+from ldls.segmentation import Segmentation
 
 WRITERS: dict[str, Callable[[Path, Segmentation], None]] = {
     ".npz": result_npz.write,
@@ -22,21 +24,55 @@ WRITERS: dict[str, Callable[[Path, Segmentation], None]] = {
     ".pcd": pcd.write,
     ".las": las.write,
     ".laz": las.write,
-    ".parquet": parquet.write,
-    ".csv": csv.write,
+    ".parquet": tables.write_parquet,
+    ".csv": tables.write_csv,
 }
 """What writes a segmentation, by the ending of the name."""
 
 
-def write(path: str | PathLike[str], result: Segmentation) -> None:
-    """Write `result` in the format of the longest ending that the name of `path` has.
+def read_result(path: str | PathLike[str]) -> Segmentation:
+    """The whole result that `save` wrote to an `.npz` file.
+
+    Raises:
+        UnsupportedFormatError: It is no such file, or one of a version that did not store the points.
+        CorruptFileError: It is not whole, or its arrays do not fit one another.
+        FileNotFoundError: There is no such file.
+    """
+    return result_npz.read(path)
+
+
+def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
+    """Write a result or instance masks; the ending of the name chooses the format.
+
+    Of a result, `.npz` has everything, `.label` is SemanticKITTI's, `_lidarseg.bin` and `_panoptic.npz` are nuScenes'.
+    `.ply`, `.pcd`, `.las` and `.laz` are point clouds with labels, confidence and colour; `.parquet` and `.csv` tables
+    with a row a point. docs/formats.md says what is in each. Of masks, `.json` is COCO's, `.png` has instance numbers
+    (for masks that do not overlap), `.npz` run lengths and `.npy` pixels only. The file appears only when it is whole.
+
+    Args:
+        thing: What `ldls.segment` returns, or instance masks.
+        path: The file.
+        options: Of masks: `image_id`, `file_name` and `results` of `.json`, `layout` of `.npz`, `pixels_only` of
+            `.npy`.
 
     Raises:
         UnsupportedFormatError: No format has this ending.
+        LimitError: The format cannot hold so many instances, so wide a cloud or so large a category id.
+        NonFiniteError: The format cannot hold points that are not finite.
+        MaskError: The format cannot keep these masks.
+        ParameterError: The format has no such option.
+        InputError: It is neither a result nor masks.
+        ImportError: The format needs an extra that is not installed; the message names it.
     """
     path = Path(path)
-    found = [ending for ending in WRITERS if path.name.lower().endswith(ending)]
-    if not found:
-        known = ", ".join(WRITERS)
-        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} files, expected {known}")
-    WRITERS[max(found, key=len)](path, result)
+    if isinstance(thing, InstanceMasks):
+        write_masks(path, thing, **options)
+        return
+    if not isinstance(thing, Segmentation):
+        raise InputError(f"save: expected a Segmentation or InstanceMasks, got {type(thing).__name__}")
+    endings = [ending for ending in WRITERS if path.name.lower().endswith(ending)]
+    if not endings:
+        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} files, expected {', '.join(WRITERS)}")
+    writer = WRITERS[max(endings, key=len)]
+    check_options(f"{path.suffix} results ({path})", writer, options)
+    writer(path, thing)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ldls.io.whole_file import whole_file
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.io.files import whole_file
+from ldls.segmentation import Segmentation
 
 OTHER_OBJECT = 99
 CLASSES = {1: 30, 2: 11, 3: 10, 4: 15, 6: 13, 7: 16, 8: 18, 13: 81, 64: 70}

@@ -10,23 +10,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls import _ldls
 from ldls.errors import MaskError, ParameterError
-from ldls.io.masks.records import MaskRecords
 
 
-def read(
+def arguments(
     image: ArrayLike,
     *,
-    source: str = "instance image",
     categories: ArrayLike | None = None,
     scores: ArrayLike | None = None,
     names: Mapping[int, str] | None = None,
     class_divisor: int | None = None,
-) -> MaskRecords:
-    """The instances of an image of instance numbers, in ascending order of their numbers.
+) -> dict[str, Any]:
+    """Arguments of `InstanceMasks` from an image of instance numbers, in ascending order of the numbers.
 
     Args:
         image: (H, W) whole numbers, 0 where there is no instance.
-        source: Where it comes from, for messages.
         categories: One for all, or one for each number found; without them all are category 1, "object".
         scores: As `categories`; all 1 without them.
         names: Name of each category id.
@@ -49,9 +46,8 @@ def read(
         categories = [category for category, instance in pairs if instance]
         names = {category: f"class {category}" for category in categories} | dict(names or {})
     height, width = np.shape(image)
-    return MaskRecords(
-        source=source, size=(height, width), rles=rles, categories=categories, scores=scores, names=names
-    )
+    size = (height, width)
+    return {"rles": rles, "image_size": size, "categories": categories, "scores": scores, "names": names}
 
 
 def split(image: ArrayLike) -> tuple[NDArray[Any], list[_ldls.Rle]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from os import PathLike
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -11,17 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls import _ldls
 from ldls.categories import COCO_NAMES, find_categories
-from ldls.errors import LimitError, MaskError, ParameterError
-from ldls.io.masks import coco, formats, npz
-from ldls.io.masks.numpy_stack import instances_first
-from ldls.io.masks.records import MaskRecords
-from ldls.masks import instance_image
-from ldls.masks.adapters import sam, supervision, torchvision, ultralytics
-from ldls.masks.adapters.arrays import to_numpy
-from ldls.masks.image_size import checked_size
+from ldls.errors import MaskError, ParameterError, within
+from ldls.masks import adapters, coco, instance_image
 from ldls.masks.instance_mask import InstanceMask
-from ldls.masks.pixels import encode
-from ldls.masks.rectangles import rectangles
+from ldls.masks.pixels import checked_size, encode, rectangles
 
 MAX_RADIUS = 10_000
 """Farthest that masks grow or shrink, in pixels."""
@@ -48,7 +40,7 @@ class InstanceMasks:
         scores: ArrayLike | None = None,
         names: Mapping[int, str] | None = None,
     ) -> None:
-        """Masks from run lengths; the `from_...` methods make them from files, arrays and other programs."""
+        """Masks from run lengths; `from_...` make them from arrays and other programs, `ldls.read_masks` from files."""
         height, width = checked_size(image_size)
         self.core = _ldls.Masks(height, width, list(rles))
         if categories is None:
@@ -84,7 +76,7 @@ class InstanceMasks:
             MaskError: Masks of different sizes, values that are no mask, an unknown category or a bad score.
         """
         if instance_axis != 0:
-            masks = instances_first(np.asarray(masks), instance_axis)
+            masks = np.moveaxis(np.asarray(masks), _checked_axis(instance_axis), 0)
         rles = [encode(i, mask) for i, mask in enumerate(masks)]  # type: ignore[arg-type]
         if image_size is None:
             image_size = _image_size(masks, rles)
@@ -93,87 +85,29 @@ class InstanceMasks:
     @classmethod
     def from_coco(
         cls,
-        source: str | PathLike[str] | Mapping[str, Any] | Sequence[Mapping[str, Any]],
+        content: Mapping[str, Any] | Sequence[Mapping[str, Any]],
         *,
         image_id: int | str | None = None,
         image_size: tuple[int, int] | None = None,
         names: Mapping[int, str] | None = None,
     ) -> Self:
-        """Masks from COCO JSON: a file, its parsed content, or a bare list of results.
+        """Masks from parsed COCO JSON: a data set, or a bare list of results.
 
         Polygons and both kinds of RLE are understood; polygons cover the pixels that the COCO tools give them.
 
         Args:
-            source: File or parsed JSON.
+            content: The parsed JSON; `ldls.read_masks` reads files.
             image_id: Which image, where there are several.
-            image_size: (height, width) in pixels, where the source does not say.
-            names: Name of each category id, where the source does not say; COCO's own list without them.
+            image_size: (height, width) in pixels, where the content does not say.
+            names: Name of each category id, where the content does not say; COCO's own list without them.
 
         Raises:
             MaskError: An annotation that cannot be used, by its id: runs that do not sum to height * width, another
                 size than the image, an unknown category, a bad score.
-            CorruptFileError: The file is not JSON.
-            FileNotFoundError: There is no such file.
+            CorruptFileError: It is not COCO's.
         """
-        return cls.of_records(coco.read(source, image_id=image_id, image_size=image_size, names=names))
-
-    @classmethod
-    def from_npz(cls, path: str | PathLike[str]) -> Self:
-        """Masks that `save` wrote, or those of the LDLS research code (Matterport class order).
-
-        Raises:
-            UnsupportedFormatError: The arrays are of neither kind.
-            MaskError: The arrays do not fit one another.
-            FileNotFoundError: There is no such file.
-        """
-        return cls.of_records(npz.read(path))
-
-    @classmethod
-    def from_file(
-        cls,
-        path: str | PathLike[str],
-        *,
-        image_id: int | str | None = None,
-        image_size: tuple[int, int] | None = None,
-        instance_axis: int | None = None,
-        class_divisor: int | None = None,
-        categories: ArrayLike | None = None,
-        scores: ArrayLike | None = None,
-        names: Mapping[int, str] | None = None,
-    ) -> Self:
-        """Masks of a file; its suffix tells the format.
-
-        Args:
-            path: `.json` (COCO), `.png` (instance numbers), `.npz` (see `from_npz`), `.npy` (stack of masks) or `.txt`
-                (KITTI label_2, whose boxes become masks).
-            image_id: Which image of a `.json` with several.
-            image_size: (height, width) in pixels; `.txt` needs it, and others must agree with it.
-            instance_axis: Axis of a `.npy` that counts the masks, 0 or -1, where sizes do not tell.
-            class_divisor: For a `.png` whose numbers hold the class as well; 256 for KITTI's. See
-                `from_instance_image`.
-            categories: Category ids for a `.png` or `.npy`, which are all 1, "object", without them.
-            scores: Scores for a `.png` or `.npy`, which are all 1 without them.
-            names: Name of each category id, for all but `.npz`, where the file does not say.
-
-        Raises:
-            MaskError: Masks that cannot be used, or of another size than the image.
-            UnsupportedFormatError: No format has this suffix, or this variant is not supported.
-            ParameterError: The format has no such option.
-            FileFormatError: The file is broken.
-            LimitError: The file is too large.
-            FileNotFoundError: There is no such file.
-        """
-        records = formats.read(
-            path,
-            image_size=image_size,
-            image_id=image_id,
-            instance_axis=instance_axis,
-            class_divisor=class_divisor,
-            categories=categories,
-            scores=scores,
-            names=names,
-        )
-        return cls.of_records(records)
+        with within("masks"):
+            return cls(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
 
     @classmethod
     def from_instance_image(
@@ -185,11 +119,11 @@ class InstanceMasks:
         names: Mapping[int, str] | None = None,
         class_divisor: int | None = None,
     ) -> Self:
-        """Masks from (H, W) whole numbers, in ascending order of the numbers; see `instance_image.read`."""
-        records = instance_image.read(
+        """Masks from (H, W) whole numbers, in ascending order of the numbers; see `instance_image.arguments`."""
+        arguments = instance_image.arguments(
             image, categories=categories, scores=scores, names=names, class_divisor=class_divisor
         )
-        return cls.of_records(records)
+        return cls._named("instance image", arguments)
 
     @classmethod
     def from_boxes(
@@ -208,15 +142,15 @@ class InstanceMasks:
         Raises:
             MaskError: A box that is none, an unknown category or a bad score.
         """
-        rles = rectangles(to_numpy(boxes), image_size)
+        rles = rectangles(adapters.to_numpy(boxes), image_size)
         return cls(rles, image_size, categories=categories, scores=scores, names=names)
 
     @classmethod
     def from_torchvision(
         cls, output: Mapping[str, Any], *, threshold: float = 0.5, names: Mapping[int, str] | None = None
     ) -> Self:
-        """Masks from what a torchvision network returns for one image; see `adapters.torchvision.read`."""
-        return cls.of_records(torchvision.read(output, threshold=threshold, names=names))
+        """Masks from what a torchvision network returns for one image; see `adapters.from_torchvision`."""
+        return cls._named("torchvision output", adapters.from_torchvision(output, threshold=threshold, names=names))
 
     @classmethod
     def from_supervision(
@@ -226,13 +160,13 @@ class InstanceMasks:
         names: Mapping[int, str] | None = None,
         image_size: tuple[int, int] | None = None,
     ) -> Self:
-        """Masks from `supervision.Detections`; see `adapters.supervision.read`."""
-        return cls.of_records(supervision.read(detections, names=names, image_size=image_size))
+        """Masks from `supervision.Detections`; see `adapters.from_supervision`."""
+        return cls._named("detections", adapters.from_supervision(detections, names=names, image_size=image_size))
 
     @classmethod
     def from_ultralytics(cls, result: Any) -> Self:  # noqa: ANN401
-        """Masks from Ultralytics' `Results` of one image; see `adapters.ultralytics.read`."""
-        return cls.of_records(ultralytics.read(result))
+        """Masks from Ultralytics' `Results` of one image; see `adapters.from_ultralytics`."""
+        return cls._named("result", adapters.from_ultralytics(result))
 
     @classmethod
     def from_sam(
@@ -243,24 +177,9 @@ class InstanceMasks:
         names: Mapping[int, str] | None = None,
         image_size: tuple[int, int] | None = None,
     ) -> Self:
-        """Masks from the list that a mask generator of Segment Anything returns; see `adapters.sam.read`."""
-        return cls.of_records(sam.read(records, categories=categories, names=names, image_size=image_size))
-
-    def save(self, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
-        """Write a file that `from_file` reads; the suffix chooses the format.
-
-        Args:
-            path: `.json` (COCO), `.png` (instance numbers, for masks that do not overlap), `.npz` (run lengths) or
-                `.npy` (pixels only).
-            options: `image_id`, `file_name` and `results` of `.json`, `layout` of `.npz`, and `pixels_only` of `.npy`;
-                see the `write` of `ldls.io.masks.coco`, `npz` and `numpy_stack`.
-
-        Raises:
-            MaskError: The format cannot keep these masks.
-            UnsupportedFormatError: No format has this suffix.
-            ParameterError: The format has no such option.
-        """
-        formats.write(path, self, **options)
+        """Masks from the list that a mask generator of Segment Anything returns; see `adapters.from_sam`."""
+        arguments = adapters.from_sam(records, categories=categories, names=names, image_size=image_size)
+        return cls._named("records", arguments)
 
     @property
     def height(self) -> int:
@@ -307,7 +226,15 @@ class InstanceMasks:
 
     def to_coco(self, *, image_id: int = 1, file_name: str | None = None) -> dict[str, Any]:
         """COCO's data set of this one image, with compressed run lengths; its `annotations` are results as well."""
-        return coco.data_set(self, image_id, file_name)
+        image: dict[str, Any] = {"id": image_id, "height": self.height, "width": self.width}
+        if file_name is not None:
+            image["file_name"] = file_name
+        results = coco.results(self, self.image_size, image_id)
+        return {
+            "images": [image],
+            "categories": [{"id": category, "name": name} for category, name in self.names.items()],
+            "annotations": [{"id": i, "iscrowd": 0, **result} for i, result in enumerate(results, start=1)],
+        }
 
     def select(self, indices: ArrayLike) -> Self:
         """The masks at `indices`, whole numbers or one bool a mask, in that order."""
@@ -387,22 +314,10 @@ class InstanceMasks:
         )
 
     @classmethod
-    def of_records(cls, records: MaskRecords) -> Self:
-        """Masks of what a reader found.
-
-        Raises:
-            LimitError, MaskError: They cannot be masks; the message begins with the file.
-        """
-        try:
-            return cls(
-                records.rles,
-                records.size,
-                categories=records.categories,
-                scores=records.scores,
-                names=records.names,
-            )
-        except (LimitError, MaskError) as error:
-            raise type(error)(f"{records.source}: {error}") from None
+    def _named(cls, source: str, arguments: Mapping[str, Any]) -> Self:
+        """Masks from arguments of which errors name the source."""
+        with within(source):
+            return cls(**arguments)
 
     def _check(self) -> None:
         for i, (category, score) in enumerate(zip(self.categories, self.scores, strict=True)):
@@ -443,6 +358,12 @@ def _per_mask(name: str, values: ArrayLike, count: int, dtype: type) -> NDArray[
     array = array.astype(dtype)
     array.flags.writeable = False
     return array
+
+
+def _checked_axis(instance_axis: int) -> int:
+    if instance_axis not in (0, -1):
+        raise ParameterError(f"instance_axis: got {instance_axis!r}, expected 0 or -1")
+    return instance_axis
 
 
 def _as_index(indices: ArrayLike) -> NDArray[Any]:

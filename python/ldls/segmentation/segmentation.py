@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls import _ldls
-from ldls.camera import Camera
-from ldls.cloud import Points, as_points
-from ldls.errors import CorruptFileError, InputError, LdlsError
-from ldls.io import result_npz, results
+from ldls.cloud import Points
+from ldls.errors import InputError
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation.objects import SegmentedObject
 from ldls.segmentation.oriented_box import fit_upright_box
 from ldls.segmentation.report import Report
-from ldls.view import SeenView, View
+from ldls.view import SeenView
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,50 +71,6 @@ class Segmentation:
 
     # what notebooks show; the package gives it
     _repr_html_: ClassVar[Callable[[Segmentation], str]]
-
-    @classmethod
-    def from_npz(cls, path: str | PathLike[str]) -> Self:
-        """The segmentation that `save` wrote to an `.npz` file.
-
-        Raises:
-            UnsupportedFormatError: It is no such file, or one of a version that did not store the points.
-            CorruptFileError: It is not whole, or its arrays do not fit one another.
-            FileNotFoundError: There is no such file.
-        """
-        stored = result_npz.read(path)
-        try:
-            result = cls(
-                labels=stored.labels,
-                diffused_labels=stored.diffused_labels,
-                confidence=stored.confidence,
-                in_view=stored.in_view,
-                instances=_stored_instances(stored),
-                views=tuple(_stored_view(view) for view in stored.views),
-                report=Report(**stored.report | {"empty_masks": tuple(stored.report["empty_masks"])}),
-                timings=stored.timings,
-                points=as_points(stored.points),
-                params=Params(**stored.params),
-            )
-            result._check()
-        except (LdlsError, KeyError, TypeError, ValueError) as error:
-            raise CorruptFileError(f"{path}: not a whole result ({error})") from None
-        return result
-
-    def _check(self) -> None:
-        """Refuse arrays that do not fit one another; only a file can have such.
-
-        Raises:
-            InputError: They do not.
-        """
-        n, most = len(self.points), len(self.instances)
-        _expect("labels", self.labels, np.int32, (n,), -1, most)
-        _expect("diffused_labels", self.diffused_labels, np.int32, (n,), -1, most)
-        _expect("confidence", self.confidence, np.float32, (n,), 0, 1)
-        _expect("in_view", self.in_view, np.int64, (len(self.in_view),), 0, n - 1)
-        for seen in self.views:
-            _expect("in_view of a view", seen.in_view, np.int64, (len(seen.in_view),), 0, n - 1)
-            _expect("pixels", seen.pixels, np.float64, (len(seen.in_view), 2), -np.inf, np.inf)
-            _expect("labels of a view", seen.labels, np.int32, (len(seen.view.masks),), 1, most)
 
     @property
     def masks(self) -> InstanceMasks:
@@ -191,48 +144,9 @@ class Segmentation:
             box=fit_upright_box(xyz) if len(rows) else None,
         )
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the labels; the ending of the name chooses the format.
-
-        `.npz` has all fields, `.label` is SemanticKITTI's, `_lidarseg.bin` and `_panoptic.npz` are nuScenes'. `.ply`,
-        `.pcd`, `.las` and `.laz` are point clouds with labels, confidence and colour; `.parquet` and `.csv` tables with
-        a row a point. docs/formats.md says what is in each. The file appears only when it is whole.
-
-        Raises:
-            UnsupportedFormatError: No format has this ending.
-            LimitError: The format cannot hold so many instances, so wide a cloud or so large a category id.
-            NonFiniteError: The format cannot hold points that are not finite.
-            ImportError: The format needs an extra that is not installed; the message names it.
-        """
-        results.write(path, self)
-
     def __repr__(self) -> str:
         found = sum(o.n_points > 0 for o in self.objects)
         return (
             f"Segmentation({len(self.labels)} points, {len(self.in_view)} in view, "
             f"{found} of {len(self.instances)} objects found)"
         )
-
-
-def _stored_view(stored: result_npz.StoredView) -> SeenView:
-    view = View(InstanceMasks.of_records(stored.masks), Camera.of_found(stored.camera), stored.name)
-    return SeenView(view=view, in_view=stored.in_view, pixels=stored.pixels, labels=stored.labels)
-
-
-def _stored_instances(stored: result_npz.StoredResult) -> tuple[Instance, ...]:
-    sources: list[list[tuple[int, int]]] = [[] for _ in stored.names]
-    for number, view in enumerate(stored.views):
-        for mask, label in enumerate(view.labels.tolist()):
-            sources[label - 1].append((number, mask))
-    parts = zip(stored.categories, stored.names, stored.scores, sources, strict=True)
-    return tuple(
-        Instance(label=label, category=category, name=name, score=score, sources=tuple(own))
-        for label, (category, name, score, own) in enumerate(parts, start=1)
-    )
-
-
-def _expect(name: str, array: NDArray[Any], kind: type, shape: tuple[int, ...], low: float, high: float) -> None:
-    if array.dtype != kind or array.shape != shape:
-        raise InputError(f"{name}: expected {shape} {np.dtype(kind)}, got {array.shape} {array.dtype}")
-    if array.size and not (array.min() >= low and array.max() <= high):
-        raise InputError(f"{name}: expected {low} to {high}, got {array.min()} to {array.max()}")

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.camera import Camera
-from ldls.io.whole_file import whole_file
+from ldls.io.files import whole_file
 from ldls.masks import InstanceMasks
 from ldls.simulation.boxes import annotation_name, label_rows
 from ldls.simulation.frame import SceneFrame, View

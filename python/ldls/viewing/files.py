@@ -8,7 +8,7 @@ from pathlib import Path
 from PIL import Image
 
 from ldls.errors import UnsupportedFormatError
-from ldls.io.whole_file import whole_file
+from ldls.io.files import whole_file
 from ldls.segmentation import Segmentation
 from ldls.viewing.birds_eye import birds_eye_view
 from ldls.viewing.comparison import comparison

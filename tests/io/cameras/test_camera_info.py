@@ -109,8 +109,10 @@ def test_yaml_of_a_message(tmp_path):
     pytest.importorskip("yaml", reason="the extra yaml is not installed")
     path = tmp_path / "info.yaml"
     path.write_text(f"height: 480\nwidth: 640\ndistortion_model: plumb_bob\nD: {D}\nK: {K}\nP: {P}\n")
-    assert ldls.Camera.from_camera_info(path, TO_CAMERA).projection[:, :3].ravel().tolist() == K
-    camera = ldls.Camera.from_camera_info(path, TO_CAMERA, rectified=True)
+    assert (
+        ldls.read_camera(path, format="camera-info", T_camera_lidar=TO_CAMERA).projection[:, :3].ravel().tolist() == K
+    )
+    camera = ldls.read_camera(path, format="camera-info", T_camera_lidar=TO_CAMERA, rectified=True)
     np.testing.assert_array_equal(camera.T_camera_lidar, TO_CAMERA)
 
 

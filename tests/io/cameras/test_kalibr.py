@@ -51,12 +51,12 @@ def write(tmp_path):
 
 
 def test_the_camera_of_a_chain(write):
-    camera = ldls.Camera.from_kalibr(write(CHAIN), T_camera_lidar=TO_IMU)
+    camera = ldls.read_camera(write(CHAIN), T_camera_lidar=TO_IMU)
     assert camera.projection[:, :3].tolist() == [[458.6, 0, 367.2], [0, 457.3, 248.4], [0, 0, 1]]
     assert camera.distortion == ldls.Distortion("plumb_bob", (-0.28, 0.07, 0.001, -0.0008))
     assert camera.image_size == (480, 752)
     np.testing.assert_array_equal(camera.T_camera_lidar, TO_IMU)
-    other = ldls.Camera.from_kalibr(write(CHAIN), camera="cam1", T_camera_lidar=np.eye(4))
+    other = ldls.read_camera(write(CHAIN), camera="cam1", T_camera_lidar=np.eye(4))
     assert other.distortion == ldls.Distortion("equidistant", (0.01, 0.02, 0.03, 0.04))
 
 
@@ -73,13 +73,13 @@ def test_the_camera_of_a_chain(write):
     ],
 )
 def test_ways_to_the_lidar(write, text, camera, options, expected):
-    found = ldls.Camera.from_kalibr(write(text), camera=camera, **options)
+    found = ldls.read_camera(write(text), camera=camera, **options)
     np.testing.assert_allclose(found.T_camera_lidar, expected, rtol=0, atol=1e-12)
 
 
 def test_no_distortion(write):
     text = CHAIN.replace("radtan", "none").replace("  distortion_coeffs: [-0.28, 0.07, 0.001, -0.0008]\n", "")
-    assert ldls.Camera.from_kalibr(write(text), T_camera_lidar=np.eye(4)).distortion.is_none
+    assert ldls.read_camera(write(text), T_camera_lidar=np.eye(4)).distortion.is_none
 
 
 @pytest.mark.parametrize(
@@ -119,4 +119,4 @@ def test_no_distortion(write):
 )
 def test_faults_are_named(write, text, options, message):
     with pytest.raises(ldls.CalibrationError, match=message):
-        ldls.Camera.from_kalibr(write(text), **{"T_camera_lidar": np.eye(4)} | options)
+        ldls.read_camera(write(text), **{"T_camera_lidar": np.eye(4)} | options)

@@ -25,13 +25,13 @@ def write(tmp_path):
 
 
 def test_a_camera_of_a_day(write):
-    camera = ldls.Camera.from_kitti_raw(write())
+    camera = ldls.read_camera(write())
     assert camera.projection.tolist() == [[100, 0, 50, 4], [0, 100, 40, -1], [0, 0, 1, 0.01]]
     np.testing.assert_array_equal(
         camera.T_camera_lidar, [[0, -1, 0, 0.1], [0, 0, -1, -0.2], [1, 0, 0, -0.3], [0, 0, 0, 1]]
     )
     assert camera.image_size == (375, 1242)
-    first = ldls.Camera.from_kitti_raw(write(), camera=0)
+    first = ldls.read_camera(write(), camera=0)
     assert first.projection[0, 3] == 0
     assert first.image_size is None
 
@@ -45,13 +45,13 @@ def test_it_is_the_camera_of_the_object_file(write, data_folder):
     def text(values):
         return " ".join(map(repr, values.ravel().tolist()))
 
-    raw = ldls.Camera.from_kitti_raw(
+    raw = ldls.read_camera(
         write(
             f"R: {text(transform[:, :3])}\nT: {text(transform[:, 3])}\n",
             f"R_rect_00: {lines['R0_rect']}\nP_rect_02: {lines['P2']}\n",
         )
     )
-    camera = ldls.Camera.from_kitti(path)
+    camera = ldls.read_camera(path)
     np.testing.assert_array_equal(raw.projection, camera.projection)
     np.testing.assert_array_equal(raw.T_camera_lidar, camera.T_camera_lidar)
 
@@ -74,11 +74,11 @@ def test_it_is_the_camera_of_the_object_file(write, data_folder):
 )
 def test_faults_are_named(write, lidar, cameras, message):
     with pytest.raises(ldls.CalibrationError, match=message):
-        ldls.Camera.from_kitti_raw(write(lidar, cameras))
+        ldls.read_camera(write(lidar, cameras))
 
 
 def test_cameras_and_files_that_are_not_there(write, tmp_path):
     with pytest.raises(ldls.ParameterError, match="camera: got 4, expected 0 to 3"):
-        ldls.Camera.from_kitti_raw(write(), camera=4)
+        ldls.read_camera(write(), camera=4)
     with pytest.raises(FileNotFoundError):
-        ldls.Camera.from_kitti_raw(tmp_path / "none")
+        ldls.read_camera(tmp_path / "none")

@@ -65,7 +65,7 @@ def write(tmp_path):
     ],
 )
 def test_spellings_of_a_camera(write, text):
-    camera = ldls.Camera.from_opencv(write(text), T_camera_lidar=TURNED)
+    camera = ldls.read_camera(write(text), format="opencv", T_camera_lidar=TURNED)
     np.testing.assert_array_equal(camera.projection[:, :3], K)
     np.testing.assert_array_equal(camera.T_camera_lidar, TURNED)
     assert camera.distortion == ldls.Distortion("plumb_bob", tuple(D))
@@ -79,7 +79,7 @@ def test_what_opencv_writes(tmp_path):
     storage.write("camera_matrix", np.array(K))
     storage.write("distortion_coefficients", np.array([*D, 0.1, 0.2, 1e-9])[:, None])
     storage.release()
-    camera = ldls.Camera.from_opencv(path, TURNED)
+    camera = ldls.read_camera(path, format="opencv", T_camera_lidar=TURNED)
     np.testing.assert_array_equal(camera.projection[:, :3], K)
     assert camera.distortion == ldls.Distortion("rational_polynomial", (*D, 0.1, 0.2, 1e-9))
     assert camera.image_size is None
@@ -97,7 +97,7 @@ def test_what_opencv_writes(tmp_path):
     ],
 )
 def test_models_of_distortion(write, entries, options, model):
-    camera = ldls.Camera.from_opencv(write(f"K: {K}\n{entries}\n"), np.eye(4), **options)
+    camera = ldls.read_camera(write(f"K: {K}\n{entries}\n"), format="opencv", T_camera_lidar=np.eye(4), **options)
     assert camera.distortion.model == model
 
 
@@ -140,27 +140,27 @@ def test_models_of_distortion(write, entries, options, model):
 )
 def test_faults_are_named_with_their_file(write, text, message):
     with pytest.raises(ldls.CalibrationError, match=f"camera.yaml.*({message})"):
-        ldls.Camera.from_opencv(write(text), np.eye(4))
+        ldls.read_camera(write(text), format="opencv", T_camera_lidar=np.eye(4))
 
 
 def test_files_that_are_no_yaml(tmp_path, monkeypatch):
     path = tmp_path / "camera.xml"
     path.write_text('<?xml version="1.0"?><opencv_storage/>')
     with pytest.raises(ldls.UnsupportedFormatError, match="got XML, expected YAML"):
-        ldls.Camera.from_opencv(path, np.eye(4))
+        ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ldls.CalibrationError, match="not a text file"):
-        ldls.Camera.from_opencv(path, np.eye(4))
+        ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     path.write_bytes(b"#" * (1 << 22) + b"\n")
     with pytest.raises(ldls.LimitError, match="4194305 bytes"):
-        ldls.Camera.from_opencv(path, np.eye(4))
+        ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     with pytest.raises(ldls.FileFormatError, match="got a folder"):
-        ldls.Camera.from_opencv(tmp_path, np.eye(4))
+        ldls.read_camera(tmp_path, format="opencv", T_camera_lidar=np.eye(4))
     with pytest.raises(FileNotFoundError):
-        ldls.Camera.from_opencv(tmp_path / "none.yaml", np.eye(4))
+        ldls.read_camera(tmp_path / "none.yaml", format="opencv", T_camera_lidar=np.eye(4))
     monkeypatch.setitem(sys.modules, "yaml", None)
     with pytest.raises(ImportError, match=r"ldls\[yaml\]"):
-        ldls.Camera.from_opencv(path, np.eye(4))
+        ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
 
 
 @pytest.mark.parametrize(
@@ -174,4 +174,4 @@ def test_files_that_are_no_yaml(tmp_path, monkeypatch):
 )
 def test_transforms_that_are_none(write, transform, message):
     with pytest.raises(ldls.CalibrationError, match=message):
-        ldls.Camera.from_opencv(write(ROS), transform)
+        ldls.read_camera(write(ROS), format="opencv", T_camera_lidar=transform)

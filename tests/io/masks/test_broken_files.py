@@ -19,11 +19,11 @@ def write_numbers(path, masks):
 
 
 WRITERS = {
-    "masks.json": lambda path, masks: masks.save(path),
-    "masks.png": lambda path, masks: masks.save(path),
+    "masks.json": lambda path, masks: ldls.save(masks, path),
+    "masks.png": lambda path, masks: ldls.save(masks, path),
     "numbers.png": write_numbers,
-    "masks.npz": lambda path, masks: masks.save(path),
-    "masks.npy": lambda path, masks: masks.save(path, pixels_only=True),
+    "masks.npz": lambda path, masks: ldls.save(masks, path),
+    "masks.npy": lambda path, masks: ldls.save(masks, path, pixels_only=True),
     "boxes.txt": lambda path, masks: path.write_text(LINES),
 }
 WITH_CHECKSUMS = {"masks.png", "numbers.png", "masks.npz"}
@@ -50,12 +50,12 @@ def test_changed_bytes_are_named_errors(tmp_path, name):
     masks = random_masks(3).resolve_overlaps()
     path = tmp_path / name
     WRITERS[name](path, masks)
-    whole, intact = path.read_bytes(), ldls.InstanceMasks.from_file(path, image_size=masks.image_size)
+    whole, intact = path.read_bytes(), ldls.read_masks(path, image_size=masks.image_size)
     generator = random.Random(name)
     for _ in range(400):
         path.write_bytes(mutated(whole, generator))
         try:
-            found = ldls.InstanceMasks.from_file(path, image_size=masks.image_size)
+            found = ldls.read_masks(path, image_size=masks.image_size)
         except ldls.LdlsError as error:
             assert name in str(error)
         else:

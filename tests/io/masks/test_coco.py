@@ -22,7 +22,7 @@ def document(**parts):
 
 def test_the_coco_tools_read_what_is_written(tmp_path, capsys):
     masks = random_masks(1)
-    masks.save(tmp_path / "masks.json", image_id=7, file_name="000007.png")
+    ldls.save(masks, tmp_path / "masks.json", image_id=7, file_name="000007.png")
     coco = COCO(tmp_path / "masks.json")
     assert coco.imgs[7] == {"id": 7, "height": masks.height, "width": masks.width, "file_name": "000007.png"}
     assert {category["id"]: category["name"] for category in coco.cats.values()} == NAMES
@@ -37,15 +37,15 @@ def test_the_coco_tools_read_what_is_written(tmp_path, capsys):
 
 def test_the_coco_tools_read_bare_results(tmp_path, capsys):
     masks = random_masks(2)
-    masks.save(tmp_path / "masks.json")
-    masks.save(tmp_path / "results.json", results=True)
+    ldls.save(masks, tmp_path / "masks.json")
+    ldls.save(masks, tmp_path / "results.json", results=True)
     found = COCO(tmp_path / "masks.json").loadRes(str(tmp_path / "results.json"))
     assert [a["score"] for a in found.dataset["annotations"]] == masks.scores.tolist()
 
 
 def test_the_document_of_masks_is_the_content_of_their_file(tmp_path):
     masks = random_masks(4)
-    masks.save(tmp_path / "masks.json", file_name="a.png")
+    ldls.save(masks, tmp_path / "masks.json", file_name="a.png")
     assert json.loads((tmp_path / "masks.json").read_text()) == masks.to_coco(file_name="a.png")
     assert_same(ldls.InstanceMasks.from_coco(masks.to_coco()), masks)
 
@@ -131,7 +131,7 @@ def test_json_that_cannot_be_parsed_is_corrupt(tmp_path, text):
     path = tmp_path / "masks.json"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(ldls.CorruptFileError, match=r"masks\.json: not valid JSON"):
-        ldls.InstanceMasks.from_coco(path)
+        ldls.read_masks(path)
 
 
 def test_a_file_of_two_gigabytes_is_refused(tmp_path):
@@ -139,7 +139,7 @@ def test_a_file_of_two_gigabytes_is_refused(tmp_path):
     with path.open("wb") as file:
         file.truncate(2 << 30)
     with pytest.raises(ldls.LimitError, match=r"masks\.json: over 1073741824 bytes; split it by image"):
-        ldls.InstanceMasks.from_coco(path)
+        ldls.read_masks(path)
 
 
 def test_polygons_of_an_image_of_another_size_are_refused(tmp_path):
@@ -150,6 +150,6 @@ def test_polygons_of_an_image_of_another_size_are_refused(tmp_path):
         "annotations": [{"id": 1, "image_id": 1, "category_id": 3, "segmentation": triangle}],
     }
     (tmp_path / "masks.json").write_text(json.dumps(document))
-    assert len(ldls.InstanceMasks.from_file(tmp_path / "masks.json", image_size=(20, 30))) == 1
+    assert len(ldls.read_masks(tmp_path / "masks.json", image_size=(20, 30))) == 1
     with pytest.raises(ldls.MaskError, match=r"masks of \(20, 30\).*the image is \(30, 20\); swapped"):
-        ldls.InstanceMasks.from_file(tmp_path / "masks.json", image_size=(30, 20))
+        ldls.read_masks(tmp_path / "masks.json", image_size=(30, 20))

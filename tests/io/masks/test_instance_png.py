@@ -13,7 +13,7 @@ NUMBERS = np.array([[0, 7, 7, 0], [3, 3, 7, 0], [0, 0, 0, 200]], np.uint8)
 
 
 def read(path, **options):
-    return ldls.InstanceMasks.from_file(path, **options)
+    return ldls.read_masks(path, **options)
 
 
 def rows(values):
@@ -186,13 +186,13 @@ def test_a_large_image_within_the_limit_warns_of_nothing(tmp_path):
 def test_overlaps_are_refused_with_the_mend(tmp_path):
     masks = random_masks(5)
     with pytest.raises(ldls.MaskError, match=r"masks \d and \d share pixel \(\d+, \d+\).*resolve_overlaps"):
-        masks.save(tmp_path / "masks.png")
+        ldls.save(masks, tmp_path / "masks.png")
     assert list(tmp_path.iterdir()) == []
-    masks.resolve_overlaps().save(tmp_path / "masks.png")
+    ldls.save(masks.resolve_overlaps(), tmp_path / "masks.png")
 
 
 def test_what_the_file_says_is_not_said_again(tmp_path):
-    random_masks(5).resolve_overlaps().save(tmp_path / "masks.png")
+    ldls.save(random_masks(5).resolve_overlaps(), tmp_path / "masks.png")
     with pytest.raises(ldls.ParameterError, match=r"categories: .*masks\.png holds its own"):
         read(tmp_path / "masks.png", categories=[1])
 
@@ -202,7 +202,7 @@ def test_bits_are_chosen_by_the_number_of_instances(tmp_path, count, mode):
     pixels = np.eye(4, dtype=bool)
     last, empty = (ldls.InstanceMasks.from_array([p])[0].rle for p in (pixels, ~pixels & pixels))
     masks = ldls.InstanceMasks([empty] * (count - 1) + [last], (4, 4))
-    masks.save(tmp_path / "masks.png")
+    ldls.save(masks, tmp_path / "masks.png")
     with Image.open(tmp_path / "masks.png") as image:
         assert image.mode == mode
         np.testing.assert_array_equal(np.asarray(image), count * pixels)

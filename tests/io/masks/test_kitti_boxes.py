@@ -13,7 +13,7 @@ Van 0.00 0 1.85 0 0 900 900 {REST}
 
 def boxes(tmp_path, text=LINES, **options):
     (tmp_path / "000007.txt").write_text(text)
-    return ldls.InstanceMasks.from_file(tmp_path / "000007.txt", **options)
+    return ldls.read_masks(tmp_path / "000007.txt", **options)
 
 
 def test_boxes_become_rectangles(tmp_path):

@@ -27,7 +27,7 @@ def saved(tmp_path, array):
     ],
 )
 def test_a_stack_becomes_masks(tmp_path, array, options):
-    masks = ldls.InstanceMasks.from_file(saved(tmp_path, array), **options)
+    masks = ldls.read_masks(saved(tmp_path, array), **options)
     np.testing.assert_array_equal(masks.to_array(), PIXELS)
     assert masks[0].name == "object"
 
@@ -40,9 +40,7 @@ def test_arrays_say_which_axis_counts():
 
 def test_categories_and_scores_can_be_given(tmp_path):
     path = saved(tmp_path, PIXELS)
-    masks = ldls.InstanceMasks.from_file(
-        path, categories=[1, 3, 101], scores=[0, 0.5, 1], names={1: "a", 3: "b", 101: "c"}
-    )
+    masks = ldls.read_masks(path, categories=[1, 3, 101], scores=[0, 0.5, 1], names={1: "a", 3: "b", 101: "c"})
     assert [(mask.name, mask.score) for mask in masks] == [("a", 0.0), ("b", 0.5), ("c", 1.0)]
 
 
@@ -74,7 +72,7 @@ def test_categories_and_scores_can_be_given(tmp_path):
 )
 def test_faults_of_stacks_are_named(tmp_path, array, options, error, message):
     with pytest.raises(error, match=message) as caught:
-        ldls.InstanceMasks.from_file(saved(tmp_path, array), **options)
+        ldls.read_masks(saved(tmp_path, array), **options)
     assert "masks.npy" in str(caught.value) or error is ldls.ParameterError
 
 
@@ -89,7 +87,7 @@ def test_faults_of_stacks_are_named(tmp_path, array, options, error, message):
 def test_files_that_are_no_arrays_are_corrupt(tmp_path, content, error):
     (tmp_path / "masks.npy").write_bytes(content)
     with pytest.raises(error, match=r"masks\.npy: not a whole \.npy file"):
-        ldls.InstanceMasks.from_file(tmp_path / "masks.npy")
+        ldls.read_masks(tmp_path / "masks.npy")
 
 
 def test_a_cut_stack_is_truncated(tmp_path):
@@ -98,13 +96,13 @@ def test_a_cut_stack_is_truncated(tmp_path):
     with pytest.raises(
         ldls.TruncatedFileError, match=r"masks\.npy: shape \(3, 11, 17\) of bool needs 689 bytes, got 688"
     ):
-        ldls.InstanceMasks.from_file(path)
+        ldls.read_masks(path)
 
 
 def test_what_would_be_lost_is_refused(tmp_path):
     masks = random_masks(1)
     with pytest.raises(ldls.MaskError, match=r"keep pixels only; save as .*pixels_only=True"):
-        masks.save(tmp_path / "masks.npy")
-    masks.save(tmp_path / "masks.npy", pixels_only=True)
+        ldls.save(masks, tmp_path / "masks.npy")
+    ldls.save(masks, tmp_path / "masks.npy", pixels_only=True)
     np.testing.assert_array_equal(np.load(tmp_path / "masks.npy"), masks.to_array())
-    assert_same(ldls.InstanceMasks.from_file(tmp_path / "masks.npy"), plain(masks))
+    assert_same(ldls.read_masks(tmp_path / "masks.npy"), plain(masks))

@@ -37,8 +37,8 @@ KINDS = {
 
 def through(kind, masks, folder):
     path = folder / kind.name
-    masks.save(path, **kind.save)
-    return ldls.InstanceMasks.from_file(path, image_size=masks.image_size, **kind.read(masks))
+    ldls.save(masks, path, **kind.save)
+    return ldls.read_masks(path, image_size=masks.image_size, **kind.read(masks))
 
 
 @pytest.mark.parametrize(("first", "second"), list(product(KINDS, KINDS)))

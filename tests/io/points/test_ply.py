@@ -73,7 +73,7 @@ def test_doubles_stay_doubles_and_intensity_may_miss(tmp_path):
 
 def test_a_file_of_results_reads_back(small_scene, tmp_path):
     points, masks, camera = small_scene
-    ldls.segment(points, masks, camera).save(tmp_path / "a.ply")
+    ldls.save(ldls.segment(points, masks, camera), tmp_path / "a.ply")
     np.testing.assert_array_equal(ldls.read_points(tmp_path / "a.ply"), points)
 
 

@@ -5,40 +5,38 @@ Source: https://github.com/ethz-asl/kalibr/wiki/yaml-formats.
 
 from __future__ import annotations
 
-from os import PathLike
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.errors import CalibrationError
-from ldls.io.cameras.fields import Fields
-from ldls.io.cameras.found import FoundCamera
-from ldls.io.cameras.rigid import rigid
-from ldls.io.cameras.yaml_file import read_yaml
+from ldls.camera import Camera
+from ldls.camera.fields import Fields
+from ldls.camera.rigid import rigid
+from ldls.errors import CalibrationError, within
 
 LIDAR = ("T_cam_lidar", "T_camera_lidar")
 IMU = ("T_cam_imu",)
 PREVIOUS = "T_cn_cnm1"
 
 
-def read(
-    path: str | PathLike[str],
-    camera: str,
-    T_camera_lidar: NDArray[np.float64] | None,
-    T_imu_lidar: NDArray[np.float64] | None,
-) -> FoundCamera:
-    """The camera `camera`, with the raw image's distortion.
+def camera_of(
+    chain: Fields,
+    *,
+    camera: str = "cam0",
+    T_camera_lidar: NDArray[np.float64] | None = None,
+    T_imu_lidar: NDArray[np.float64] | None = None,
+) -> Camera:
+    """Camera of the raw image; a pinhole with radtan, equidistant or no distortion.
 
     Args:
-        path: The file.
+        chain: The file's entries.
         camera: Key of the camera.
-        T_camera_lidar: (4, 4) from lidar to camera coordinates; None for what the file says.
-        T_imu_lidar: (4, 4) from lidar to IMU coordinates, for a file that has the IMU's place alone.
+        T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates; without it the file must have
+            T_cam_lidar at this camera or at one before it in the chain (T_cn_cnm1).
+        T_imu_lidar: (4, 4) rigid transform from lidar to IMU coordinates, to go by the file's T_cam_imu instead.
 
     Raises:
-        CalibrationError: It is not YAML, a key is missing, the model is not a pinhole, or nothing leads to the lidar.
+        CalibrationError: A key is missing, the camera is no pinhole, or nothing leads to the lidar.
     """
-    chain = read_yaml(path)
     fields = chain.section(camera)
     model = fields.get("camera_model")
     if model != "pinhole":
@@ -47,13 +45,16 @@ def read(
     distortion_model = str(fields.get("distortion_model"))
     coefficients = np.zeros(0) if distortion_model == "none" else fields.numbers("distortion_coeffs")
     width, height = (_side(fields, side) for side in fields.matrix((2,), "resolution"))
-    return FoundCamera(
-        place=fields.place,
-        projection=np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]),
-        T_camera_lidar=_from_lidar(chain, camera, T_imu_lidar) if T_camera_lidar is None else T_camera_lidar,
-        distortion=fields.distortion(distortion_model, coefficients),
-        image_size=(height, width),
-    )
+    if T_camera_lidar is None:
+        T_camera_lidar = _from_lidar(chain, camera, T_imu_lidar)
+    distortion = fields.distortion(distortion_model, coefficients)
+    with within(fields.place):
+        return Camera(
+            projection=np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]),
+            T_camera_lidar=T_camera_lidar,
+            distortion=distortion,
+            image_size=(height, width),
+        )
 
 
 def _side(fields: Fields, pixels: float) -> int:

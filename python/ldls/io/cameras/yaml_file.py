@@ -7,9 +7,9 @@ from os import PathLike
 from typing import Any
 
 from ldls._optional import require
+from ldls.camera.fields import Fields
 from ldls.errors import CalibrationError, LimitError, UnsupportedFormatError
-from ldls.io.cameras.fields import Fields
-from ldls.io.regular_file import regular_file
+from ldls.io.files import regular_file
 
 MAX_BYTES = 1 << 22
 OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"

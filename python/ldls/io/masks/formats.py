@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from inspect import signature
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from ldls.errors import MaskError, ParameterError, UnsupportedFormatError
-from ldls.io.masks import coco, instance_png, kitti_boxes, npz, numpy_stack
-from ldls.io.masks.records import MaskRecords
-from ldls.masks.image_size import checked_size
+from numpy.typing import ArrayLike
 
-if TYPE_CHECKING:
-    from ldls.masks import InstanceMasks
+from ldls.errors import MaskError, UnsupportedFormatError
+from ldls.io.masks import coco_json, instance_png, kitti_boxes, npz, numpy_stack
+from ldls.io.options import check_options
+from ldls.masks import InstanceMasks
+from ldls.masks.pixels import checked_size
 
-READERS: dict[str, Callable[..., MaskRecords]] = {
-    ".json": coco.read,
+READERS: dict[str, Callable[..., InstanceMasks]] = {
+    ".json": coco_json.read,
     ".png": instance_png.read,
     ".npz": npz.read,
     ".npy": numpy_stack.read,
@@ -25,7 +24,7 @@ READERS: dict[str, Callable[..., MaskRecords]] = {
 }
 
 WRITERS: dict[str, Callable[..., None]] = {
-    ".json": coco.write,
+    ".json": coco_json.write,
     ".png": instance_png.write,
     ".npz": npz.write,
     ".npy": numpy_stack.write,
@@ -34,47 +33,62 @@ WRITERS: dict[str, Callable[..., None]] = {
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
-def read(
+def read_masks(
     path: str | PathLike[str],
     *,
     image_size: tuple[int, int] | None = None,
-    **options: Any,  # noqa: ANN401
-) -> MaskRecords:
-    """The instances of a file in the format of its suffix.
+    image_id: int | str | None = None,
+    instance_axis: int | None = None,
+    class_divisor: int | None = None,
+    categories: ArrayLike | None = None,
+    scores: ArrayLike | None = None,
+    names: Mapping[int, str] | None = None,
+) -> InstanceMasks:
+    """Instance masks of a file; its suffix tells the format.
 
     Args:
-        path: File of one of `READERS`.
-        image_size: (height, width) of the image in pixels; the file must agree, where it says.
-        options: Those of the format's reader; None stands for its default.
+        path: `.json` (COCO), `.png` (instance numbers), `.npz` (of ldls, or of the LDLS research code), `.npy` (stack
+            of masks) or `.txt` (KITTI label_2, whose boxes become masks).
+        image_size: (height, width) in pixels; `.txt` needs it, and others must agree with it.
+        image_id: Which image of a `.json` with several.
+        instance_axis: Axis of a `.npy` that counts the masks, 0 or -1, where sizes do not tell.
+        class_divisor: For a `.png` whose numbers hold the class as well: 256 for KITTI's, 1000 for Cityscapes'.
+        categories: Category ids for a `.png` or `.npy`, which are all 1, "object", without them.
+        scores: Scores for a `.png` or `.npy`, which are all 1 without them.
+        names: Name of each category id, for all but `.npz`, where the file does not say.
 
     Raises:
-        UnsupportedFormatError: No format has this suffix.
+        MaskError: Masks that cannot be used, or of another size than the image.
+        UnsupportedFormatError: No format has this suffix, or this variant is not supported.
         ParameterError: The format has no such option.
-        MaskError: The file's image is of another size, or its masks cannot be used.
         FileFormatError: The file is broken.
+        LimitError: The file is too large.
         FileNotFoundError: There is no such file.
     """
     path = Path(path)
     reader = _of_suffix(path, READERS, "read")
-    given = {name: value for name, value in options.items() if value is not None}
-    known = _check_options(path, reader, given)
+    options = {
+        "image_id": image_id,
+        "instance_axis": instance_axis,
+        "class_divisor": class_divisor,
+        "categories": categories,
+        "scores": scores,
+        "names": names,
+    }
+    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    known = check_options(f"{path.suffix} masks ({path})", reader, given)
     if image_size is None:
         return reader(path, **given)
     size = checked_size(image_size)
-    records = reader(path, **given, **({"image_size": size} if "image_size" in known else {}))
-    if size != records.size:
-        hint = "; swapped?" if size == records.size[::-1] else ""
-        raise MaskError(f"{path}: masks of {records.size} (height, width), the image is {size}{hint}")
-    return records
+    masks = reader(path, **given, **({"image_size": size} if "image_size" in known else {}))
+    if size != masks.image_size:
+        hint = "; swapped?" if size == masks.image_size[::-1] else ""
+        raise MaskError(f"{path}: masks of {masks.image_size} (height, width), the image is {size}{hint}")
+    return masks
 
 
-def write(path: str | PathLike[str], masks: InstanceMasks, **options: Any) -> None:  # noqa: ANN401
-    """Write `masks` in the format of the suffix of `path`.
-
-    Args:
-        path: File of one of `WRITERS`.
-        masks: Masks.
-        options: Those of the format's writer.
+def write_masks(path: str | PathLike[str], masks: InstanceMasks, **options: Any) -> None:  # noqa: ANN401
+    """Write `masks` in the format of the suffix of `path`; options are those of the format's writer.
 
     Raises:
         UnsupportedFormatError: No format has this suffix.
@@ -83,7 +97,7 @@ def write(path: str | PathLike[str], masks: InstanceMasks, **options: Any) -> No
     """
     path = Path(path)
     writer = _of_suffix(path, WRITERS, "write")
-    _check_options(path, writer, options)
+    check_options(f"{path.suffix} masks ({path})", writer, options)
     writer(path, masks, **options)
 
 
@@ -92,14 +106,3 @@ def _of_suffix(path: Path, known: Mapping[str, _Function], verb: str) -> _Functi
     if function is None:
         raise UnsupportedFormatError(f"{path}: cannot {verb} {path.suffix!r} masks, expected {', '.join(known)}")
     return function
-
-
-def _check_options(path: Path, function: Callable[..., object], options: Mapping[str, object]) -> list[str]:
-    """The options of `function`, which `options` are among."""
-    parameters = signature(function).parameters.values()
-    known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
-    for option in options:
-        if option not in known:
-            expected = f"expected {', '.join(known)}" if known else "they have none"
-            raise ParameterError(f"{option}: no option of {path.suffix} masks ({path}); {expected}")
-    return known

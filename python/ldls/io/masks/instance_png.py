@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,14 +18,17 @@ from PIL import Image
 from PIL.PngImagePlugin import PngImageFile, PngInfo
 
 from ldls import _ldls
-from ldls.errors import CorruptFileError, FileFormatError, LimitError, ParameterError, UnsupportedFormatError
-from ldls.io.masks.records import MaskRecords
-from ldls.io.regular_file import regular_file
-from ldls.io.whole_file import whole_file
-from ldls.masks import instance_image
-
-if TYPE_CHECKING:
-    from ldls.masks import InstanceMasks
+from ldls.errors import (
+    CorruptFileError,
+    FileFormatError,
+    LdlsError,
+    LimitError,
+    ParameterError,
+    UnsupportedFormatError,
+    within,
+)
+from ldls.io.files import regular_file, whole_file
+from ldls.masks import InstanceMasks, instance_image
 
 CHUNK = "ldls:instances"
 """Keyword of the text chunk."""
@@ -44,12 +47,12 @@ def read(
     scores: ArrayLike | None = None,
     names: Mapping[int, str] | None = None,
     class_divisor: int | None = None,
-) -> MaskRecords:
+) -> InstanceMasks:
     """The instances of a PNG of 8 or 16 bits; of a palette image the indices count, not the colours.
 
     Args:
         path: Image file.
-        categories: As in `instance_image.read`, for files without our chunk.
+        categories: As in `instance_image.arguments`, for files without our chunk.
         scores: As `categories`.
         names: As `categories`.
         class_divisor: As `categories`; 256 for KITTI's files.
@@ -64,14 +67,16 @@ def read(
     values, texts = _open(path)
     given = {"categories": categories, "scores": scores, "names": names, "class_divisor": class_divisor}
     if CHUNK not in texts:
-        return instance_image.read(values, source=str(path), **given)  # type: ignore[arg-type]
+        with within(path):
+            return InstanceMasks(**instance_image.arguments(values, **given))  # type: ignore[arg-type]
     idle = [name for name, value in given.items() if value is not None]
     if idle:
         raise ParameterError(f"{idle[0]}: {path} holds its own; leave it out")
     try:
-        return _from_chunk(str(path), values, json.loads(texts[CHUNK]))
+        with within(path):
+            return _from_chunk(values, json.loads(texts[CHUNK]))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        if isinstance(error, FileFormatError):
+        if isinstance(error, LdlsError):
             raise
         raise CorruptFileError(f"{path}: text chunk {CHUNK} cannot be used ({error})") from None
 
@@ -123,20 +128,19 @@ def _check_kind(path: Path, image: PngImageFile) -> None:
         )
 
 
-def _from_chunk(source: str, values: NDArray[Any], content: dict[str, Any]) -> MaskRecords:
+def _from_chunk(values: NDArray[Any], content: dict[str, Any]) -> InstanceMasks:
     if content["version"] != VERSION:
-        raise UnsupportedFormatError(f"{source}: version {content['version']}, this ldls reads {VERSION}; update ldls")
+        raise UnsupportedFormatError(f"version {content['version']}, this ldls reads {VERSION}; update ldls")
     height, width = values.shape
     numbers, found = instance_image.split(values)
     count = len(content["categories"])
     if numbers.size and numbers[-1] > count:
-        raise CorruptFileError(f"{source}: value {numbers[-1]}, but text chunk {CHUNK} describes {count} instances")
+        raise CorruptFileError(f"value {numbers[-1]}, but text chunk {CHUNK} describes {count} instances")
     empty = _ldls.Rle.from_runs(height, width, np.array([height * width], np.uint32))
     rles = dict(zip(numbers.tolist(), found, strict=True))
-    return MaskRecords(
-        source=source,
-        size=(height, width),
-        rles=[rles.get(m + 1, empty) for m in range(count)],
+    return InstanceMasks(
+        [rles.get(m + 1, empty) for m in range(count)],
+        (height, width),
         categories=np.array(content["categories"], np.int64),
         scores=np.array(content["scores"], np.float32),
         names={int(category): str(name) for category, name in content["names"].items()},

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from os import PathLike
 
 from ldls.categories import COCO_NAMES
-from ldls.errors import MaskError
+from ldls.errors import MaskError, within
 from ldls.io.kitti_objects import KittiObject, read_kitti_objects
-from ldls.io.masks.records import MaskRecords
-from ldls.masks.rectangles import rectangles
+from ldls.masks import InstanceMasks
 
 KITTI_CATEGORIES: dict[str, int] = {
     "Pedestrian": 1, "Person_sitting": 1, "Car": 3, "Tram": 7, "Truck": 8, "Van": 101, "Cyclist": 102, "Misc": 103,
@@ -62,7 +61,7 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
 
 def read(
     path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
-) -> MaskRecords:
+) -> InstanceMasks:
     """One rectangle for each object of a label_2 file, as `read_boxes` finds them.
 
     Args:
@@ -76,18 +75,15 @@ def read(
     """
     if image_size is None:
         raise MaskError(f"{path}: says nothing of the image's size; pass image_size=(height, width)")
-    try:
-        found = read_boxes(path, names=names)
-        return MaskRecords(
-            source=str(path),
-            size=image_size,
-            rles=rectangles(found.boxes, image_size),
-            categories=found.categories,
-            scores=found.scores,
-            names=found.names,
+    with within(path):
+        objects = read_boxes(path, names=names)
+        return InstanceMasks.from_boxes(
+            objects.boxes,
+            image_size,
+            categories=objects.categories,
+            scores=objects.scores,
+            names=objects.names,
         )
-    except MaskError as error:
-        raise MaskError(f"{path}: {error}") from None
 
 
 def _category(index: int, found: KittiObject, ids: Mapping[str, int]) -> int:

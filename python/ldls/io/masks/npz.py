@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, Literal
+from os import PathLike
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls import _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
-from ldls.errors import LimitError, MaskError, ParameterError, UnsupportedFormatError
-from ldls.io.masks.records import MaskRecords
-from ldls.io.npz import read_npz, write_npz
-from ldls.masks.image_size import checked_size
-from ldls.masks.pixels import encode
-
-if TYPE_CHECKING:
-    from ldls.masks import InstanceMasks
-
+from ldls.errors import LdlsError, MaskError, ParameterError, UnsupportedFormatError, within
+from ldls.io.arrays import read_npz, write_npz
+from ldls.masks import InstanceMasks
+from ldls.masks.pixels import checked_size, encode
 
 OWN_ARRAYS = {"size", "runs", "run_counts", "categories", "scores", "category_ids", "category_names"}
 """What files of this package hold."""
 
 
-def read(path: str | PathLike[str]) -> MaskRecords:
+def read(path: str | PathLike[str]) -> InstanceMasks:
     """The masks of a file of either kind.
 
     Raises:
@@ -33,19 +28,20 @@ def read(path: str | PathLike[str]) -> MaskRecords:
         FileFormatError: It is not a whole `.npz` file, or holds Python objects.
     """
     arrays = read_npz(path)
-    try:
-        if arrays.keys() >= OWN_ARRAYS:
-            return records_of(fspath(path), arrays)
-        if arrays.keys() >= {"masks", "class_ids", "scores"}:
-            return _from_research_code(fspath(path), arrays)
-    except LimitError as error:
-        raise LimitError(f"{path}: {error}") from None
-    except (MaskError, IndexError, ValueError, TypeError) as error:
-        raise MaskError(f"{path}: {error}") from None
-    raise UnsupportedFormatError(
-        f"{path}: found arrays {sorted(arrays)}, expected those of InstanceMasks.save, "
-        "or masks, class_ids and scores of the LDLS research code"
-    )
+    with within(path):
+        try:
+            if arrays.keys() >= OWN_ARRAYS:
+                return masks_of(arrays)
+            if arrays.keys() >= {"masks", "class_ids", "scores"}:
+                return _of_research_code(arrays)
+        except (IndexError, ValueError, TypeError) as error:
+            if isinstance(error, LdlsError):
+                raise
+            raise MaskError(str(error)) from None
+        raise UnsupportedFormatError(
+            f"found arrays {sorted(arrays)}, expected those of ldls.save, "
+            "or masks, class_ids and scores of the LDLS research code"
+        )
 
 
 def write(path: str | PathLike[str], masks: InstanceMasks, *, layout: Literal["runs", "research"] = "runs") -> None:
@@ -80,7 +76,7 @@ def mask_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
     }
 
 
-def records_of(source: str, arrays: dict[str, NDArray[Any]]) -> MaskRecords:
+def masks_of(arrays: dict[str, NDArray[Any]]) -> InstanceMasks:
     """The masks of arrays that `mask_arrays` made.
 
     Raises:
@@ -99,10 +95,9 @@ def records_of(source: str, arrays: dict[str, NDArray[Any]]) -> MaskRecords:
         raise MaskError(f"run_counts sum to {ends[-1]}, runs holds {runs.size}")
     split = np.split(runs, ends[:-1]) if ends.size else []
     names = zip(arrays["category_ids"].tolist(), arrays["category_names"].tolist(), strict=True)
-    return MaskRecords(
-        source=source,
-        size=(height, width),
-        rles=[_ldls.Rle.from_runs(height, width, np.ascontiguousarray(runs)) for runs in split],
+    return InstanceMasks(
+        [_ldls.Rle.from_runs(height, width, np.ascontiguousarray(runs)) for runs in split],
+        (height, width),
         categories=arrays["categories"],
         scores=arrays["scores"],
         names={int(category): str(name) for category, name in names},
@@ -131,17 +126,16 @@ def _research_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
     }
 
 
-def _from_research_code(source: str, arrays: dict[str, NDArray[Any]]) -> MaskRecords:
+def _of_research_code(arrays: dict[str, NDArray[Any]]) -> InstanceMasks:
     masks, classes = arrays["masks"], arrays["class_ids"]
     if masks.ndim != 3 or classes.shape != masks.shape[2:]:
         raise MaskError(f"masks: expected (height, width, {classes.size}), got {masks.shape}; one mask a class id")
     wrong = ~((classes >= 1) & (classes <= len(CONTIGUOUS_IDS)))
     if wrong.any():
         raise MaskError(f"class_ids: {classes[wrong][0]} at {wrong.argmax()}, expected 1 to 80")
-    return MaskRecords(
-        source=source,
-        size=checked_size(masks.shape[:2]),
-        rles=[encode(m, masks[:, :, m]) for m in range(classes.size)],
+    return InstanceMasks(
+        [encode(m, masks[:, :, m]) for m in range(classes.size)],
+        checked_size(masks.shape[:2]),
         categories=np.array(CONTIGUOUS_IDS, np.int32)[classes - 1],
         scores=arrays["scores"],
         names=COCO_NAMES,

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any
+from os import PathLike
+from typing import Any
 
-import numpy as np
 from numpy.lib.format import write_array_header_1_0
 from numpy.typing import ArrayLike, NDArray
 
-from ldls.errors import MaskError, ParameterError
-from ldls.io.masks.records import MaskRecords
-from ldls.io.npy import read_npy
-from ldls.io.whole_file import whole_file
-from ldls.masks.pixels import encode
-
-if TYPE_CHECKING:
-    from ldls.masks import InstanceMasks
+from ldls.errors import MaskError, within
+from ldls.io.arrays import read_npy
+from ldls.io.files import whole_file
+from ldls.masks import InstanceMasks
 
 
 def read(
@@ -28,7 +23,7 @@ def read(
     categories: ArrayLike | None = None,
     scores: ArrayLike | None = None,
     names: Mapping[int, str] | None = None,
-) -> MaskRecords:
+) -> InstanceMasks:
     """The masks of an array of (M, H, W) or (H, W, M).
 
     Args:
@@ -50,16 +45,17 @@ def read(
             f"{path}: expected (M, height, width) or (height, width, M), got shape {stack.shape}; "
             "InstanceMasks.from_instance_image takes an image of instance numbers"
         )
-    axis = _instance_axis(fspath(path), stack, image_size) if instance_axis is None else instance_axis
-    masks = instances_first(stack, axis)
-    height, width = masks.shape[1:]
-    try:
-        rles = [encode(i, mask) for i, mask in enumerate(masks)]
-    except MaskError as error:
-        raise MaskError(f"{path}: {error}") from None
-    return MaskRecords(
-        source=fspath(path), size=(height, width), rles=rles, categories=categories, scores=scores, names=names
-    )
+    axis = _instance_axis(path, stack, image_size) if instance_axis is None else instance_axis
+    size = stack.shape[1:] if axis == 0 else stack.shape[:2]
+    with within(path):
+        return InstanceMasks.from_array(
+            stack,
+            categories=categories,
+            scores=scores,
+            names=names,
+            image_size=(size[0], size[1]),
+            instance_axis=axis,
+        )
 
 
 def write(path: str | PathLike[str], masks: InstanceMasks, *, pixels_only: bool = False) -> None:
@@ -86,14 +82,7 @@ def write(path: str | PathLike[str], masks: InstanceMasks, *, pixels_only: bool 
             file.write(mask.to_array().tobytes())
 
 
-def instances_first(stack: NDArray[Any], instance_axis: int) -> NDArray[Any]:
-    """`stack` with the axis that counts masks, 0 or -1, as its first."""
-    if instance_axis not in (0, -1):
-        raise ParameterError(f"instance_axis: got {instance_axis!r}, expected 0 or -1")
-    return np.moveaxis(stack, instance_axis, 0)
-
-
-def _instance_axis(place: str, stack: NDArray[Any], image_size: tuple[int, int] | None) -> int:
+def _instance_axis(place: str | PathLike[str], stack: NDArray[Any], image_size: tuple[int, int] | None) -> int:
     first, middle, last = stack.shape
     sizes = {0: (middle, last), -1: (first, middle)}
     fitting = [axis for axis, size in sizes.items() if image_size is None or size == tuple(image_size)]

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
-from ldls.io.points.header_lines import split_header, text_rows, whole_number
+from ldls.io.files import whole_file
+from ldls.io.labelled_points import colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
-from ldls.io.points.number_rows import Row, read_rows
+from ldls.io.points.text_rows import Row, read_rows, split_header, text_rows, whole_number
+from ldls.segmentation import Segmentation
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 TYPES = {
@@ -209,3 +211,33 @@ def _field(path: Path, name: str, kind: str, size: str, count: str) -> Field:
     if n_values == 0:
         raise CorruptFileError(f"{place}: COUNT 0, expected 1 or more")
     return Field(name, np.dtype(TYPES[key]), n_values)
+
+
+def write(path: Path, result: Segmentation) -> None:
+    """Write all points: x y z (and intensity), `label` (category id), `instance`, `confidence` and `rgb`.
+
+    Points out of view have label and instance 0, as the background has. The colour is packed as the Point Cloud
+    Library has it: the bits of 0x00RRGGBB as a float.
+
+    Raises:
+        ImportError: The extra `pcd` is not installed.
+    """
+    pypcd4 = require("pypcd4", "pcd")
+    columns = {name: np.ascontiguousarray(column) for name, column in positions(result).items()}
+    columns |= {
+        "label": result.categories.astype(np.uint32),
+        "instance": instances(result),
+        "confidence": result.confidence,
+        "rgb": _packed(colors(result)),
+    }
+    cloud = pypcd4.PointCloud.from_points(
+        list(columns.values()), list(columns), [column.dtype for column in columns.values()]
+    )
+    with whole_file(path) as file:
+        cloud.save(file, pypcd4.Encoding.BINARY)
+
+
+def _packed(rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
+    red, green, blue = rgb.astype(np.uint32).T
+    packed: NDArray[np.float32] = (red << 16 | green << 8 | blue).view(np.float32)
+    return packed

@@ -9,12 +9,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
-from ldls.io.points.header_lines import split_header, text_rows, whole_number
+from ldls.io.files import whole_file
+from ldls.io.labelled_points import CHANNELS, colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
-from ldls.io.points.number_rows import Row, read_rows
+from ldls.io.points.text_rows import Row, read_rows, split_header, text_rows, whole_number
+from ldls.segmentation import Segmentation
 
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 TYPES = {
@@ -22,6 +25,7 @@ TYPES = {
     "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float32": "f4", "float64": "f8",
 }  # fmt: skip
+TYPE_NAMES = {"<f4": "float", "<f8": "double", "<u4": "uint", "|u1": "uchar"}
 
 
 @dataclass
@@ -129,3 +133,30 @@ def _add_property(place: str, element: Element, words: list[str]) -> None:
             element.types.append(TYPES[kind])
         case _:
             raise CorruptFileError(f"{place}: expected a type and a name, got {' '.join(words)[:80]!r}")
+
+
+def write(path: Path, result: Segmentation) -> None:
+    """Write all points: x y z (and intensity), colour, `label` (category id), `instance` and `confidence`.
+
+    Points out of view have label and instance 0, as the background has.
+    """
+    position = positions(result)
+    columns: dict[str, NDArray[np.number]] = {
+        **position,
+        **dict(zip(CHANNELS, colors(result).T, strict=True)),
+        "label": result.categories,
+        "instance": instances(result),
+        "confidence": result.confidence,
+    }
+    real = "<f4" if result.points.dtype == np.float32 else "<f8"
+    kinds = dict.fromkeys(position, real) | dict.fromkeys(CHANNELS, "|u1")
+    kinds |= {"label": "<u4", "instance": "<u4", "confidence": "<f4"}
+    vertices = np.empty(len(result.labels), list(kinds.items()))
+    for name, column in columns.items():
+        vertices[name] = column
+    header = ["ply", "format binary_little_endian 1.0", "comment written by ldls"]
+    header += [f"element vertex {len(vertices)}"]
+    header += [f"property {TYPE_NAMES[kind]} {name}" for name, kind in kinds.items()]
+    with whole_file(path) as file:
+        file.write("\n".join([*header, "end_header\n"]).encode("ascii"))
+        file.write(vertices.tobytes())

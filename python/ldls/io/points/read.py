@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from os import PathLike
+from pathlib import Path
 
-from ldls.cloud import Points
-from ldls.errors import ParameterError, UnsupportedFormatError
-from ldls.io.points import float_rows, las, npy, pcd, ply, text
-from ldls.io.regular_file import regular_file
+from ldls.cloud import Points, as_points
+from ldls.errors import ParameterError, UnsupportedFormatError, within
+from ldls.io.arrays import read_npy
+from ldls.io.files import regular_file
+from ldls.io.points import float_rows, las, pcd, ply, text
+
+
+def _read_npy(path: Path) -> Points:
+    """(N, >= 3) points of an `.npy` file, in its own precision."""
+    array = read_npy(path)
+    with within(path):
+        return as_points(array)
+
 
 READERS: dict[str, Callable[..., Points]] = {
     ".bin": float_rows.read,
-    ".npy": npy.read,
+    ".npy": _read_npy,
     ".pcd": pcd.read,
     ".ply": ply.read,
     ".las": las.read,

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ldls.cloud import MAX_COLUMNS
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
+from ldls.io.files import read_lines
 from ldls.io.points.named_columns import NamedColumns, plain_name
-from ldls.io.points.number_rows import Row, read_rows
-from ldls.io.text import read_lines
+from ldls.io.points.text_rows import Row, read_rows
 
 COMMENTS = ("#", "//")
 DELIMITERS = (";", "\t", ",")

@@ -16,7 +16,7 @@ from ldls.camera import Camera
 from ldls.datasets import Frame
 from ldls.errors import ParameterError
 from ldls.evaluation import Labeling
-from ldls.io.whole_file import whole_file
+from ldls.io.files import whole_file
 from ldls.segmentation import Segmentation
 from ldls.view import camera_names
 from ldls.viewing.recording import viewer

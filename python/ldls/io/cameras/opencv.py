@@ -6,47 +6,36 @@ https://wiki.ros.org/camera_calibration_parsers.
 
 from __future__ import annotations
 
-from os import PathLike
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.distortion import Distortion
-from ldls.io.cameras.fields import Fields
-from ldls.io.cameras.found import FoundCamera
-from ldls.io.cameras.yaml_file import read_yaml
+from ldls.camera import Camera, Distortion
+from ldls.camera.fields import Fields
+from ldls.errors import within
 
 MATRIX = ("camera_matrix", "K", "cameraMatrix")
 COEFFICIENTS = ("distortion_coefficients", "D", "distCoeffs", "dist_coeffs")
-WIDTH = ("image_width", "width")
-HEIGHT = ("image_height", "height")
 
 
-def read(path: str | PathLike[str], T_camera_lidar: NDArray[np.float64], *, fisheye: bool) -> FoundCamera:
-    """The camera of the raw image.
+def camera_of(fields: Fields, *, T_camera_lidar: NDArray[np.float64], fisheye: bool = False) -> Camera:
+    """Camera of the raw image.
 
     Args:
-        path: The file.
+        fields: The file's entries.
         T_camera_lidar: (4, 4) from lidar to camera coordinates, which such files do not have.
         fisheye: Whether the coefficients are those of `cv2.fisheye`, where the file does not name their model.
 
     Raises:
-        CalibrationError: It is not YAML, a key is missing, or a value cannot be a camera's.
+        CalibrationError: A key is missing, or a value cannot be a camera's.
     """
-    fields = read_yaml(path)
-    return FoundCamera(
-        place=fields.place,
-        projection=fields.matrix((3, 3), *MATRIX),
-        T_camera_lidar=T_camera_lidar,
-        distortion=_distortion(fields, fisheye),
-        image_size=image_size(fields),
-    )
-
-
-def image_size(fields: Fields) -> tuple[int, int] | None:
-    """(height, width) in pixels; None where one is missing or 0."""
-    height, width = fields.whole_number(*HEIGHT), fields.whole_number(*WIDTH)
-    return (height, width) if height and width else None
+    projection, distortion = fields.matrix((3, 3), *MATRIX), _distortion(fields, fisheye)
+    with within(fields.place):
+        return Camera(
+            projection=projection,
+            T_camera_lidar=T_camera_lidar,
+            distortion=distortion,
+            image_size=fields.image_size(),
+        )
 
 
 def _distortion(fields: Fields, fisheye: bool) -> Distortion:

@@ -1,4 +1,4 @@
-"""CameraInfo messages of ROS 1 and ROS 2, and dicts and YAML with the same names.
+"""CameraInfo messages of ROS 1 and ROS 2, and dicts with the same names.
 
 Source: https://docs.ros.org/en/api/sensor_msgs/html/msg/CameraInfo.html.
 """
@@ -6,18 +6,15 @@ Source: https://docs.ros.org/en/api/sensor_msgs/html/msg/CameraInfo.html.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.distortion import Distortion
+from ldls.camera.fields import Fields
+from ldls.camera.rigid import from_parts, rigid
 from ldls.errors import CalibrationError
-from ldls.io.cameras.fields import Fields
-from ldls.io.cameras.found import FoundCamera
-from ldls.io.cameras.opencv_yaml import image_size
-from ldls.io.cameras.rigid import from_parts, rigid
-from ldls.io.cameras.yaml_file import read_yaml
 
 MESSAGE_FIELDS = (
     "height", "width", "distortion_model", "D", "d", "K", "k", "R", "r", "P", "p", "binning_x", "binning_y", "roi",
@@ -26,44 +23,41 @@ ROI_FIELDS = ("x_offset", "y_offset", "height", "width")
 UNCALIBRATED = "calibrate the camera, or wait until its driver sends the calibration"
 
 
-def read(message: object, T_camera_lidar: NDArray[np.float64], *, rectified: bool) -> FoundCamera:
-    """The camera that a message describes.
+def arguments(fields: Fields, T_camera_lidar: NDArray[np.float64], *, rectified: bool) -> dict[str, Any]:
+    """Arguments of `Camera` from the fields of a message.
 
     Region of interest and binning change the full image that the matrices are of: first it is cut, then it shrinks.
 
     Args:
-        message: A message by its attributes, a dict, or the path of a YAML file.
+        fields: The message.
         T_camera_lidar: (4, 4) from lidar to the coordinates of the camera as it is mounted.
         rectified: Whether masks are of the rectified image (P and R) instead of the raw one (K and D).
 
     Raises:
         CalibrationError: The camera is not calibrated, or a field is missing or cannot be a camera's.
     """
-    fields = as_fields(message)
     crop = _Crop.of(fields)
     if rectified:
         rotation = np.eye(3)
         if fields.find("R", "rectification_matrix") is not None:
             rotation = fields.matrix((3, 3), "R", "rectification_matrix")
-        return FoundCamera(
-            place=fields.place,
-            projection=crop.apply(_not_zero(fields, (3, 4), "P", "projection_matrix")),
-            T_camera_lidar=rigid(f"{fields.place}: R", from_parts(rotation)) @ T_camera_lidar,
-            image_size=crop.image_size,
-        )
-    return FoundCamera(
-        place=fields.place,
-        projection=crop.apply(_not_zero(fields, (3, 3), "K", "camera_matrix")),
-        T_camera_lidar=T_camera_lidar,
-        distortion=_distortion(fields),
-        image_size=crop.image_size,
-    )
+        return {
+            "projection": crop.apply(_not_zero(fields, (3, 4), "P", "projection_matrix")),
+            "T_camera_lidar": rigid(f"{fields.place}: R", from_parts(rotation)) @ T_camera_lidar,
+            "image_size": crop.image_size,
+        }
+    return {
+        "projection": crop.apply(_not_zero(fields, (3, 3), "K", "camera_matrix")),
+        "T_camera_lidar": T_camera_lidar,
+        "distortion": _distortion(fields),
+        "image_size": crop.image_size,
+    }
 
 
 def as_fields(message: object) -> Fields:
-    """The fields of a message, whatever it comes as."""
-    if isinstance(message, str | PathLike):
-        return read_yaml(message)
+    """The fields of a message or of a dict with the same names."""
+    if isinstance(message, Fields):
+        return message
     if isinstance(message, Mapping):
         return Fields("camera_info", message)
     return Fields("camera_info", _attributes(message, MESSAGE_FIELDS))
@@ -104,7 +98,7 @@ class _Crop:
         roi_fields = Fields(f"{fields.place}: roi", region)
         offset = np.array([roi_fields.whole_number(name) or 0 for name in ("x_offset", "y_offset")])
         binning = np.array([fields.whole_number(name) or 1 for name in ("binning_x", "binning_y")])
-        full, cut = image_size(fields), image_size(roi_fields)
+        full, cut = fields.image_size(), roi_fields.image_size()
         kept = cut or full
         if full and cut and not (offset[::-1] + cut <= full).all():
             raise CalibrationError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ldls.errors import CalibrationError
 
@@ -11,6 +11,31 @@ Matrix = NDArray[np.float64]
 
 ROTATION_LIMIT = 1e-3
 """How far a rotation may be from orthonormal; calibration files round to 7 digits."""
+
+
+def as_transform(name: str, values: ArrayLike) -> Matrix:
+    """`values` as a (4, 4) matrix.
+
+    Raises:
+        CalibrationError: They are no such matrix.
+    """
+    return as_matrix(name, values, ((4, 4),))
+
+
+def as_matrix(name: str, values: ArrayLike, shapes: tuple[tuple[int, ...], ...]) -> Matrix:
+    """`values` as a matrix of one of the shapes.
+
+    Raises:
+        CalibrationError: They are no such matrix; the message names the argument.
+    """
+    try:
+        matrix = np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise CalibrationError(f"{name}: expected an array of numbers") from None
+    if matrix.shape not in shapes:
+        expected = " or ".join(map(str, shapes))
+        raise CalibrationError(f"{name}: expected shape {expected}, got {matrix.shape}")
+    return matrix
 
 
 def rigid(place: str, matrix: Matrix) -> Matrix:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.distortion import Distortion
-from ldls.errors import CalibrationError
+from ldls.errors import CalibrationError, within
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,11 @@ class Fields:
             raise CalibrationError(f"{self.place}: {name} is {_short(entries)}, expected keys with values")
         return Fields(f"{self.place}: {name}", entries)
 
+    def image_size(self) -> tuple[int, int] | None:
+        """(height, width) in pixels of `image_height` and `image_width`; None where one is missing or 0."""
+        height, width = self.whole_number("image_height", "height"), self.whole_number("image_width", "width")
+        return (height, width) if height and width else None
+
     def numbers(self, *spellings: str, mend: str = "") -> NDArray[np.float64]:
         """The numbers of an entry as they stand: a list, a list of rows, or `rows`, `cols` and `data`.
 
@@ -96,10 +101,8 @@ class Fields:
         Raises:
             CalibrationError: The model is unknown or has another number of coefficients.
         """
-        try:
+        with within(self.place):
             return Distortion(model, tuple(coefficients.ravel().tolist()))
-        except CalibrationError as error:
-            raise CalibrationError(f"{self.place}: {error}") from None
 
     def _numbers(self, name: str, value: object) -> NDArray[np.float64]:
         if isinstance(value, Mapping):

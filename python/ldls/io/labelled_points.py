@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.palette import label_colours
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.segmentation import Segmentation
 
 POSITION = ("x", "y", "z", "intensity")
 CHANNELS = ("red", "green", "blue")

@@ -1,0 +1,218 @@
+"""Masks of what other programs return, as arguments of `InstanceMasks`; none of the programs is imported."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls import _ldls
+from ldls.categories import COCO_NAMES, category_ids
+from ldls.errors import MaskError
+from ldls.masks.coco import from_rle
+from ldls.masks.pixels import checked_size, encode
+
+Arguments = dict[str, Any]
+"""Keyword arguments of `InstanceMasks`."""
+
+
+def from_torchvision(
+    output: Mapping[str, Any], *, threshold: float = 0.5, names: Mapping[int, str] | None = None
+) -> Arguments:
+    """Masks of one element of the list that an instance segmentation network of torchvision returns.
+
+    Source: https://docs.pytorch.org/vision/stable/models/generated/torchvision.models.detection.maskrcnn_resnet50_fpn.html
+
+    Args:
+        output: `labels` (N,), which are COCO's 91-space ids already, `scores` (N,) and `masks` (N, 1, H, W)
+            probabilities.
+        threshold: Least probability of a pixel of the object.
+        names: Name of each label; COCO's without them.
+
+    Raises:
+        MaskError: A part is missing, or of another shape.
+    """
+    missing = [key for key in ("labels", "scores", "masks") if key not in output]
+    if missing:
+        raise MaskError(f"output: {missing[0]!r} is missing, found {sorted(output)}; a detector without masks?")
+    masks = to_numpy(output["masks"])
+    if masks.ndim != 4 or masks.shape[1] != 1:
+        raise MaskError(f"masks: expected (N, 1, height, width), got shape {masks.shape}")
+    return {
+        "rles": [encode(i, mask[0], threshold) for i, mask in enumerate(masks)],
+        "image_size": masks.shape[2:],
+        "categories": whole_numbers("labels", output["labels"]),
+        "scores": to_numpy(output["scores"]),
+        "names": COCO_NAMES if names is None else names,
+    }
+
+
+def from_supervision(
+    detections: Any,  # noqa: ANN401
+    *,
+    names: Mapping[int, str] | None = None,
+    image_size: tuple[int, int] | None = None,
+) -> Arguments:
+    """Masks of `supervision.Detections`.
+
+    Source: https://supervision.roboflow.com/latest/detection/core/
+
+    Args:
+        detections: `mask` (N, H, W), `confidence` (N,) or None, `class_id` (N,) or None, and `data["class_name"]`.
+        names: Name of each class id, where `data` does not say; a class without one is called by its number.
+        image_size: (height, width) of the image in pixels; only needed where there may be no detection.
+
+    Raises:
+        MaskError: There are boxes and no masks, or arrays that do not fit one another.
+    """
+    masks = detections.mask
+    if masks is None and len(detections.xyxy):
+        raise MaskError(
+            "detections: boxes without masks; InstanceMasks.from_boxes takes boxes for masks, "
+            "and ldls.segmenters.BoxSegmenter does so frame by frame"
+        )
+    pixels = [] if masks is None else [to_numpy(mask) for mask in masks]
+    if not pixels and image_size is None:
+        raise MaskError("detections: none, so the image's size is not known; pass image_size=(height, width)")
+    rles = [encode(i, mask) for i, mask in enumerate(pixels)]
+    classes = _classes(detections, len(rles), names)
+    size = (rles[0].height, rles[0].width) if image_size is None else image_size
+    return {"rles": rles, "image_size": size, "scores": detections.confidence, **classes}
+
+
+def _classes(detections: Any, count: int, names: Mapping[int, str] | None) -> dict[str, Any]:  # noqa: ANN401
+    """Categories and their names; none where there are no class ids."""
+    if detections.class_id is None:
+        return {}
+    indices = whole_numbers("class_id", detections.class_id)
+    own = dict(names or {})
+    found = [own.get(index, f"class {index}") for index in indices]
+    found = [str(name) for name in detections.data.get("class_name", found)]
+    if not len(indices) == len(found) == count:
+        raise MaskError(f"detections: {count} masks, {len(indices)} class ids, {len(found)} class names")
+    by_index = dict(zip(indices, found, strict=True))
+    for i, (index, name) in enumerate(zip(indices, found, strict=True)):
+        if index < 0:
+            raise MaskError(f"mask {i}: class {index}, expected 0 or more")
+        if by_index[index] != name:
+            raise MaskError(f"mask {i}: class {index} is {name!r}, elsewhere {by_index[index]!r}; one name a class")
+    ids, by_category = category_ids(by_index)
+    return {"categories": [ids[index] for index in indices], "names": by_category}
+
+
+def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
+    """Masks of the `Results` of Ultralytics' segmentation networks for one image.
+
+    Source: https://docs.ultralytics.com/reference/engine/results/
+
+    Masks of the image's size, as `retina_masks=True` makes them, are taken as they are. Those of the padded input give
+    way to their outlines in the image, `masks.xy`, which are coarser and have no holes.
+
+    Args:
+        result: `masks` (`data` (N, h, w) and `xy`, N outlines in image pixels) or None, `boxes` (`cls`, `conf`),
+            `names` and `orig_shape`.
+
+    Raises:
+        MaskError: An index that `names` does not have, or parts that do not fit one another.
+    """
+    size = checked_size(result.orig_shape)
+    ids, names = category_ids(result.names)
+    if result.masks is None:
+        return {"rles": [], "image_size": size, "categories": [], "scores": [], "names": names}
+    classes = whole_numbers("boxes.cls", result.boxes.cls)
+    for i, index in enumerate(classes):
+        if index not in ids:
+            raise MaskError(f"mask {i}: class {index} has no name; found {len(ids)} names")
+    return {
+        "rles": _ultralytics_rles(result.masks, size),
+        "image_size": size,
+        "categories": [ids[index] for index in classes],
+        "scores": to_numpy(result.boxes.conf),
+        "names": names,
+    }
+
+
+def _ultralytics_rles(masks: Any, size: tuple[int, int]) -> list[_ldls.Rle]:  # noqa: ANN401
+    pixels = to_numpy(masks.data)
+    if pixels.shape[1:] == size:
+        return [encode(i, mask) for i, mask in enumerate(pixels)]
+    return [_from_outline(i, to_numpy(outline), size) for i, outline in enumerate(masks.xy)]
+
+
+def _from_outline(index: int, outline: Any, size: tuple[int, int]) -> _ldls.Rle:  # noqa: ANN401
+    if len(outline) < 3:  # of a mask without pixels, or with next to none
+        return _ldls.Rle.from_pixels(np.zeros(size, np.bool_))
+    try:
+        return _ldls.Rle.from_polygons(*size, [outline.ravel().tolist()])
+    except MaskError as error:
+        raise MaskError(f"mask {index}: {error}") from None
+
+
+def from_sam(
+    records: Sequence[Mapping[str, Any]],
+    *,
+    categories: ArrayLike | None = None,
+    names: Mapping[int, str] | None = None,
+    image_size: tuple[int, int] | None = None,
+) -> Arguments:
+    """Masks of the list of records that an automatic mask generator of Segment Anything returns for one image.
+
+    Source: https://github.com/facebookresearch/segment-anything
+
+    Args:
+        records: Each with `segmentation`, (H, W) bool or COCO's run lengths, and `predicted_iou`, the score, which may
+            lie a little above 1.
+        categories: (M,) category ids; without them all are category 1, "object".
+        names: Name of each category id.
+        image_size: (height, width) of the image in pixels; only needed where there may be no mask.
+
+    Raises:
+        MaskError: A record that cannot be used, by its index.
+    """
+    rles = [_sam_rle(i, record) for i, record in enumerate(records)]
+    if not rles and image_size is None:
+        raise MaskError("records: none, so the image's size is not known; pass image_size=(height, width)")
+    size = (rles[0].height, rles[0].width) if image_size is None else image_size
+    scores = np.array([record.get("predicted_iou", 1.0) for record in records], np.float32)
+    scores = np.clip(scores, 0, 1)
+    return {"rles": rles, "image_size": size, "categories": categories, "scores": scores, "names": names}
+
+
+def _sam_rle(index: int, record: Mapping[str, Any]) -> _ldls.Rle:
+    if "segmentation" not in record:
+        raise MaskError(f"record {index}: 'segmentation' is missing, found {sorted(record)}")
+    segmentation = record["segmentation"]
+    if not isinstance(segmentation, Mapping):
+        return encode(index, to_numpy(segmentation))
+    try:
+        return from_rle(segmentation)
+    except MaskError as error:
+        raise MaskError(f"record {index}: {error}") from None
+
+
+def to_numpy(values: Any) -> NDArray[Any]:  # noqa: ANN401
+    """`values`, an array or a tensor on any device, with or without gradient."""
+    if not hasattr(values, "detach"):
+        return np.asarray(values)
+    tensor = values.detach().cpu()
+    try:
+        return np.asarray(tensor.numpy())
+    except TypeError:  # bfloat16, which NumPy does not have
+        return np.asarray(tensor.float().numpy())
+
+
+def whole_numbers(name: str, values: Any) -> list[int]:  # noqa: ANN401
+    """Class indices, which some programs keep as floats.
+
+    Raises:
+        MaskError: One of them is no whole number; the message names its instance.
+    """
+    array = to_numpy(values)
+    if array.ndim != 1 or array.dtype.kind not in "iuf":
+        raise MaskError(f"{name}: expected one number an instance, got {array.dtype} of shape {array.shape}")
+    for i, value in enumerate(array.tolist()):
+        if value != value or value % 1 != 0:
+            raise MaskError(f"mask {i}: {name} is {value}, expected a whole number")
+    return [int(value) for value in array.tolist()]

@@ -1,1 +1,0 @@
-"""What other programs hold in memory, as mask records: one module a program, none of which it imports."""
