@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import ldls
-from ldls.evaluation import ClassSet, Labeling, evaluate, from_instance_labels, instance_table, semantic_table
+from ldls.evaluation import ClassSet, Labeling, evaluate, instance_table, semantic_table
 from ldls.simulation import SceneFrame, scene_frame
 
 NEAR_M = 3.0
@@ -32,7 +32,7 @@ def my_method(result: ldls.Segmentation) -> np.ndarray:
 def truth_of(frame: SceneFrame) -> Labeling:
     """True labels; `ldls.evaluation.read_labeling` reads those of KITTI, SemanticKITTI, nuScenes and others."""
     names = [ldls.categories.COCO_NAMES[thing.category] for thing in frame.objects]
-    return from_instance_labels(frame.instances, np.array(names))
+    return Labeling.from_instance_labels(frame.instances, names)
 
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "scores")
@@ -48,7 +48,7 @@ for seed in range(300, 306):
         (mine, my_method(result)),
         (ours, result.labels),
     ):
-        pairs.append((str(seed), from_instance_labels(labels, names), truth_of(frame)))
+        pairs.append((str(seed), Labeling.from_instance_labels(labels, names), truth_of(frame)))
 
 classes = ClassSet.kitti(("car", "person"))  # names of COCO, KITTI and other data sets are understood
 methods = {"direct projection": projected, "my method": mine, "ldls": ours}

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import ldls
-from ldls.evaluation import ClassSet, Labeling, evaluate, from_instance_labels, from_segmentation
+from ldls.evaluation import ClassSet, Labeling, evaluate
 from ldls.simulation import SceneFrame, scene_frame
 
 SIGMAS = (0.01, 0.1, 1.0, 10.0)
@@ -23,13 +23,13 @@ CLASSES = ClassSet.kitti(("car", "person"))  # names of COCO, KITTI and other da
 def truth_of(frame: SceneFrame) -> Labeling:
     """True labels of a simulated frame; yours may be read with `ldls.evaluation.read_labeling`."""
     names = [ldls.categories.COCO_NAMES[thing.category] for thing in frame.objects]
-    return from_instance_labels(frame.instances, np.array(names))
+    return Labeling.from_instance_labels(frame.instances, names)
 
 
 def mean_iou(frames: list[SceneFrame], params: ldls.Params) -> float:
     """Mean IoU of cars and persons, in percent."""
     pairs = [
-        (str(number), from_segmentation(ldls.segment(f.points, f.masks, f.camera, params=params)), truth_of(f))
+        (str(number), Labeling.from_segmentation(ldls.segment(f.points, f.masks, f.camera, params=params)), truth_of(f))
         for number, f in enumerate(frames)
     ]
     counts = evaluate(pairs, classes=CLASSES).semantic

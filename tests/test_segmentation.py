@@ -30,6 +30,18 @@ def test_shapes_and_types_of_the_result(small_scene):
     }  # fmt: skip
 
 
+def test_values_of_labels_become_values_of_points(small_scene):
+    points, masks, camera = small_scene
+    result = ldls.segment(np.vstack([points, [[0, 0, -5]]]), masks, camera)
+    labels = np.array([0, 1, 2], np.int64)
+    np.testing.assert_array_equal(result.per_point(labels), np.maximum(result.labels, 0))
+    np.testing.assert_array_equal(result.per_point(labels, out_of_view=-1), result.labels)
+    colours = np.arange(9, dtype=np.uint8).reshape(3, 3)
+    assert result.per_point(colours).shape == (len(result.labels), 3)
+    assert result.per_point(colours, out_of_view=(7, 8, 9))[-1].tolist() == [7, 8, 9]
+    assert {*result.per_point([None, "person", "car"])} == {None, "person", "car"}
+
+
 def test_objects_describe_their_points(small_scene):
     points, masks, camera = small_scene
     result = ldls.segment(points, masks, camera)

@@ -7,7 +7,7 @@ import ldls
 from ldls.datasets import open_source
 from ldls.datasets.inspection import check_stamps, inspect
 from ldls.evaluation import ClassSet, evaluate
-from ldls.evaluation.results import from_segmentation
+from ldls.labeling import Labeling
 from ldls.simulation import Drive, SensorErrors, drive_folder, drive_frame, write_drive
 
 DRIVE = Drive(n_frames=5, seed=3, lidar="hdl-32e")
@@ -42,7 +42,7 @@ def test_a_drive_scores_as_its_frames_do_singly(drive_path):
     for k, frame in enumerate(source):
         simulated = drive_frame(DRIVE, k)
         result = ldls.segment(simulated.points, simulated.masks, simulated.camera)
-        singly.append((frame.name, from_segmentation(result), frame.truth))
+        singly.append((frame.name, Labeling.from_segmentation(result), frame.truth))
     mean_through, mean_singly = _mean_iou(through), _mean_iou(singly)
     assert mean_through == pytest.approx(mean_singly, abs=1e-3)
     assert mean_through > 0.5
@@ -73,7 +73,7 @@ def _stored_masks(drive, name):
 
 def _scored(frame, masks):
     result = ldls.segment(frame.points, masks, frame.images[0].camera)
-    return frame.name, from_segmentation(result), frame.truth
+    return frame.name, Labeling.from_segmentation(result), frame.truth
 
 
 def _mean_iou(pairs):

@@ -12,8 +12,8 @@ from ldls.cli import app
 from ldls.evaluation import ClassSet, paper
 from ldls.evaluation.annotations import write_annotations
 from ldls.evaluation.kitti_frames import KittiFrames
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.methods import CLUSTERING, DIFFUSION, DIRECT_PROJECTION, FULL
+from ldls.labeling import Labeling
 
 pytest.importorskip("sklearn")
 

@@ -12,8 +12,6 @@ from ldls.errors import (
     UnsupportedFormatError,
 )
 from ldls.evaluation import (
-    from_instance_labels,
-    from_segmentation,
     read_labeling,
     read_lidarseg,
     read_panoptic,
@@ -24,6 +22,7 @@ from ldls.evaluation import (
     write_labeling,
 )
 from ldls.evaluation.formats import FORMATS, guess_format
+from ldls.labeling import Labeling
 
 
 def class_names(found):
@@ -153,17 +152,17 @@ def test_segmentations_are_read_as_they_were_written(small_scene, tmp_path):
     np.testing.assert_array_equal(found.instances, np.maximum(result.labels, 0))
     np.testing.assert_array_equal(found.ignored, result.labels < 0)
     assert found.ignored[-1]
-    direct = from_segmentation(result)
+    direct = Labeling.from_segmentation(result)
     for name in ("classes", "instances", "ignored"):
         np.testing.assert_array_equal(getattr(direct, name), getattr(found, name))
 
 
 def test_two_masks_of_a_class_are_two_instances():
-    found = from_instance_labels(np.array([-1, 0, 1, 2, 3]), np.array(["car", "person", "car"]))
+    found = Labeling.from_instance_labels(np.array([-1, 0, 1, 2, 3]), ["car", "person", "car"])
     assert class_names(found) == ["background", "background", "car", "person", "car"]
     assert found.instances.tolist() == [0, 0, 1, 2, 3]
     with pytest.raises(InputError, match="labels: got 4 to 4, expected -1 to 3"):
-        from_instance_labels(np.array([4]), np.array(["car", "person", "car"]))
+        Labeling.from_instance_labels(np.array([4]), ["car", "person", "car"])
 
 
 def test_arrays_make_the_round_trip(tmp_path):

@@ -14,7 +14,7 @@ from ldls.camera import Camera
 from ldls.cloud import Points
 
 if TYPE_CHECKING:
-    from ldls.evaluation import Labeling
+    from ldls.labeling import Labeling
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -16,9 +16,10 @@ from ldls.datasets.files import IMAGE_SUFFIXES, POINT_SUFFIXES, choose, find_fil
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.kitti_cameras import camera_numbers, image_from_file
 from ldls.datasets.truth import of_points
-from ldls.evaluation import Labeling, label_by_boxes, read_annotations
+from ldls.evaluation import label_by_boxes, read_annotations
 from ldls.io import read_camera, read_points
 from ldls.io.kitti_objects import read_kitti_objects
+from ldls.labeling import Labeling
 
 SPLITS = ("training", "testing")
 

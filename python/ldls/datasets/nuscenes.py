@@ -21,10 +21,11 @@ from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.nuscenes_tables import Reading
 from ldls.datasets.truth import of_points
 from ldls.errors import SourceError
-from ldls.evaluation import Labeling, read_lidarseg, read_panoptic
+from ldls.evaluation import read_lidarseg, read_panoptic
 from ldls.io import read_points
 from ldls.io.files import below
 from ldls.io.images import read_image
+from ldls.labeling import Labeling
 
 LIDAR = "LIDAR_TOP"
 CAMERAS = ("CAM_FRONT", "CAM_FRONT_RIGHT", "CAM_BACK_RIGHT", "CAM_BACK", "CAM_BACK_LEFT", "CAM_FRONT_LEFT")

@@ -23,11 +23,10 @@ from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.errors import CorruptFileError, LdlsError
-from ldls.evaluation import Labeling
-from ldls.evaluation.vocabularies import BACKGROUND
 from ldls.io import read_points
 from ldls.io.files import below
 from ldls.io.images import read_image, read_image_size
+from ldls.labeling import BACKGROUND, Labeling
 
 FILE = "frame.json"
 

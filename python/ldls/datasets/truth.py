@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ldls.cloud import Points
 from ldls.errors import InputError
-from ldls.evaluation import Labeling
+from ldls.labeling import Labeling
 
 
 def of_points(truth: Labeling, points: Points, path: Path) -> Labeling:

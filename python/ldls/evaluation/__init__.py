@@ -16,17 +16,17 @@ from ldls.evaluation.figures import iou_against_iterations, iou_against_range, s
 from ldls.evaluation.formats import FORMATS, Format, read_labeling
 from ldls.evaluation.instance import InstanceScores
 from ldls.evaluation.kitti_boxes import label_by_boxes, points_in_box, read_kitti_boxes
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.nuscenes import read_lidarseg, read_panoptic
 from ldls.evaluation.object_scores import ObjectScore, object_scores
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticQuality, PanopticScores
-from ldls.evaluation.results import from_instance_labels, from_segmentation, read_results, write_labeling
+from ldls.evaluation.results import read_results, write_labeling
 from ldls.evaluation.semantic import SemanticScores
 from ldls.evaluation.semantic_kitti import read_semantic_kitti
 from ldls.evaluation.squeezeseg import read_squeezeseg, read_squeezeseg_ranges
 from ldls.evaluation.tables import Table, ablation_table, frame_table, instance_table, panoptic_table, semantic_table
 from ldls.io.kitti_objects import KittiObject, read_kitti_objects
+from ldls.labeling import Labeling
 
 __all__ = [
     "FORMATS",
@@ -49,8 +49,6 @@ __all__ = [
     "annotate",
     "evaluate",
     "frame_table",
-    "from_instance_labels",
-    "from_segmentation",
     "instance_table",
     "iou_against_iterations",
     "iou_against_range",

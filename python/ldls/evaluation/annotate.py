@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from ldls.camera import Camera
 from ldls.cloud import as_points
 from ldls.evaluation.kitti_boxes import in_box_frame, in_camera_frame, label_by_boxes
-from ldls.evaluation.labeling import Labeling
 from ldls.io.kitti_objects import KittiObject
+from ldls.labeling import Labeling
 
 GROUND_THICKNESS_M = 0.15
 """Points this near the ground belong to it: returns scatter by centimetres, and tyres and shoes hide little more."""

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from ldls.errors import CorruptFileError
-from ldls.evaluation.labeling import MAX_LABEL, Labeling
-from ldls.evaluation.vocabularies import BACKGROUND
 from ldls.io.files import read_lines, whole_file
+from ldls.labeling import BACKGROUND, MAX_LABEL, Labeling
 
 DONT_CARE = "DontCare"
 

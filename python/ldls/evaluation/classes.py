@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ldls.categories import COCO_NAMES
-from ldls.errors import ParameterError
+from ldls.errors import InputError, ParameterError
 from ldls.evaluation.vocabularies import (
-    BACKGROUND,
     KITTI,
     NUSCENES,
     SEMANTIC_KITTI,
@@ -17,6 +19,7 @@ from ldls.evaluation.vocabularies import (
     VOID,
     synonyms,
 )
+from ldls.labeling import BACKGROUND, Labeling
 
 SITTING = "Person_sitting"
 LEFT_OUT: tuple[str, ...] = ("Van", "Cyclist", "Misc", "DontCare")
@@ -102,6 +105,24 @@ class ClassSet:
         """Names of a mapped labeling: background, then the scored classes."""
         return (BACKGROUND, *self.names)
 
+    def map(self, labeling: Labeling, *, truth: bool = False) -> Labeling:
+        """The labels of `labeling` with the names of `vocabulary`.
+
+        Classes that are not scored become background. In truth, names that are left out are ignored, and a name that
+        is not known is an error; in a prediction both are background, for a method must not choose which points count.
+
+        Raises:
+            InputError: This is truth and holds an unknown class.
+        """
+        if truth:
+            self._check_known(labeling)
+        targets = np.array([self.index(name) for name in labeling.names], np.int32)
+        classes = targets[labeling.classes]
+        ignored = labeling.ignored
+        if truth:
+            ignored = ignored | np.array([name in self.left_out for name in labeling.names])[labeling.classes]
+        return Labeling(classes, _distinct_instances(labeling, classes), ignored, self.vocabulary)
+
     def index(self, name: str) -> int:
         """Number of the class of `name` in `vocabulary`; 0 for whatever is not scored."""
         scored = self.aliases.get(name, name)
@@ -110,6 +131,25 @@ class ClassSet:
     def knows(self, name: str) -> bool:
         """Whether truth may hold `name`."""
         return name == BACKGROUND or self.index(name) > 0 or name in self.left_out or name in self.background
+
+    def _check_known(self, truth: Labeling) -> None:
+        unknown = [name for name, count in truth.counts().items() if count and not self.knows(name)]
+        if unknown:
+            raise InputError(
+                f"truth has points of {unknown}, which the class set {self.names} does not know; "
+                "name them in its aliases, left_out or background"
+            )
+
+
+def _distinct_instances(labeling: Labeling, classes: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Instances of scored classes, numbered anew where two classes that become one share a number."""
+    instances = np.where(classes > 0, labeling.instances, 0).astype(np.int32)
+    rows = np.flatnonzero(instances)
+    own, mapped = (k[rows].astype(np.int64) << 32 | labeling.instances[rows] for k in (labeling.classes, classes))
+    before, numbers = np.unique(own, return_inverse=True)
+    if len(before) > len(np.unique(mapped)):
+        instances[rows] = numbers.reshape(-1) + 1
+    return instances
 
 
 def _merged(name: str, merge_sitting: bool) -> tuple[str, ...]:

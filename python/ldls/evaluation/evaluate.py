@@ -9,10 +9,10 @@ from ldls.errors import ParameterError
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.instance import PAPER_THRESHOLDS, InstanceScores
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticScores
 from ldls.evaluation.semantic import SemanticScores
+from ldls.labeling import Labeling
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from ldls.camera import Camera
 from ldls.errors import InputError, ParameterError, UnsupportedFormatError
 from ldls.evaluation.annotations import read_annotations
 from ldls.evaluation.kitti_boxes import read_kitti_boxes
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.nuscenes import read_lidarseg, read_panoptic
 from ldls.evaluation.results import read_results
 from ldls.evaluation.semantic_kitti import read_semantic_kitti
 from ldls.evaluation.squeezeseg import read_squeezeseg
+from ldls.labeling import Labeling
 
 
 @dataclass(frozen=True)

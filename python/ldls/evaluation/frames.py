@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ldls.cloud import Points
 from ldls.evaluation.formats import FORMATS, guess_format, read_labeling
 from ldls.evaluation.frame_inputs import FrameInputs, ranges_of
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.pairing import FrameFiles
 from ldls.evaluation.squeezeseg import read_squeezeseg_ranges
+from ldls.labeling import Labeling
 
 
 def read_pairs(

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.overlaps import Overlaps, overlaps
 from ldls.evaluation.semantic import check_vocabulary
+from ldls.labeling import Labeling
 
 PAPER_THRESHOLDS = (0.5, 0.7)
 

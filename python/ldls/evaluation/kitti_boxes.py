@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import as_points
-from ldls.evaluation.labeling import Labeling
-from ldls.evaluation.vocabularies import BACKGROUND, KITTI
+from ldls.evaluation.vocabularies import KITTI
 from ldls.io.kitti_objects import KittiObject, read_kitti_objects
+from ldls.labeling import BACKGROUND, Labeling
 from ldls.stages import project
 
 IMAGE_SIZE = (375, 1242)

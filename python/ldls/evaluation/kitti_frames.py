@@ -14,8 +14,8 @@ from ldls.camera import Camera
 from ldls.errors import InputError
 from ldls.evaluation.annotations import read_annotations
 from ldls.evaluation.kitti_boxes import read_kitti_boxes
-from ldls.evaluation.labeling import Labeling
 from ldls.io import read_camera, read_masks, read_points
+from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
 
 

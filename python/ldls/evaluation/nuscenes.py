@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from ldls.errors import CorruptFileError, InputError
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.vocabularies import NUSCENES
 from ldls.io.arrays import read_npz
 from ldls.io.nuscenes_labels import INSTANCES_A_CLASS
+from ldls.labeling import Labeling
 
 
 def read_lidarseg(path: str | PathLike[str]) -> Labeling:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ldls.errors import InputError, ShapeError
 from ldls.evaluation.classes import ClassSet
-from ldls.evaluation.labeling import Labeling
+from ldls.labeling import Labeling
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Pair:
             InputError: Truth holds an unknown class, or a range is asked for and none is known.
         """
         try:
-            truth = self.truth.mapped(classes, truth=True)
+            truth = classes.map(self.truth, truth=True)
         except InputError as error:
             raise InputError(f"frame {self.name}: {error}") from None
         if self.ranges_m is not None:
@@ -57,4 +57,4 @@ class Pair:
             truth = truth.restricted(np.asarray(self.ranges_m) <= farthest)
         elif max_range_m is not None:
             raise InputError(f"frame {self.name}: max_range_m needs the points' ranges_m, got none")
-        return Pair(self.name, self.prediction.mapped(classes), truth, self.ranges_m)
+        return Pair(self.name, classes.map(self.prediction), truth, self.ranges_m)

@@ -16,9 +16,9 @@ import numpy as np
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts, mean
 from ldls.evaluation.instance import check_minimum
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.overlaps import overlaps
 from ldls.evaluation.semantic import check_vocabulary
+from ldls.labeling import Labeling
 
 MATCH_ABOVE = 0.5
 

@@ -16,12 +16,11 @@ from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.evaluate import Evaluation, evaluate
 from ldls.evaluation.frame_inputs import ranges_of
 from ldls.evaluation.kitti_frames import LabelledFrame
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.methods import FULL, OUT_OF_VIEW, compare
 from ldls.evaluation.object_scores import ObjectScore, object_scores
 from ldls.evaluation.pair import Pair
-from ldls.evaluation.results import from_instance_labels
 from ldls.label_diffusion import segment
+from ldls.labeling import Labeling
 from ldls.params import Params
 
 ITERATIONS: tuple[int, ...] = (1, 5, 10, 20, 50, 100, 200, 500)
@@ -109,11 +108,11 @@ def _label(frame: LabelledFrame, params: Params, iterations: Sequence[int]) -> L
     found = compare(frame.points, frame.masks, frame.camera, params=params)
     in_view = np.flatnonzero(next(iter(found.values())) != OUT_OF_VIEW)
     truth = _rows(frame.truth, in_view)
-    names = np.array([mask.name for mask in frame.masks], np.str_)
+    names = [mask.name for mask in frame.masks]
     ranges_m = ranges_of(frame.points[in_view])
 
     def pair(labels: NDArray[np.int32]) -> Pair:
-        return Pair(frame.name, from_instance_labels(labels[in_view], names), truth, ranges_m)
+        return Pair(frame.name, Labeling.from_instance_labels(labels[in_view], names), truth, ranges_m)
 
     def after(count: int) -> NDArray[np.int32]:
         counted = replace(params, iterations=count)

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import CorruptFileError, InputError, UnsupportedFormatError
-from ldls.evaluation.labeling import Labeling
-from ldls.evaluation.vocabularies import BACKGROUND
 from ldls.io.arrays import read_npz, write_npz
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.labeling import Labeling
 
 
 def read_results(path: str | PathLike[str]) -> Labeling:
@@ -30,7 +26,7 @@ def read_results(path: str | PathLike[str]) -> Labeling:
     arrays = read_npz(path)
     try:
         if {"labels", "object_name"} <= arrays.keys():
-            return from_instance_labels(arrays["labels"], arrays["object_name"])
+            return Labeling.from_instance_labels(arrays["labels"], arrays["object_name"])
         if {"classes", "names"} <= arrays.keys():
             return _by_array(arrays)
     except (InputError, IndexError) as error:
@@ -44,26 +40,6 @@ def write_labeling(path: str | PathLike[str], labeling: Labeling) -> None:
     """Write the arrays of `labeling` to an `.npz` file under their names."""
     arrays = {"classes": labeling.classes, "instances": labeling.instances, "ignored": labeling.ignored}
     write_npz(path, arrays | {"names": np.array(labeling.names, np.str_)})
-
-
-def from_segmentation(result: Segmentation) -> Labeling:
-    """Labels of a segmentation, its instances by their masks; points out of view are ignored."""
-    return from_instance_labels(result.labels, np.array([instance.name for instance in result.instances], np.str_))
-
-
-def from_instance_labels(labels: NDArray[Any], class_names: NDArray[np.str_]) -> Labeling:
-    """Labels of points by instance: -1 ignored, 0 background, m of class `class_names[m - 1]`.
-
-    Raises:
-        InputError: A label has no name.
-    """
-    objects = [str(name) for name in class_names]
-    if labels.size and not (labels.min() >= -1 and labels.max() <= len(objects)):
-        raise InputError(f"labels: got {labels.min()} to {labels.max()}, expected -1 to {len(objects)}")
-    names = tuple(dict.fromkeys([BACKGROUND, *objects]))
-    # label -1, out of view, picks the last entry
-    by_label = np.array([0, *(names.index(name) for name in objects), 0], np.int32)
-    return Labeling(by_label[labels], np.maximum(labels, 0), labels < 0, names)
 
 
 def _by_array(arrays: dict[str, NDArray[Any]]) -> Labeling:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts, mean
-from ldls.evaluation.labeling import Labeling
-from ldls.evaluation.vocabularies import BACKGROUND
+from ldls.labeling import BACKGROUND, Labeling
 
 
 class SemanticScores:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.vocabularies import SEMANTIC_KITTI
+from ldls.labeling import Labeling
 
 LABEL_BYTES = 4
 

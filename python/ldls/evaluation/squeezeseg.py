@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import CorruptFileError, InputError, UnsafeFileError
-from ldls.evaluation.labeling import Labeling
 from ldls.evaluation.vocabularies import SQUEEZESEG
+from ldls.labeling import Labeling
 
 IMAGE = (64, 512)
 N_CHANNELS = 6

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ldls.io.nuscenes_labels import CLASS_NAMES
-
-BACKGROUND = "background"
+from ldls.labeling import BACKGROUND
 
 KITTI: tuple[str, ...] = (
     "Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc", "DontCare",

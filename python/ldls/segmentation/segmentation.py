@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ldls import _ldls
 from ldls.cloud import Points
@@ -103,9 +103,20 @@ class Segmentation:
     @cached_property
     def categories(self) -> NDArray[np.int32]:
         """(N,) int32: category id of each point; 0 for background and out of view."""
+        return self.per_point(np.array([0, *(instance.category for instance in self.instances)], np.int32))
+
+    def per_point(self, values: ArrayLike, *, out_of_view: ArrayLike | None = None) -> NDArray[Any]:
+        """(N, ...) the value of each point's label.
+
+        Args:
+            values: (M + 1, ...): `values[0]` is that of the background, `values[m]` that of `instances[m - 1]`.
+            out_of_view: Value of points out of view; by default that of the background.
+        """
+        by_label = np.asarray(values)
+        last = by_label[:1] if out_of_view is None else np.asarray(out_of_view, by_label.dtype)[None]
         # label -1 picks the last entry
-        by_label = np.array([0, *(instance.category for instance in self.instances), 0], np.int32)
-        return by_label[self.labels]
+        of_points: NDArray[Any] = np.concatenate([by_label, last])[self.labels]
+        return of_points
 
     @cached_property
     def direct_labels(self) -> NDArray[np.int32]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ldls.categories import category_ids
 from ldls.errors import LimitError
-from ldls.evaluation import Labeling
+from ldls.labeling import Labeling
 from ldls.palette import BACKGROUND, Colour, category_colour
 from ldls.segmentation import Instance, Segmentation
 from ldls.viewing.recording.colours import GREATEST_ID, OUT_OF_VIEW_COLOUR, OUT_OF_VIEW_ID, label_colours

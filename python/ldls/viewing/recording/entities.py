@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ldls.cloud import finite_rows
 from ldls.errors import InputError
-from ldls.evaluation import Labeling
+from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
 from ldls.view import camera_names
 from ldls.viewing.recording.boxes import boxes_3d

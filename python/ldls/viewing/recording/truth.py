@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ldls.cloud import Points, finite_rows
 from ldls.errors import InputError
-from ldls.evaluation import Labeling
+from ldls.labeling import Labeling
 from ldls.segmentation import fit_upright_box
 from ldls.viewing.recording import contexts
 from ldls.viewing.recording.boxes import boxes_3d

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.errors import DtypeError, InputError, ShapeError
-from ldls.evaluation.vocabularies import BACKGROUND
 
 if TYPE_CHECKING:
-    from ldls.evaluation.classes import ClassSet
+    from ldls.segmentation import Segmentation
 
+BACKGROUND = "background"
 MAX_LABEL = 2**31 - 1
 
 
@@ -76,12 +76,32 @@ class Labeling:
         none = np.zeros(len(classes), np.int32)
         return cls(classes, none if instances is None else instances, none.astype(bool), names)
 
+    @classmethod
+    def from_segmentation(cls, result: Segmentation) -> Self:
+        """Labels of a segmentation, its instances by their masks; points out of view are ignored."""
+        return cls.from_instance_labels(result.labels, [instance.name for instance in result.instances])
+
+    @classmethod
+    def from_instance_labels(cls, labels: NDArray[np.signedinteger], class_names: Iterable[str]) -> Self:
+        """Labels of points by instance, (N,): -1 ignored, 0 background, m of class `class_names[m - 1]`.
+
+        Raises:
+            InputError: A label has no name.
+        """
+        objects = [str(name) for name in class_names]
+        if labels.size and not (labels.min() >= -1 and labels.max() <= len(objects)):
+            raise InputError(f"labels: got {labels.min()} to {labels.max()}, expected -1 to {len(objects)}")
+        names = tuple(dict.fromkeys([BACKGROUND, *objects]))
+        instances = np.maximum(labels, 0)
+        by_label = np.array([0, *(names.index(name) for name in objects)], np.int32)
+        return cls(by_label[instances], instances, labels < 0, names)
+
     def __len__(self) -> int:
         return len(self.classes)
 
     def __repr__(self) -> str:
-        found = [name for name, count in self.counts().items() if count and name != BACKGROUND]
-        return f"Labeling({len(self)} points, {int(self.ignored.sum())} ignored, classes {found})"
+        classes = [name for name, count in self.counts().items() if count and name != BACKGROUND]
+        return f"Labeling({len(self)} points, {int(self.ignored.sum())} ignored, classes {classes})"
 
     def counts(self) -> dict[str, int]:
         """Points of each class that are not ignored."""
@@ -95,45 +115,6 @@ class Labeling:
         if inside.dtype != np.bool_:
             raise DtypeError(f"keep: expected bool, got {inside.dtype}")
         return replace(self, ignored=self.ignored | ~inside)
-
-    def mapped(self, vocabulary: ClassSet, *, truth: bool = False) -> Labeling:
-        """These labels with the names of `vocabulary`.
-
-        What is not scored becomes background. In truth, names that the vocabulary leaves out are ignored, and a name
-        that it does not know is an error; in a prediction both are background, for what a method predicts must not
-        choose which points count.
-
-        Raises:
-            InputError: This is truth and holds an unknown class.
-        """
-        if truth:
-            self._check_known(vocabulary)
-        targets = np.array([vocabulary.index(name) for name in self.names], np.int32)
-        classes = targets[self.classes]
-        ignored = self.ignored
-        if truth:
-            ignored = ignored | np.array([name in vocabulary.left_out for name in self.names])[self.classes]
-        return Labeling(classes, self._distinct_instances(classes), ignored, vocabulary.vocabulary)
-
-    def _check_known(self, vocabulary: ClassSet) -> None:
-        unknown = [name for name, count in self.counts().items() if count and not vocabulary.knows(name)]
-        if unknown:
-            raise InputError(
-                f"truth has points of {unknown}, which the class set {vocabulary.names} does not know; "
-                "name them in its aliases, left_out or background"
-            )
-
-    def _distinct_instances(self, classes: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Instances of scored classes, numbered anew where two classes that become one share a number."""
-        instances = np.where(classes > 0, self.instances, 0).astype(np.int32)
-        rows = np.flatnonzero(instances)
-        before, numbers = np.unique(self._pairs(self.classes[rows], rows), return_inverse=True)
-        if len(before) > len(np.unique(self._pairs(classes[rows], rows))):
-            instances[rows] = numbers.reshape(-1) + 1
-        return instances
-
-    def _pairs(self, classes: NDArray[np.int32], rows: NDArray[np.intp]) -> NDArray[np.int64]:
-        return classes.astype(np.int64) << 32 | self.instances[rows]
 
 
 def _whole_numbers(name: str, values: ArrayLike, shape: tuple[int, ...], highest: int) -> NDArray[np.int32]:

@@ -47,7 +47,7 @@ def test_restricted_ignores_the_others_too():
 def test_mapping_truth_ignores_left_out_names_and_predictions_make_them_background():
     names = ("background", "Car", "Van", "Person_sitting", "Truck")
     source = labeling([0, 1, 2, 3, 4], [0, 1, 2, 3, 4], names=names)
-    truth, prediction = source.mapped(ClassSet.kitti(), truth=True), source.mapped(ClassSet.kitti())
+    truth, prediction = ClassSet.kitti().map(source, truth=True), ClassSet.kitti().map(source)
     for mapped in (truth, prediction):
         assert mapped.names == NAMES
         assert mapped.classes.tolist() == [0, 1, 0, 2, 0]
@@ -58,7 +58,7 @@ def test_mapping_truth_ignores_left_out_names_and_predictions_make_them_backgrou
 
 def test_instances_of_merged_classes_stay_apart():
     names = ("background", "Pedestrian", "Person_sitting")
-    mapped = labeling([1, 1, 2, 2, 1], [1, 1, 1, 2, 0], names=names).mapped(ClassSet.kitti())
+    mapped = ClassSet.kitti().map(labeling([1, 1, 2, 2, 1], [1, 1, 1, 2, 0], names=names))
     assert mapped.classes.tolist() == [2] * 5
     walking, also_walking, sitting, other, none = mapped.instances.tolist()
     assert walking == also_walking
@@ -69,17 +69,17 @@ def test_instances_of_merged_classes_stay_apart():
 def test_unknown_names_are_an_error_in_truth_and_background_in_predictions():
     source = labeling([0, 1], names=("background", "gnome"))
     with pytest.raises(InputError, match="points of \\['gnome'\\].*aliases, left_out or background"):
-        source.mapped(ClassSet.kitti(), truth=True)
-    assert source.mapped(ClassSet.kitti()).classes.tolist() == [0, 0]
+        ClassSet.kitti().map(source, truth=True)
+    assert ClassSet.kitti().map(source).classes.tolist() == [0, 0]
     unseen = labeling([0, 0], names=("background", "gnome"))
-    assert unseen.mapped(ClassSet.kitti(), truth=True).classes.tolist() == [0, 0]
+    assert ClassSet.kitti().map(unseen, truth=True).classes.tolist() == [0, 0]
     known = ClassSet(names=("Car",), background=("gnome",))
-    assert source.mapped(known, truth=True).classes.tolist() == [0, 0]
+    assert known.map(source, truth=True).classes.tolist() == [0, 0]
 
 
 def test_a_mapped_labeling_maps_onto_itself():
     source = labeling([0, 1, 2, 1], [0, 4, 4, 2], ignored=[3])
-    again = source.mapped(ClassSet.kitti(), truth=True).mapped(ClassSet.kitti(), truth=True)
+    again = ClassSet.kitti().map(ClassSet.kitti().map(source, truth=True), truth=True)
     for name in ("classes", "instances", "ignored"):
         np.testing.assert_array_equal(getattr(again, name), getattr(source, name))
 
