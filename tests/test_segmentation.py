@@ -283,6 +283,15 @@ def test_map_coordinates_in_double_precision_keep_their_precision(small_scene):
         ldls.segment((points + offset).astype(np.float32), masks, shifted)
 
 
+def test_single_precision_is_warned_of_once_its_steps_pass_a_centimetre(small_scene):
+    points, masks, camera = small_scene
+    # from 2^17 m = 131,072 m on, float32 has steps of 1/64 m
+    near, far = (points + np.float32([0, offset, 0]) for offset in (131_000, 131_100))
+    ldls.segment(near, masks, camera)
+    with pytest.warns(PrecisionWarning, match="float32 spacing at 1.3e\\+05 is 0.016 m"):
+        ldls.segment(far, masks, camera)
+
+
 def translation(offset):
     transform = np.eye(4)
     transform[:3, 3] = offset
@@ -400,3 +409,12 @@ def test_direct_labels_of_a_ring_are_those_of_the_first_camera_that_sees_an_inst
     ring = ldls.segment(points, [ldls.View(first, camera), ldls.View(second, camera)])
     alone = ldls.segment(points, masks, camera)
     np.testing.assert_array_equal(ring.direct_labels, alone.direct_labels)
+
+
+def test_where_two_cameras_see_different_instances_the_first_gives_the_direct_label(small_scene):
+    points, masks, camera = small_scene
+    other = ldls.InstanceMasks.from_array(masks.to_array()[:1], categories=[2])
+    ring = ldls.segment(points, [ldls.View(masks, camera), ldls.View(other, camera)])
+    assert [instance.category for instance in ring.instances] == [1, 3, 2]
+    np.testing.assert_array_equal(ring.direct_labels, ldls.segment(points, masks, camera).direct_labels)
+    assert (ring.direct_labels == 1).sum() > 50

@@ -76,10 +76,11 @@ def test_las_files_open_elsewhere(small_scene, tmp_path, suffix, dtype, shift):
     np.testing.assert_array_equal(ldls.read_points(tmp_path / f"a{suffix}")[:, :3], las.xyz)
 
 
-def test_las_keeps_larger_intensities_as_they_are(result, tmp_path):
+@pytest.mark.parametrize("largest", [2, 255, 256, 65535])
+def test_las_keeps_larger_intensities_as_they_are(result, tmp_path, largest):
     laspy = pytest.importorskip("laspy", reason="the extra las is not installed")
     points = result.points.copy()
-    points[:, 3] = np.arange(len(points))
+    points[:, 3] = np.linspace(0, largest, len(points)).round()
     ldls.save(replace(result, points=points), tmp_path / "a.las")
     np.testing.assert_array_equal(laspy.read(tmp_path / "a.las").intensity, points[:, 3])
 

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,39 @@ def test_five_columns_are_not_taken_for_four(tmp_path):
         ldls.read_points(path)
     np.testing.assert_array_equal(ldls.read_points(path, columns=5), values)
     assert ldls.read_points(path, columns=4).shape == (10, 4)
+
+
+def sweep(n, columns):
+    """Plausible rows: metres, intensity as the sensors of KITTI and of nuScenes give it, and rings."""
+    generator = np.random.default_rng(4)
+    xyz = generator.normal(0, [20, 20, 1], (n, 3)).round(3)
+    intensity = generator.uniform(0, 1, n).round(2) if columns == 4 else generator.integers(0, 256, n)
+    return np.column_stack([xyz, intensity, np.arange(n) % 32]).astype("<f4")[:, :columns]
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "columns", "guess"),
+    [
+        pytest.param("sweep.pcd.bin", 100, 4, 5, id="four for five"),
+        pytest.param("sweep.bin", 80, 5, 4, id="five for four"),
+    ],
+)
+def test_a_guess_that_scrambles_the_rows_is_refused(tmp_path, name, n, columns, guess):
+    values = sweep(n, columns)
+    values.tofile(tmp_path / name)
+    message = rf"{re.escape(name)}: guessed {guess} floats.*pass columns={columns} \(or columns={guess} to insist"
+    with pytest.raises(ldls.FileFormatError, match=message):
+        ldls.read_points(tmp_path / name)
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / name, columns=columns), values)
+    assert ldls.read_points(tmp_path / name, columns=guess).shape == (400 // guess, guess)
+
+
+@pytest.mark.parametrize("name, columns", [("sweep.pcd.bin", 5), ("sweep.bin", 4)])
+@pytest.mark.parametrize("zeros", [False, True], ids=["a sweep", "nothing but zeros"])
+def test_a_guess_that_fits_stands_though_the_other_divides(tmp_path, name, columns, zeros):
+    values = sweep(400 // columns, columns) * (not zeros)
+    values.tofile(tmp_path / name)
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / name), values)
 
 
 def test_real_nuscenes_points_have_five_columns(data_folder):

@@ -48,6 +48,14 @@ def test_coordinates_of_utm_size_stay_exact(tmp_path, point_format, version, suf
     np.testing.assert_array_equal(points[:, 3], las.intensity)
 
 
+@pytest.mark.parametrize("largest", [1, 255, 256])
+def test_intensities_are_those_of_the_file_however_small(tmp_path, largest):
+    las = cloud()
+    las.intensity = np.arange(N_POINTS) % (largest + 1)
+    las.write(tmp_path / "a.las")
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / "a.las")[:, 3], las.intensity)
+
+
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
 def test_a_cloud_without_points(tmp_path, suffix):
     cloud(n_points=0).write(tmp_path / f"a{suffix}")

@@ -12,6 +12,7 @@ from ldls.cloud import MAX_COLUMNS
 from ldls.errors import FileFormatError, ParameterError, RecoveredFileWarning, TruncatedFileError
 
 FLOAT_BYTES = 4
+MAX_RINGS = 256
 
 
 def read(path: Path, *, columns: int | None = None, recover: bool = False) -> NDArray[np.float32]:
@@ -50,18 +51,22 @@ def read(path: Path, *, columns: int | None = None, recover: bool = False) -> ND
 
 
 def _check_guess(path: Path, values: NDArray[np.float32], columns: int) -> None:
-    """Refuse four columns where the file reads as five whose last is a ring number, and the other way round."""
+    """Refuse a guess that the fifth column contradicts, where the file divides into rows of four and of five.
+
+    Of five columns the last is nuScenes' ring number; all zeros are no evidence for five, nor against it.
+    """
     other = 9 - columns
     if values.size == 0 or values.size % other:
         return
-    if not _has_ring(values, columns) and _has_ring(values, other):
-        raise FileFormatError(
-            f"{path.name}: guessed {columns} floats a point, but with {other} the last column holds ring numbers; "
-            f"pass columns={other} (or columns={columns} to insist)"
-        )
-
-
-def _has_ring(values: NDArray[np.float32], columns: int) -> bool:
-    ring = values.reshape(-1, columns)[:, -1]
-    whole = (ring == np.floor(ring)) & (ring >= 0) & (ring < 256)
-    return bool(whole.all()) and columns == 5 and bool(ring.any())
+    fifth = values[4::5]
+    are_rings = bool(((fifth == np.floor(fifth)) & (fifth >= 0) & (fifth < MAX_RINGS)).all())
+    if columns == 5 and not are_rings:
+        fault = f"the fifth column does not hold ring numbers, and rows of {other} fit the file too"
+    elif columns == 4 and are_rings and fifth.any():
+        fault = f"with {other} the last column holds ring numbers"
+    else:
+        return
+    raise FileFormatError(
+        f"{path.name}: guessed {columns} floats a point, but {fault}; pass columns={other} "
+        f"(or columns={columns} to insist)"
+    )
