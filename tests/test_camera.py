@@ -34,13 +34,6 @@ def test_kitti_calibration_composes_projection_and_transform(write):
     assert ldls.read_camera(write(calibration()), camera=0).projection[0, 3] == 0
 
 
-def test_kitti_rectifies_after_it_moves_from_lidar_to_camera(write):
-    # with a rotation of its own, R0_rect shows the order of the product
-    camera = ldls.Camera.from_kitti(write(calibration(R0_rect="0.8 -0.6 0 0.6 0.8 0 0 0 1")))
-    expected = [[0, -0.8, 0.6, 0.2], [0, -0.6, -0.8, -0.1], [1, 0, 0, -0.3], [0, 0, 0, 1]]
-    np.testing.assert_allclose(camera.T_camera_lidar, expected, rtol=0, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     "text",
     [
