@@ -127,7 +127,7 @@ def neighbors(measured: Frame, threads: int, runs: int, _most: int) -> Table:
 
 
 def growth(measured: Frame, threads: int, runs: int, most: int) -> Table:
-    """How time and memory grow with the number of points, all in view of one camera, 20 instances."""
+    """Time and memory against the number of points, all in view of one camera, 20 instances."""
     from benches import memory
 
     params = ldls.Params(threads=threads)
@@ -146,7 +146,7 @@ def growth(measured: Frame, threads: int, runs: int, most: int) -> Table:
 
 
 def instances(measured: Frame, threads: int, runs: int, _most: int) -> Table:
-    """How time grows with the number of instances."""
+    """Time against the number of instances."""
     params = ldls.Params(threads=threads)
     table = _table("time against instances, 100,000 points", ["instances", "ms"], f"{threads} threads")
     for count in (0, 1, 5, 20, 100, 500):
@@ -157,7 +157,7 @@ def instances(measured: Frame, threads: int, runs: int, _most: int) -> Table:
 
 
 def thread_scaling(measured: Frame, threads: int, runs: int, _most: int) -> Table:
-    """How time falls with the number of threads."""
+    """Time against the number of threads."""
     table = _table(f"time against threads: {measured.name}", ["threads", "ms", "ratio to one"], "")
     counts = [count for count in (1, 2, 4, 8, 16) if count <= threads]
 

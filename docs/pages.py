@@ -1,4 +1,4 @@
-"""What stands in the pages of the documentation: code, commands, pictures and how these are made."""
+"""The pages of the documentation: code, commands, pictures and how these are made."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def shown(page: Path) -> list[str]:
 
 
 def recipes(page: Path) -> list[Recipe]:
-    """How the pictures of a page are made: `<!-- PICTURE is FILE -->` before a block of shell that writes FILE."""
+    """Return the commands that make the pictures of a page: `<!-- PICTURE is FILE -->` before a block of shell that writes FILE."""
     return [_recipe(page, found[0]) for found in RECIPE.finditer(page.read_text())]
 
 

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 
 class LdlsError(Exception):
-    """Whatever `ldls` raises of its own."""
+    """Base class of the errors of `ldls`."""
 
     code: ClassVar[str] = "ldls"
 
@@ -61,7 +61,7 @@ class ParameterError(InputError):
 
 
 class SourceError(InputError):
-    """A source of frames that is not whole, or of which nobody can tell what it is."""
+    """A source of frames that is not whole, or of an unknown kind."""
 
     code = "source"
 
@@ -130,7 +130,7 @@ class InternalError(LdlsError):
 
 
 class LdlsWarning(UserWarning):
-    """Whatever `ldls` warns of."""
+    """Base class of the warnings of `ldls`."""
 
 
 class NoUsablePoints(LdlsWarning):

@@ -1,4 +1,4 @@
-"""Labels of the points of one frame, whoever made them."""
+"""Labels of the points of one frame, by a method or a person."""
 
 from __future__ import annotations
 

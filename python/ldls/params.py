@@ -53,7 +53,7 @@ class Params:
         return cls()
 
     def as_tuple(self) -> tuple[int, float, float, int, int | None, bool]:
-        """What the core needs, in its order."""
+        """The parameters of the core, in its order."""
         return (
             self.neighbors,
             self.sigma,

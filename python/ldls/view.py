@@ -1,4 +1,4 @@
-"""What one camera took of a moment: an image's masks, and the camera."""
+"""Views: the masks of an image and the camera that took it."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class View:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SeenView:
-    """A view, and what came of it.
+    """A view, with the points that it sees and their labels.
 
     Attributes:
         view: Masks and camera.

@@ -1,4 +1,4 @@
-"""Where frames are segmented."""
+"""The engines that segment the frames of a run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Engine = Callable[[FrameWork, Sequence[tuple[int, str]]], Iterator[Outcome]]
 
 @dataclass(frozen=True, kw_only=True)
 class EngineOptions:
-    """What engines can be told; each takes what concerns it.
+    """Options of the engines; each takes those that concern it.
 
     Attributes:
         workers: Workers at a time; as many as there are cores, or GPUs where workers need them, by default.
@@ -54,7 +54,7 @@ def _ray(options: EngineOptions) -> Engine:
 
 
 ENGINES: dict[str, Callable[[EngineOptions], Engine]] = {"local": _local, "ray": _ray}
-"""What makes each engine."""
+"""Makers of the engines, by name."""
 
 
 def open_engine(engine: str | Engine, options: EngineOptions) -> Engine:

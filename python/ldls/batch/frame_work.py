@@ -1,4 +1,4 @@
-"""What is done with one frame: read, masks, segment, write. Every engine does it so."""
+"""The work on one frame, the same for every engine: read, get masks, segment, write."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ class Work:
     seconds: dict[str, float] = field(default_factory=dict)
 
     def outcome(self) -> Outcome:
-        """What became of it, all stages done."""
+        """Return the outcome of a frame with all stages done."""
         assert self.record is not None
         return Outcome(self.record, self.seconds)
 
     def failed(self, error: StageError) -> Outcome:
-        """What became of it, one stage failed."""
+        """Return the outcome of a frame with a failed stage."""
         cause = error.error
         record = {
             "stage": error.stage,
@@ -83,7 +83,7 @@ class FrameWork:
     """Does the stages of frames; several threads may do so at a time."""
 
     def __init__(self, source: Source, settings: RunSettings, out: Path) -> None:
-        """Prepare for the frames of `source`: the segmenter is opened here, and told to keep to one thread.
+        """Prepare for the frames of `source`: the segmenter is opened here, limited to one thread.
 
         Raises:
             LdlsError: The segmenter, or the place of the masks, cannot be used.
@@ -100,7 +100,7 @@ class FrameWork:
         return FrameWork, (self._source, self._settings, self.out)
 
     def read(self, work: Work) -> None:
-        """Read points and stored masks; what they are read from is looked at before, lest a change be missed."""
+        """Read points and stored masks; the files are looked at before, so that no change is missed."""
         with _stage(work, "read"):
             work.inputs.update(_states(self._source.files(work.index)))
             work.frame = self._source[work.index]
@@ -155,7 +155,7 @@ class FrameWork:
         return work.outcome()
 
     def is_done(self, record: Mapping[str, Any] | None) -> bool:
-        """Whether a frame was finished by an earlier run, as `record` says, and its files are still there.
+        """Return True if an earlier run finished a frame, by its `record`, and its files are still there.
 
         Raises:
             BatchError: Its input was changed since.
@@ -189,7 +189,7 @@ class FrameWork:
 
 
 def _segmenters(spec: str, min_score: float | None) -> Callable[[str, CameraImage], Segmenter]:
-    """What gives the segmenter of an image: one for all, or one for each where files name frames."""
+    """Return a function that gives the segmenter of an image: one for all, or one each where files name frames."""
     if "{frame}" in spec or "{camera}" in spec:
         return lambda frame, image: open_segmenter(fill(spec, frame, image.name), min_score=min_score)
     # every worker runs it, each on a core of its own

@@ -1,4 +1,4 @@
-"""What a run has done: a line a frame, appended when the files of the frame are safe on the disk.
+"""The journal of a run: a line a frame, appended when the files of the frame are safe on the disk.
 
 The first line holds the settings; a run goes on only with the same ones. Frames are appended in the order in which
 they are finished, in groups, so that the disk need not be waited for after each; a line that a crash cut off is
@@ -49,7 +49,7 @@ class Journal:
             raise
 
     def get(self, frame: str) -> Record | None:
-        """What became of a frame; None if nothing did."""
+        """Return the record of a frame; None if it has none."""
         place = self._places.get(frame)
         if place is None:
             return None
@@ -57,7 +57,7 @@ class Journal:
             return _record_at(file, place)
 
     def records(self, frames: Sequence[str]) -> Iterator[Record]:
-        """What became of `frames`, one after the other; those of which nothing is known are passed over."""
+        """Yield the records of `frames`; those without one are passed over."""
         with self._path.open("rb") as file:
             for frame in frames:
                 if frame in self._places:
@@ -93,7 +93,7 @@ class Journal:
         sync_folder(self._folder)
 
     def _append(self, records: Iterable[Record]) -> list[int]:
-        """Where the line of each record stands."""
+        """Return the offset of the line of each record."""
         lines = [_line(record) for record in records]
         places = list(accumulate((len(line) for line in lines), initial=self._end))
         rest = memoryview(b"".join(lines))

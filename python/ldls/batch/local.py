@@ -19,13 +19,13 @@ from ldls.batch.outcome import Outcome
 READERS = 2
 WRITERS = 2
 SWITCH_INTERVAL_S = 0.0005
-"""How long a thread keeps Python's lock when others want it: the default, 5 ms, is a third of a frame."""
+"""Seconds for which a thread keeps Python's lock when others want it: the default, 5 ms, is a third of a frame."""
 POLL_S = 0.1
-"""How often waiting threads look whether the run was stopped."""
+"""Seconds between looks of waiting threads at the flag that stops the run."""
 
 
 def run_local(work: FrameWork, frames: Sequence[tuple[int, str]], workers: int) -> Iterator[Outcome]:
-    """What became of each of `frames`, in the order in which they are finished.
+    """Yield the outcome of each of `frames`, in the order in which they are finished.
 
     Args:
         work: What is done with a frame.

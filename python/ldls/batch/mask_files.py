@@ -8,7 +8,7 @@ from ldls.batch.settings import fill
 from ldls.errors import InputError
 
 SUFFIXES = (".json", ".npz", ".png", ".npy", ".txt")
-"""What is looked for in a folder of masks, in this order."""
+"""Suffixes looked for in a folder of masks, in this order."""
 
 
 class MaskFiles:

@@ -1,4 +1,4 @@
-"""What becomes of a frame."""
+"""The outcome of a frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which frames of a source a run takes, and under which names it writes them."""
+"""The frames of a source that a run takes, and the names of their outputs."""
 
 from __future__ import annotations
 

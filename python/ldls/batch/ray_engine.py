@@ -31,12 +31,12 @@ MAX_STILLBIRTHS = 20
 """Workers that may die one after the other before any of them is ready."""
 CONNECT_S = 10.0
 STARTING = (-1, "")
-"""What a worker does that makes ready."""
+"""State of a worker that is starting."""
 
 
 @dataclass(frozen=True)
 class RayCluster:
-    """Where Ray runs.
+    """A running Ray.
 
     Attributes:
         address: Address of a cluster, "auto" for the one that this machine is part of; None starts one on this machine.
@@ -85,7 +85,7 @@ def run_ray(
     workers: int | None,
     gpus: float,
 ) -> Iterator[Outcome]:
-    """What became of each of `frames`, in the order in which they are finished.
+    """Yield the outcome of each of `frames`, in the order in which they are finished.
 
     Args:
         work: What is done with a frame; workers open it anew.
@@ -123,7 +123,7 @@ class _Pool:
     def __init__(self, ray: Any, work: FrameWork, resources: dict[str, Any]) -> None:  # noqa: ANN401
         self._ray = ray
         self._share: int = resources["max_concurrency"]
-        # a worker that dies is replaced here, lest a frame that kills be tried for ever
+        # a worker that dies is replaced here, so that a frame that kills is not tried for ever
         self._class = ray.remote(RayWorker).options(max_restarts=0, max_task_retries=0, **resources)
         try:
             self._work = ray.put(work)

@@ -40,7 +40,7 @@ class RayWorker:
         self._work = work
 
     def do(self, index: int, name: str) -> Outcome:
-        """What became of a frame."""
+        """Segment a frame; return its outcome."""
         return self._work.do(Work(index, name))
 
 

@@ -1,4 +1,4 @@
-"""What a run is made of: whatever changes its outputs, so that a run goes on only as what it began."""
+"""Settings of a run: everything that changes its outputs, so that a run goes on only as it began."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ KNOWN_FORMATS = (*(ending.removeprefix(".") for ending in WRITERS), PICTURE)
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
-    """How every frame of a run is treated.
+    """Settings that hold for every frame of a run.
 
     Attributes:
         masks: Where stored masks lie: a folder, or a path with {frame} and, for several cameras, {camera}.
@@ -66,7 +66,7 @@ class RunSettings:
         return path if path.is_file() else None
 
     def record(self) -> dict[str, Any]:
-        """What a journal remembers of these settings."""
+        """These settings as a journal stores them."""
         settings = asdict(self)
         # the same bits for any number of threads
         del settings["params"]["threads"]
@@ -83,6 +83,6 @@ def fill(pattern: str, frame: str, camera: str) -> str:
 
 
 def source_record(kind: str, path: str, names: Sequence[str]) -> dict[str, Any]:
-    """What a journal remembers of a source: where it lies and which frames it has."""
+    """A source as a journal stores it: its path and its frames."""
     digest = hashlib.sha256("\n".join(names).encode()).hexdigest()
     return {"kind": kind, "path": path, "frames": len(names), "names_sha256": digest}

@@ -1,4 +1,4 @@
-"""What came of a run."""
+"""The summary of a run."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Failure:
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What came of a run, earlier parts of it included.
+    """Counts of a run, earlier parts of it included.
 
     Attributes:
         n_frames: Frames wanted.

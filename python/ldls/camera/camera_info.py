@@ -86,7 +86,7 @@ def _distortion(fields: Fields) -> Distortion:
 
 
 class _Crop:
-    """What became of the full image: cut to a region, then shrunk by binning."""
+    """The part of the full image that is left: cut to a region, then shrunk by binning."""
 
     def __init__(self, offset: NDArray[np.float64], binning: NDArray[np.float64], size: tuple[int, int] | None) -> None:
         self.offset, self.binning, self.image_size = offset, binning, size

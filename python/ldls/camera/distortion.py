@@ -1,4 +1,4 @@
-"""How a lens departs from a pinhole."""
+"""Distortion of a lens."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SPELLINGS = {
     "": "none", "pinhole": "none", "radtan": "plumb_bob", "brown": "plumb_bob", "rational": "rational_polynomial",
     "fisheye": "equidistant", "kannala_brandt": "equidistant", "kb4": "equidistant", "equi": "equidistant",
 }  # fmt: skip
-"""What Kalibr, OpenCV and others call the models of ROS."""
+"""Names that Kalibr, OpenCV and others give to the models of ROS."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Distortion:
                 f"distortion: model {self.model!r} is unknown, expected one of {', '.join(MODELS)}; undistort the "
                 "images and leave it out if your camera has another"
             )
-        # an empty D means that there is none, whatever the model is called
+        # an empty D means that there is none, under any model's name
         if len(values) == 0:
             model = "none"
         if len(values) in (12, 14) and not any(values[8:]):
@@ -72,7 +72,7 @@ class Distortion:
 
     @property
     def is_none(self) -> bool:
-        """Whether the image is that of a pinhole."""
+        """True if the image is that of a pinhole."""
         return self.model == "none" or (not any(self.coefficients) and self.model != "equidistant")
 
     def as_core(self) -> tuple[str, NDArray[np.float64]]:

@@ -10,7 +10,7 @@ from ldls.errors import CalibrationError
 Matrix = NDArray[np.float64]
 
 ROTATION_LIMIT = 1e-3
-"""How far a rotation may be from orthonormal; calibration files round to 7 digits."""
+"""Largest deviation of a rotation from orthonormal; calibration files round to 7 digits."""
 
 
 def as_transform(name: str, values: ArrayLike) -> Matrix:

@@ -1,4 +1,4 @@
-"""Which point of a result a word on the command line means."""
+"""The point of a result that a word on the command line names."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EXPECTED = "a row number as 12345, a pixel U,V as 610,180 or a place X,Y,Z in me
 
 @dataclass(frozen=True, kw_only=True)
 class ChosenPoint:
-    """A point and how it was come to.
+    """A point and how it was chosen.
 
     Attributes:
         row: Its row in the cloud.

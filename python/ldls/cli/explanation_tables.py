@@ -1,4 +1,4 @@
-"""What `ldls explain` prints below its verdict: tables, and sentences between them."""
+"""Tables and sentences that `ldls explain` prints below its verdict."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def tables_of(explanation: Explanation) -> Iterator[Table | str]:
 
 
 def sight_table(explanation: Explanation) -> Table:
-    """What each camera has of the point."""
+    """Return the table of the point as each camera sees it."""
     table = Table(title="what the camera sees" if len(explanation.sights) == 1 else "what the cameras see")
     table.add_column("camera")
     table.add_column("depth", justify="right")

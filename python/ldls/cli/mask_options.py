@@ -1,4 +1,4 @@
-"""Where commands get instance masks from: files, or a segmenter that runs on the images."""
+"""Instance masks for commands: from files, or from a segmenter that runs on the images."""
 
 from __future__ import annotations
 

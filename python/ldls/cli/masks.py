@@ -26,7 +26,7 @@ ImageIdOption = Annotated[int | None, typer.Option(help="Which image of a COCO f
 
 
 class Priority(StrEnum):
-    """Which of several masks keeps a pixel."""
+    """Rule that leaves a pixel to one of several masks."""
 
     SCORE = "score"
     AREA = "area"
@@ -34,7 +34,7 @@ class Priority(StrEnum):
 
 
 class Variant(StrEnum):
-    """What else a format may hold."""
+    """Variants of formats."""
 
     RESULTS = "results"
     RESEARCH = "research"
@@ -46,11 +46,11 @@ VARIANTS: dict[Variant, dict[str, Any]] = {
     Variant.RESEARCH: {"layout": "research"},
     Variant.PIXELS: {"pixels_only": True},
 }
-"""What writers of masks call the variants."""
+"""Options of the writers, by variant."""
 
 
 class Axis(StrEnum):
-    """Where a stack has its instances."""
+    """Axis of a stack that counts the instances."""
 
     FIRST = "first"
     LAST = "last"

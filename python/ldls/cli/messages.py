@@ -1,4 +1,4 @@
-"""How commands speak: tables on standard output, errors on standard error with exit status 1."""
+"""Messages of commands: tables on standard output, errors on standard error with exit status 1."""
 
 from __future__ import annotations
 
@@ -80,6 +80,6 @@ def timing_table(timings: Mapping[str, float]) -> Table:
 
 
 def console() -> Console:
-    """Where tables go: as wide as the terminal, and wide enough where there is none."""
+    """Return the console for tables: as wide as the terminal, and wide enough where there is none."""
     found = Console()
     return found if found.is_terminal else Console(width=100)

@@ -27,7 +27,7 @@ PictureOption = Annotated[
 
 
 class Output(StrEnum):
-    """What a command can write."""
+    """A format of results."""
 
     NPZ = "npz"
     LABEL = "label"
@@ -43,7 +43,7 @@ class Output(StrEnum):
 
     @property
     def ending(self) -> str:
-        """How the names of such files end."""
+        """Ending of the names of such files."""
         return NUSCENES_ENDINGS.get(self, f".{self}")
 
 

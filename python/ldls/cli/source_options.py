@@ -1,4 +1,4 @@
-"""Which frames of which source a command takes."""
+"""Options that choose a source and its frames."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a point has its label, and the graph of a result built again."""
+"""Explanation of the label of a point, and the graph of a result built again."""
 
 from ldls.explaining.explain import explain, influences
 from ldls.explaining.explanation import Components, Edges, Explanation, Island, Likelihood, Neighbor, Provenance

@@ -1,4 +1,4 @@
-"""Why a point has its label: its pixels, its edges and whose pixels its likelihood comes from."""
+"""Explain the label of a point by its pixels, its edges and the origin of its likelihood."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 LEFT = 1e-9
-"""What one more product brings, 1 at first, below which a converged solution leaves out the rest."""
+"""Change by one more product, 1 at first, below which a converged solution leaves out the rest."""
 MOST_PRODUCTS = 20_000
 
 
 def explain(result: Segmentation, point: int) -> Explanation:
-    """Why the point in row `point` of the cloud of `result` has its label. Needs the extra `eval`.
+    """Explain the label of the point in row `point` of the cloud of `result`. Needs the extra `eval`.
 
     The graph of the result is built again, and the likelihoods of this point are those of plain products in double
     precision.
@@ -165,11 +165,11 @@ def _connected(graph: csr_array) -> NDArray[np.int32]:
 
 
 def influences(A: csr_array, row: int, iterations: int | None) -> NDArray[np.float64]:
-    """What the pixels of each point count for the point in `row`: (n,) r, with which its likelihoods are r b.
+    """Return (n,) r, the influence of each point's pixels on the point in `row`, whose likelihoods are r b.
 
     Likelihoods are z = (1 + A + ... + A^(iterations - 1)) b (step 5); r is one row of that polynomial, the sum of the
     products of the transpose of A with a unit vector, in double precision. It costs one vector instead of one for each
-    label, and tells where a label comes from.
+    label, and shows where a label comes from.
 
     Args:
         A: (n, n) of `stages.normalize_rows`.

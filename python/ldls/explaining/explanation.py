@@ -48,7 +48,7 @@ class Likelihood:
 
 @dataclass(frozen=True, kw_only=True)
 class Edges:
-    """What the edges of a point weigh, as shares of their sum.
+    """Weights of the edges of a point, as shares of their sum.
 
     Attributes:
         own: Edge to itself.
@@ -63,7 +63,7 @@ class Edges:
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """Whose pixels the likelihood of a point's diffused label comes from.
+    """Origin of the likelihood of a point's diffused label.
 
     Attributes:
         own_share: Share that its own pixels bring; the others' came along edges.
@@ -92,7 +92,7 @@ class Components:
 
     @property
     def removed(self) -> bool:
-        """Whether the point lost its label."""
+        """True if the point lost its label."""
         return self.removal and self.own > 0
 
 
@@ -111,7 +111,7 @@ class Island:
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """What decided the label of one point; `print(explanation.verdict)` says it in a sentence.
+    """The facts that decided the label of one point; `explanation.verdict` sums them up in a sentence.
 
     Attributes:
         point: Its row in the cloud.
@@ -153,7 +153,7 @@ class Explanation:
 
     @property
     def verdict(self) -> str:
-        """Why the point has its label, in a sentence."""
+        """The reason for the label of the point, in a sentence."""
         return verdict_of(self)
 
     def to_dict(self) -> dict[str, Any]:
@@ -165,7 +165,7 @@ class Explanation:
 
 
 def verdict_of(explanation: Explanation) -> str:
-    """Why the point has its label, in a sentence."""
+    """The reason for the label of the point, in a sentence."""
     point = f"Point {explanation.point}"
     if explanation.label < 0:
         return f"{point} is out of view: {_why_unseen(explanation.sights)}."

@@ -1,4 +1,4 @@
-"""What a camera has of one point: whether it sees it, where, and what masks lie there."""
+"""One point as a camera sees it: outcome, pixel, and the masks there."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class WindowCount:
 
 @dataclass(frozen=True, kw_only=True)
 class Sight:
-    """What one camera has of a point.
+    """A point as one camera sees it.
 
     Attributes:
         camera: Name of the view, or "camera 0" and so on.
@@ -60,7 +60,7 @@ class Sight:
 
 
 def sights_of(result: Segmentation, point: int) -> tuple[Sight, ...]:
-    """What each camera of `result` has of the point in row `point` of its cloud."""
+    """Return the point in row `point` of the cloud of `result` as each camera sees it."""
     names = camera_names(result.views)
     return tuple(_sight(result, seen, name, point) for name, seen in zip(names, result.views, strict=True))
 

@@ -14,7 +14,7 @@ from typing import IO
 from ldls.errors import CorruptFileError, FileFormatError, UnsafePathError
 
 UNFINISHED = ".ldls-part"
-"""How the names of files end that are being written."""
+"""Ending of the names of files that are being written."""
 KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),

@@ -1,4 +1,4 @@
-"""What formats for labelled clouds write of each point."""
+"""Columns of labelled clouds: position, instance, name and colour of each point."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from ldls.view import SeenView, View
 
 Arrays = Mapping[str, NDArray[Any]]
 MASKS = "masks_"
-"""How the names of the arrays begin that hold the masks of a view."""
+"""Prefix of the arrays that hold the masks of a view."""
 
 
 def write(path: str | PathLike[str], result: Segmentation) -> None:

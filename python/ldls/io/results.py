@@ -27,7 +27,7 @@ WRITERS: dict[str, Callable[[Path, Segmentation], None]] = {
     ".parquet": tables.write_parquet,
     ".csv": tables.write_csv,
 }
-"""What writes a segmentation, by the ending of the name."""
+"""Writers of results, by the ending of the name."""
 
 
 def read_result(path: str | PathLike[str]) -> Segmentation:

@@ -12,7 +12,7 @@ from ldls.segmentation.oriented_box import OrientedBox
 
 @dataclass(frozen=True, kw_only=True)
 class SegmentedObject:
-    """What became of one instance mask.
+    """The points of one instance.
 
     Attributes:
         label: Its label m in `Segmentation.labels`.

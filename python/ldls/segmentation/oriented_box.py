@@ -63,7 +63,7 @@ def fit_upright_box(points: NDArray[np.float64]) -> OrientedBox:
 
 
 def _best(ground: NDArray[np.float64], headings: NDArray[np.float64]) -> int:
-    """Which heading fits (n, 2) places best."""
+    """Return the index of the heading that fits (n, 2) places best."""
     along = np.stack([np.cos(headings), np.sin(headings)], axis=1) @ ground.T
     across = np.stack([-np.sin(headings), np.cos(headings)], axis=1) @ ground.T
     to_side = np.minimum(_to_nearer_side(along), _to_nearer_side(across))

@@ -1,4 +1,4 @@
-"""What was noticed about the input and the run."""
+"""Report of a run: counts of the input and measures of the diffusion."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from ldls.view import SeenView
 
 @dataclass(frozen=True, kw_only=True)
 class Instance:
-    """What a label stands for.
+    """The instance that a label stands for.
 
     Attributes:
         label: The label, from 1.

@@ -14,7 +14,7 @@ UNUSED = "N/A"
 
 @dataclass(frozen=True)
 class Classes:
-    """What a network's class numbers stand for.
+    """Categories of a network's class numbers.
 
     Attributes:
         ids: Category id of each class.

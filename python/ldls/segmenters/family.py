@@ -1,4 +1,4 @@
-"""What each family of models does with an image before the network, and with its outputs after it."""
+"""The interface of a family of models: an image before the network, its outputs after it."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ MIN_MARGIN_PX = 8
 MAX_PIXELS = 65_536
 """Larger surroundings are shrunk to this many pixels; GrabCut takes time in proportion."""
 MIN_SHARE = 0.2
-"""Where GrabCut leaves less of a box than this, the ellipse in the box stands for it."""
+"""Share of a box: if GrabCut leaves less, the ellipse in the box takes its place."""
 ROUNDS = 5
 SEED = 0
 

@@ -18,7 +18,7 @@ FARTHEST = 1e6
 
 @dataclass(frozen=True)
 class Letterbox:
-    """How an image of `image_size` lies in an input of `input_size`, as Ultralytics defines it.
+    """Place of an image of `image_size` in an input of `input_size`, as Ultralytics defines it.
 
     Attributes:
         image_size: (height, width) of the image in pixels.

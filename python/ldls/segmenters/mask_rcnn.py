@@ -115,7 +115,7 @@ def detection_outputs(signature: Signature) -> tuple[str, ...] | None:
 
 
 def zoo_masks(signature: Signature) -> bool:
-    """Whether input and masks are those of the zoo: `image` (3, height, width) and grids of 28 x 28."""
+    """Return True if input and masks are those of the zoo: `image` (3, height, width) and grids of 28 x 28."""
     outputs = {value.name: value for value in signature.outputs}
     names = detection_outputs(signature)
     image = signature.image
@@ -139,7 +139,7 @@ def _role(value: Value) -> str:
 
 
 def _detections(outputs: list[NDArray[Any]], classes: Classes, min_score: float) -> list[_Detection]:
-    """What the network found with at least `min_score`, in its order."""
+    """Return the network's instances with at least `min_score`, in its order."""
     boxes, labels, scores, masks = outputs
     expect_shape("scores", scores, (None,))
     expect_shape("boxes", boxes, (len(scores), 4))

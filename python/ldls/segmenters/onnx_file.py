@@ -109,7 +109,7 @@ def _check_fields(path: Path, content: bytes) -> None:
 
 
 def _field_end(content: bytes, at: int, wire_type: int) -> int:
-    """Where a field ends whose content begins at `at`; -1 where there is no such type of field."""
+    """Return the end of a field whose content begins at `at`; -1 for an unknown type of field."""
     match wire_type:
         case 0:
             return _varint(content, at)[1]

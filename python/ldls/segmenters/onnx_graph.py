@@ -1,4 +1,4 @@
-"""What goes into and comes out of an ONNX model."""
+"""Inputs and outputs of an ONNX model."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Value:
 
     @property
     def is_float(self) -> bool:
-        """Whether it holds floating-point numbers."""
+        """True if it holds floating-point numbers."""
         return self.dtype.startswith("float")
 
     @property
@@ -44,7 +44,7 @@ class Value:
         return -1 if self.shape is None else len(self.shape)
 
     def may_be(self, *sides: int | None) -> bool:
-        """Whether its shape is known and fits these sides, None being any."""
+        """Return True if its shape is known and fits these sides, None being any."""
         return self.rank == len(sides) and all(
             want is None or isinstance(got, str) or got == want
             for got, want in zip(self.shape or (), sides, strict=True)

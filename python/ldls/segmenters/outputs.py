@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ldls.errors import FileFormatError, MaskError
 
 SCORE_SLACK = 1e-3
-"""How far rounding may carry a score out of [0, 1]."""
+"""Distance from [0, 1] up to which a score counts as rounded."""
 
 
 def check_scores(scores: NDArray[Any]) -> NDArray[np.float32]:

@@ -24,7 +24,7 @@ SEGMENTERS: dict[str, Callable[..., Segmenter]] = {
     "boxes": BoxSegmenter.from_kitti,
     "grabcut": partial(BoxSegmenter.from_kitti, grabcut=True),
 }
-"""What makes each segmenter, of what stands after the colon."""
+"""Makers of the segmenters by name; they take the text after the colon."""
 EXAMPLES = {
     "onnx": "onnx:model.onnx",
     "torchvision": "torchvision or torchvision:maskrcnn_resnet50_fpn_v2",

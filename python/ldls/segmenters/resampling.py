@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 ONE = 2048
-"""What weights of whole numbers sum to."""
+"""Sum of weights of whole numbers."""
 
 
 def bilinear_taps(
     source: int, target: int, window: slice = slice(None)
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], F32]:
-    """Where each of `target` cells falls among `source` cells: the cell before, the one after, the share of the latter.
+    """Place each of `target` cells among `source` cells: the cell before, the one after, the share of the latter.
 
     This is what `align_corners=False` means in PyTorch and `INTER_LINEAR` in OpenCV, without a filter against
     aliasing. Only the cells of `window` are reckoned.

@@ -1,4 +1,4 @@
-"""What a segmenter is."""
+"""The interface of a segmenter."""
 
 from __future__ import annotations
 

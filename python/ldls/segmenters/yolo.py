@@ -40,7 +40,7 @@ class Candidates:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the first output has what.
+    """Layout of the first output.
 
     Attributes:
         name: `yolov8` (also 11): (1, 4 + classes + C, n); `yolov5`: (1, n, 5 + classes + C) with objectness;

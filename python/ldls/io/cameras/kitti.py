@@ -15,9 +15,9 @@ from ldls.errors import CalibrationError, ParameterError, within
 OBJECT_ARCHIVE = "data_object_calib"
 RAW_ARCHIVE = "the calibration of that day"
 SIZES = {"P0": 12, "P1": 12, "P2": 12, "P3": 12, "R0_rect": 9, "Tr_velo_to_cam": 12, "Tr": 12}
-"""How many numbers each line holds that a camera needs."""
+"""Numbers in each line that a camera needs."""
 SPELLINGS = {"R_rect": "R0_rect", "R_rect_00": "R0_rect", "Tr_velo_cam": "Tr_velo_to_cam"}
-"""How KITTI tracking spells the keys of KITTI object."""
+"""Keys of KITTI tracking, and those of KITTI object that they stand for."""
 LIDAR_SIZES = {"R": 9, "T": 3}
 
 Matrices = dict[str, NDArray[np.float64]]

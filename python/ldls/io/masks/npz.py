@@ -16,7 +16,7 @@ from ldls.masks import InstanceMasks
 from ldls.masks.pixels import checked_size, encode
 
 OWN_ARRAYS = {"size", "runs", "run_counts", "categories", "scores", "category_ids", "category_names"}
-"""What files of this package hold."""
+"""Arrays of this package's files."""
 
 
 def read(path: str | PathLike[str]) -> InstanceMasks:

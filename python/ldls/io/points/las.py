@@ -43,7 +43,7 @@ MAX_INTENSITY = 2**16 - 1
 
 @dataclass(frozen=True)
 class Header:
-    """What the first bytes of a file say."""
+    """The fields of a file's header that reading needs."""
 
     header_bytes: int
     offset: int

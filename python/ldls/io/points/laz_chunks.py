@@ -72,7 +72,7 @@ def _items(path: Path, laszip: bytes, record_bytes: int) -> list[tuple[int, int]
 
 
 def _walk(path: Path, head: struct.Struct, start: int, n_points: int) -> tuple[int, int]:
-    """How many points the chunks have up to `n_points`, and where they end.
+    """Return the number of points that the chunks hold, up to `n_points`, and where they end.
 
     A chunk is one whole point, a count, the size of each layer, and the layers.
     """
@@ -93,7 +93,7 @@ def _walk(path: Path, head: struct.Struct, start: int, n_points: int) -> tuple[i
 
 
 def _table_offset(path: Path, offset: int, record_bytes: int) -> int:
-    """Where the table of the chunks begins: stands before the points, or, in streams, at the end of the file."""
+    """Return the offset of the table of chunks, which stands before the points or, in streams, at the end."""
     file_bytes = path.stat().st_size
     table = _unpack(path, TABLE_POINTER, offset)
     if table == NOT_HERE:

@@ -1,4 +1,4 @@
-"""Which of a file's named columns are coordinates and intensity."""
+"""Coordinates and intensity among a file's named columns."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ldls.cloud import Points
 from ldls.errors import CorruptFileError
 
 INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "remission", "i")
-"""What writers call the intensity; the first that a file has is taken."""
+"""Names of the intensity; the first that a file has is taken."""
 
 
 @dataclass(frozen=True)

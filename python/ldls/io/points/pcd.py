@@ -48,7 +48,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Header:
-    """What a header says, once it does not contradict itself."""
+    """A header that does not contradict itself."""
 
     fields: list[Field]
     n_points: int

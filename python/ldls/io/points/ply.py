@@ -45,7 +45,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Header:
-    """What a header says."""
+    """The fields of a file's header."""
 
     encoding: str
     before: list[Element]

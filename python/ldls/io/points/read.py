@@ -31,7 +31,7 @@ READERS: dict[str, Callable[..., Points]] = {
     ".txt": text.read,
     ".xyz": text.read,
 }
-"""What reads a cloud, by the suffix of the name."""
+"""Readers of clouds, by the suffix of the name."""
 
 
 def read_points(path: str | PathLike[str], *, columns: int | None = None, recover: bool = False) -> Points:
