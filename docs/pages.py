@@ -47,7 +47,7 @@ def shown(page: Path) -> list[str]:
 
 
 def recipes(page: Path) -> list[Recipe]:
-    """Return the commands that make the pictures of a page: `<!-- PICTURE is FILE -->` before a block of shell that writes FILE."""
+    """Return how a page's pictures are made: `<!-- PICTURE is FILE -->` before a block of shell that writes FILE."""
     return [_recipe(page, found[0]) for found in RECIPE.finditer(page.read_text())]
 
 

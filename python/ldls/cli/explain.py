@@ -59,7 +59,7 @@ def explain(
 
     The first line is the verdict. Then come what each camera sees of the point (its pixel, and what masks cover the
     window around it), the likelihood of every label, the edges over which labels flow to it, and, for a point of an
-    object, the connected components of which outlier removal keeps the largest. For points out of view, the reason is given.
+    object, the connected components of which outlier removal keeps the largest. Points out of view get a reason.
 
     The point is one of a result that ldls wrote (.npz), or of a sweep that is segmented on the spot with the paper's
     parameters. Needs the extra eval.

@@ -22,7 +22,7 @@ def progress(items: Iterable[T], total: int, title: str) -> Iterator[T]:
 
 @contextmanager
 def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
-    """Return a function to call with the frames finished, failed and in all: shows a bar, frames a second, time left, failures."""
+    """Yield a function to call with the frames finished, failed and in all; shows a bar, speed, time left, failures."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
