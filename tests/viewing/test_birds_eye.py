@@ -13,6 +13,9 @@ from ldls.viewing.ground import corners_of, ground_of
 X_FORWARD = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
 Y_FORWARD = [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
 
+LOW, HIGH = [115, 95, 175, 115], [115, 60, 175, 85]
+"""Boxes around slabs of points below the camera and above it, in the image."""
+
 
 def street(T_camera_lidar, shift_m: float = 0.0) -> ldls.Segmentation:
     """A box 12 m ahead and 3 m to the left on a ground, in the lidar's axes."""
@@ -73,6 +76,32 @@ def test_points_in_view_and_out_of_it_are_two_greys() -> None:
     )
     often = {tuple(colour) for colour in colours[counts > 20].tolist()}
     assert {BACKGROUND, OUT_OF_VIEW} <= often
+
+
+@pytest.mark.parametrize("first", [pytest.param(0, id="the low first"), pytest.param(1, id="the high first")])
+@pytest.mark.parametrize(
+    ("masks", "on_top"),
+    [
+        pytest.param({3: LOW, 1: HIGH}, 1, id="the higher object covers the lower"),
+        pytest.param({3: LOW}, 3, id="an object covers background above it"),
+    ],
+)
+def test_the_drawing_has_an_order(first, masks, on_top) -> None:
+    # two slabs of points that differ in height only, in either order in the cloud
+    x, z = (axis.ravel() for axis in np.meshgrid(np.linspace(-4, -2, 60), np.linspace(11, 13, 60)))
+    low, high = (np.stack([x, np.full(x.shape, y), z], axis=1) for y in (1.4, -0.5))
+    in_camera = np.vstack([low, high] if first == 0 else [high, low])
+    points = (in_camera @ np.array(X_FORWARD, float)[:3, :3]).astype(np.float32)
+    camera = ldls.Camera(projection=[[200, 0, 200], [0, 200, 80], [0, 0, 1]], T_camera_lidar=np.array(X_FORWARD, float))
+    boxes = ldls.InstanceMasks.from_boxes(list(masks.values()), (160, 400), categories=list(masks))
+    result = ldls.segment(points, boxes, camera)
+    assert (np.bincount(result.labels, minlength=len(masks) + 1)[1:] == len(x)).all()
+    picture = np.asarray(birds_eye_view(result, boxes=False)).astype(int)
+    ground = ground_of(result)
+    left, top = ground.at(np.array([[12.9, 3.9]]))[0].astype(int)
+    right, bottom = ground.at(np.array([[11.1, 2.1]]))[0].astype(int)
+    inside = picture[top:bottom, left:right].reshape(-1, 3)
+    assert np.abs(inside - instance_colours([on_top])[0]).max(axis=1).mean() < 10
 
 
 def test_the_picture_fits_and_follows_the_range() -> None:
