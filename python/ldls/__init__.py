@@ -26,10 +26,10 @@ from ldls.explaining import Explanation, explain
 from ldls.io import read_camera, read_image, read_masks, read_points, read_result, save
 from ldls.label_diffusion import LabelDiffusion, segment
 from ldls.masks import InstanceMasks
-from ldls.notebook import html_of
 from ldls.params import Params
 from ldls.segmentation import Instance, OrientedBox, Report, Segmentation, SegmentedObject
 from ldls.view import SeenView, View
+from ldls.viewing.notebook import html_of
 
 # pictures lie above the nouns, which know nothing of them
 Segmentation._repr_html_ = html_of

@@ -38,9 +38,9 @@ HUES: tuple[tuple[float, float, float], ...] = (
 )
 """Lightness, chroma and hue in degrees, the best kept apart first."""
 OF_EVERYDAY: dict[int, int] = {1: 0, 3: 1, 8: 2, 2: 3, 6: 4, 4: 5}
-"""Which hue belongs to the categories that traffic is made of: person, car, truck, bicycle, bus, motorcycle."""
+"""Hues of the categories that traffic is made of: person, car, truck, bicycle, bus, motorcycle."""
 LIGHTER = (0.0, 0.08, -0.08, 0.04, -0.04, 0.12, -0.12)
-"""What the shades of a hue add to its lightness, in the order in which instances get them."""
+"""Lightness that the shades of a hue add, in the order in which instances get them."""
 LIGHTEST = 0.90
 PALER = 0.65
 """Share of the chroma left to a second turn through the shades."""
@@ -72,6 +72,11 @@ def instance_colours(categories: Iterable[int]) -> NDArray[np.uint8]:
 def label_colours(categories: Iterable[int], *, out_of_view: Colour = BACKGROUND) -> NDArray[np.uint8]:
     """(M + 2, 3) uint8 by label: the background, the M instances, and last, where label -1 finds it, out of view."""
     return np.vstack([[BACKGROUND], instance_colours(categories), [out_of_view]]).astype(np.uint8)
+
+
+def as_tuples(colours: NDArray[np.uint8]) -> list[Colour]:
+    """Colours (n, 3) one by one."""
+    return [(red, green, blue) for red, green, blue in colours.tolist()]
 
 
 def _hue_of(category: int) -> int:

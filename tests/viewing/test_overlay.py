@@ -8,8 +8,9 @@ import pytest
 import ldls
 from ldls.palette import BACKGROUND, instance_colours
 from ldls.viewing import masks_overlay, overlay
-from ldls.viewing.overlay import MARK, overlay_of
-from ldls.viewing.shown import images_of, shown
+from ldls.viewing.drawing import MARK
+from ldls.viewing.overlay import overlay_of
+from ldls.viewing.shown import Shown, images_of
 from ldls.viewing.tags import place_tags
 
 
@@ -78,7 +79,7 @@ def test_marked_points_have_a_white_rim(result) -> None:
     marked = result.labels == 1
     (image,) = images_of(result, None)
     plain, rimmed = (
-        overlay_of(shown(result, "final", chosen), result.views[0], image, 1800) for chosen in (None, marked)
+        overlay_of(Shown.of(result, "final", chosen), result.views[0], image, 1800) for chosen in (None, marked)
     )
     changed = np.any(np.asarray(plain) != np.asarray(rimmed), axis=2)
     white = np.all(np.asarray(rimmed) == MARK, axis=2)

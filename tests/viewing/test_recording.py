@@ -25,8 +25,8 @@ from ldls.explaining import rebuild
 from ldls.palette import BACKGROUND, category_colour, instance_colours
 from ldls.viewing import recording
 from ldls.viewing.depth import depth_colours
-from ldls.viewing.recording import log, log_diffusion, log_frame, open_recording, viewer
-from ldls.viewing.recording.pinholes import PIXEL_CENTRE, pinhole_of
+from ldls.viewing.recording import Recording, open_recording, viewer
+from ldls.viewing.recording.cameras import PIXEL_CENTRE, pinhole_of
 from ldls.viewing.recording.session import check_target
 from viewing.recorded import Recorded, rgb, vectors
 
@@ -300,7 +300,7 @@ def test_frames_after_a_diffusion_are_not_on_its_timeline(tmp_path, result):
 @pytest.mark.parametrize("every", [0, -4, float("nan")])
 def test_a_diffusion_of_no_steps_is_refused(result, every):
     with pytest.raises(ldls.errors.ParameterError, match="every"):
-        log_diffusion(result, every=every, recording=rr.RecordingStream("test"))
+        Recording(rr.RecordingStream("test")).log_diffusion(result, every=every)
 
 
 @pytest.mark.parametrize(
@@ -347,7 +347,7 @@ def replace_length(truth, length):
 )
 def test_wrong_images_are_refused(result, images, message):
     with pytest.raises(ldls.errors.InputError, match=message):
-        log(result, images=images, recording=rr.RecordingStream("test"))
+        Recording(rr.RecordingStream("test")).log_result(result, images=images)
 
 
 def test_categories_beyond_the_ids_of_rerun_are_refused(small_scene):
@@ -355,18 +355,19 @@ def test_categories_beyond_the_ids_of_rerun_are_refused(small_scene):
     names = {70_000: "thing"}
     many = ldls.InstanceMasks.from_array(masks[0].to_array()[None], categories=[70_000], names=names)
     with pytest.raises(ldls.errors.LimitError, match="category 70000"):
-        log(ldls.segment(points, many, camera), recording=rr.RecordingStream("test"))
+        Recording(rr.RecordingStream("test")).log_result(ldls.segment(points, many, camera))
 
 
 def test_a_result_goes_into_ones_own_recording_at_ones_own_time(tmp_path, result):
     with pytest.raises(ldls.errors.InputError, match=r"none is active; call rerun\.init"):
-        log(result)
+        Recording()
     stream = rr.RecordingStream("robot")
     stream.save(tmp_path / "own.rrd")
     with stream:
+        own = Recording()
         rr.set_time("tick", sequence=7)
-        log(result, entity="robot/front lidar")
-        log_frame(ldls.datasets.Frame(name="f", points=result.points), entity="raw")
+        own.log_result(result, entity="robot/front lidar")
+        own.log_frame(ldls.datasets.Frame(name="f", points=result.points), entity="raw")
     stream.disconnect()
     found = Recorded(tmp_path / "own.rrd")
     assert found.recording.application_id == "robot"
@@ -414,7 +415,7 @@ def test_the_layout_shows_what_there_is(tmp_path, result, truth):
 def test_a_layout_can_be_sent_to_ones_own_recording(tmp_path, result):
     with rr.RecordingStream("robot") as stream:
         stream.save(tmp_path / "own.rrd")
-        log(result, entity="robot/lidar")
+        Recording(stream).log_result(result, entity="robot/lidar")
         stream.send_blueprint(recording.layout(recording.Contents(cameras=("camera 0",), entity="robot/lidar")))
     views, _ = Recorded(tmp_path / "own.rrd").views[-1]
     assert views == {
@@ -542,7 +543,7 @@ def test_a_missing_library_is_named_with_its_extra(monkeypatch, tmp_path, result
     with pytest.raises(ImportError, match=r"pip install 'ldls\[viz\]'"):
         recorded(tmp_path / "a.rrd", result)
     with pytest.raises(ImportError, match=r"pip install 'ldls\[viz\]'"):
-        log(result)
+        Recording()
 
 
 def test_a_street_with_its_diffusion_takes_few_megabytes(tmp_path, frame_571):

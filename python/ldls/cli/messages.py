@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.table import Table
 
 from ldls.errors import LdlsError
-from ldls.object_rows import HEADINGS, cells_of, nearest_first
 from ldls.segmentation import SegmentedObject
+from ldls.viewing.object_tables import HEADINGS, cells_of, nearest_first, objects_found
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -58,11 +58,11 @@ def flowing(text: str) -> str:
 
 def object_table(objects: Sequence[SegmentedObject]) -> Table:
     """Name, points, distance and size of each object, the nearest first and those without points last."""
-    table = Table(title=f"{sum(o.n_points > 0 for o in objects)} of {len(objects)} objects found")
+    table = Table(title=objects_found(objects))
     for heading in HEADINGS:
         table.add_column(heading, justify="left" if heading == "object" else "right")
-    for found in nearest_first(objects):
-        table.add_row(*cells_of(found))
+    for each in nearest_first(objects):
+        table.add_row(*cells_of(each))
     return table
 
 

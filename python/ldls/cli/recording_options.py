@@ -30,7 +30,7 @@ DiffusionOption = Annotated[
     ),
 ]
 ONLY_CAMERA = "camera 0"
-"""What recordings call the camera of a frame that does not name it."""
+"""Name in recordings of the camera of a frame that does not name it."""
 
 
 def every_of(diffusion: int | None, n_frames: int) -> int | None:
@@ -49,13 +49,10 @@ def check_recording(target: str | None) -> None:
         ParameterError: It is neither a file that ends in .rrd nor "spawn".
         ImportError: The extra `viz` is not installed.
     """
-    if target is None:
-        return
-    from ldls.viewing.recording.session import check_target
-    from ldls.viewing.recording.stream import rerun
+    if target is not None:
+        from ldls.viewing.recording.session import check_target
 
-    check_target(target)
-    rerun()
+        check_target(target)
 
 
 def record(
@@ -66,16 +63,16 @@ def record(
     images: Mapping[str, NDArray[np.uint8]] | None = None,
     diffusion: int | None = None,
 ) -> str:
-    """Record one segmentation; what to tell the user."""
+    """Record one segmentation; the message for the user."""
     from ldls.viewing.recording import open_recording
 
     with open_recording(target, name=name) as recording:
         recording.add(result, images=images, name=name, diffusion=every_of(diffusion, 1), alone=True)
-    return told(target)
+    return where_recorded(target)
 
 
-def told(target: str) -> str:
-    """Where a recording is, and how to open it."""
+def where_recorded(target: str) -> str:
+    """The place of a recording, and the command that opens it."""
     from ldls.viewing.recording.session import VIEWER
 
     if target == VIEWER:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import FRAMES_FAILED, refuse
 from ldls.cli.outputs import PictureOption
-from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, told
+from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, where_recorded
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
-from ldls.cli.view_result import view_result
 from ldls.cli.view_source import MOST_FRAMES, chosen_frames, record_frames, settings_of
+from ldls.errors import InputError
+from ldls.io import read_image, read_result
 
 
 @speaks_plainly
@@ -105,7 +109,45 @@ def view(
         for failure in failures:
             console().print(failure, highlight=False, soft_wrap=True)
         count = f"{len(indices) - len(failures):,} of {len(source):,} frames; "
-        message = count + told(target)
+        message = count + where_recorded(target)
     console().print(message, highlight=False, soft_wrap=True)
     if failures:
         raise typer.Exit(FRAMES_FAILED)
+
+
+def view_result(
+    path: Path, images: Sequence[str], target: str | None, *, name: str, diffusion: int | None, picture: Path | None
+) -> str:
+    """Show a stored result; the message for the user."""
+    from ldls.view import camera_names
+
+    result = read_result(path)
+    pictures = read_images(images, camera_names(result.views))
+    messages = []
+    if picture is not None:
+        from ldls.viewing import save_pictures
+
+        each = [pictures.get(camera) for camera in camera_names(result.views)]
+        messages.append("wrote " + " ".join(map(str, save_pictures(picture, result, each))))
+    if target is not None:
+        messages.append(record(result, target, name=name, images=pictures, diffusion=diffusion))
+    return "\n".join(messages)
+
+
+def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
+    """Images by camera: FILE for the cameras in their order, CAMERA=FILE for one by name.
+
+    Raises:
+        InputError: There are more images than cameras, or one camera has two.
+    """
+    paths: dict[str, str] = {}
+    for number, text in enumerate(texts):
+        camera, equals, file = text.partition("=")
+        if not equals or camera not in cameras:
+            if number >= len(cameras):
+                raise InputError(f"--image: got {len(texts)} images, the result has cameras {', '.join(cameras)}")
+            camera, file = cameras[number], text
+        if camera in paths:
+            raise InputError(f"--image: camera {camera} has {paths[camera]} and {file}; give one")
+        paths[camera] = file
+    return {camera: read_image(file) for camera, file in paths.items()}

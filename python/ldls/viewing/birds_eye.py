@@ -10,11 +10,10 @@ from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from ldls.cloud import finite_rows
 from ldls.palette import Colour
-from ldls.segmentation import Segmentation, SegmentedObject
-from ldls.viewing.grid import INK, PAPER
+from ldls.segmentation import Segmentation
+from ldls.viewing.drawing import INK, MARK, PAPER, disc, stamp
 from ldls.viewing.ground import Ground, corners_of, ground_of
-from ldls.viewing.marks import disc, stamp
-from ldls.viewing.shown import Shown, Stage, shown
+from ldls.viewing.shown import Shown, Stage
 from ldls.viewing.tags import Box, Tag, draw_tags
 
 RING_STEPS_M = (1, 2, 5, 10, 20, 50)
@@ -25,12 +24,11 @@ RIM_PX = 3
 """Paper left around the range of a ring."""
 OUT_OF_VIEW: Colour = (66, 66, 76)
 BACKGROUND: Colour = (135, 135, 140)
-MARK: Colour = (255, 255, 255)
 PEN_PX = 1.15
 AVERSION = 40.0
-"""How many of its heights a name goes aside rather than lie on an object."""
+"""Heights of a name that it goes aside rather than lie on an object."""
 FINE = 2
-"""How much larger a picture is drawn than it becomes, so that slanting lines are smooth."""
+"""Scale at which a picture is drawn before it is reduced, so that slanting lines are smooth."""
 
 
 def birds_eye_view(
@@ -41,41 +39,39 @@ def birds_eye_view(
     Points that no camera sees are dark, the background is grey.
 
     Args:
-        result: What to show.
+        result: The segmentation.
         stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
         range_m: Farthest range shown, in metres; by default as far as the objects lie.
-        boxes: Whether to draw the boxes of the objects; they are those of the final labels.
+        boxes: True to draw the boxes of the objects; they are those of the final labels.
 
     Raises:
         ParameterError: There is no such stage, or the range is not more than 0.
     """
-    return shown_birds_eye_view(shown(result, stage), ground_of(result, range_m), boxes=boxes)
+    return birds_eye_of(Shown.of(result, stage), ground_of(result, range_m), boxes=boxes)
 
 
-def shown_birds_eye_view(what: Shown, ground: Ground, *, boxes: bool) -> Image.Image:
-    """The same of what is already chosen, marked points rimmed."""
+def birds_eye_of(shown: Shown, ground: Ground, *, boxes: bool) -> Image.Image:
+    """The picture of a part of the ground, marked points with a white rim."""
     width, height = ground.size_px
     fine = Image.new("RGB", (FINE * width, FINE * height), PAPER)
+    step_m = _ring_step_m(ground)
+    _draw_rings(ImageDraw.Draw(fine), ground, step_m)
+    fine = _with_points(fine, shown, ground)
     draw = ImageDraw.Draw(fine)
-    step = _ring_step(ground)
-    _draw_rings(draw, ground, step)
-    fine = _with_points(fine, what, ground)
-    boxed = [(one, one.box) for one in what.result.objects if one.box is not None] if boxes else []
-    found = [(_colour(what, one), what.names[one.label - 1], ground.at(corners_of(box))) for one, box in boxed]
-    draw = ImageDraw.Draw(fine)
-    for colour, _, corners in found:
-        draw.line(
-            [tuple(place) for place in (FINE * corners[[0, 1, 2, 3, 0]]).tolist()], colour, 2 * FINE, joint="curve"
-        )
+    tags = []
+    for each in shown.result.objects if boxes else ():
+        if each.box is not None:
+            corners, colour = ground.at(corners_of(each.box)), shown.colours[each.label - 1]
+            around = [tuple(place) for place in (FINE * corners[[0, 1, 2, 3, 0]]).tolist()]
+            draw.line(around, colour, 2 * FINE, joint="curve")
+            tags.append(Tag(shown.names[each.label - 1], colour, _around(corners)))
     picture = fine.reduce(FINE)
-    written = _write_ranges(picture, ground, step)
-    covered = _covered(picture, what, ground)
-    tags = [Tag(name, colour, _around(corners)) for colour, name, corners in found]
-    draw_tags(picture, tags, covered, PEN_PX, aversion=AVERSION, taken=written)
+    written = _write_ranges(picture, ground, step_m)
+    draw_tags(picture, tags, _covered(picture, shown, ground), PEN_PX, aversion=AVERSION, taken=written)
     return picture
 
 
-def _ring_step(ground: Ground) -> int:
+def _ring_step_m(ground: Ground) -> int:
     farthest = max(ground.ahead_m, ground.right_m, -ground.left_m)
     return next((step for step in RING_STEPS_M if farthest / step <= MOST_RINGS), RING_STEPS_M[-1])
 
@@ -95,7 +91,7 @@ def _draw_rings(draw: ImageDraw.ImageDraw, ground: Ground, step_m: int) -> None:
 
 
 def _write_ranges(picture: Image.Image, ground: Ground, step_m: int) -> list[Box]:
-    """Write the range of each ring where it crosses the line ahead of the lidar; the places taken."""
+    """Write the range of each ring where it crosses the line ahead of the lidar, and return the places taken."""
     written = []
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(size=15)
@@ -111,36 +107,31 @@ def _write_ranges(picture: Image.Image, ground: Ground, step_m: int) -> list[Box
     return written
 
 
-def _with_points(fine: Image.Image, what: Shown, ground: Ground) -> Image.Image:
+def _with_points(fine: Image.Image, shown: Shown, ground: Ground) -> Image.Image:
     canvas = np.array(fine)
-    points = what.result.points
+    points = shown.result.points
     rows = finite_rows(points)
-    # the lowest first: what stands on the ground covers it
+    # the lowest first: objects cover the ground that they stand on
     rows = rows[np.argsort(points[rows, 2], kind="stable")]
     at_px = np.floor(FINE * ground.at(points[rows, :2].astype(np.float64))).astype(np.int64)
-    labels, marked = what.labels[rows], what.marked[rows]
+    labels, marked = shown.labels[rows], shown.marked[rows]
     size = float(np.clip(ground.px_per_m / 14, 0.7, 1.8))
     for label, colour in ((-1, OUT_OF_VIEW), (0, BACKGROUND)):
         stamp(canvas, at_px[labels == label], colour, disc(0.55 * FINE * size))
     own = labels > 0
     stamp(canvas, at_px[own & marked], MARK, disc((1.2 * size + 0.8) * FINE))
-    stamp(canvas, at_px[own], what.colours_of(labels[own]), disc(1.2 * FINE * size))
+    stamp(canvas, at_px[own], shown.colours_of(labels[own]), disc(1.2 * FINE * size))
     return Image.fromarray(canvas)
 
 
-def _covered(picture: Image.Image, what: Shown, ground: Ground) -> NDArray[np.bool_]:
-    """Where objects are: (H, W) of the picture."""
-    points = what.result.points[what.labels > 0, :2].astype(np.float64)
+def _covered(picture: Image.Image, shown: Shown, ground: Ground) -> NDArray[np.bool_]:
+    """(H, W) True on and around the points of objects in the picture."""
+    points = shown.result.points[shown.labels > 0, :2].astype(np.float64)
     at = np.floor(ground.at(points)).astype(int)
     covered = np.zeros((picture.height, picture.width), bool)
     x, y = at[((at >= 0) & (at < picture.size)).all(axis=1)].T
     covered[y, x] = True
     return np.asarray(Image.fromarray(covered).convert("L").filter(ImageFilter.MaxFilter(9))) > 0
-
-
-def _colour(what: Shown, found: SegmentedObject) -> Colour:
-    red, green, blue = what.colours[found.label - 1].tolist()
-    return red, green, blue
 
 
 def _around(corners: NDArray[np.float64]) -> tuple[int, int, int, int]:

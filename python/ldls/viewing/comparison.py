@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.segmentation import Segmentation
-from ldls.viewing.birds_eye import shown_birds_eye_view
-from ldls.viewing.grid import grid, half
+from ldls.viewing.birds_eye import birds_eye_of
+from ldls.viewing.drawing import grid, half
 from ldls.viewing.ground import ground_of
 from ldls.viewing.overlay import WIDTH_PX, overlay_of
-from ldls.viewing.shown import Images, Shown, images_of, shown
+from ldls.viewing.shown import Images, Shown, images_of
 
 WIDE = 2.0
 """Width over height from which on two images stand one above the other."""
@@ -26,16 +26,16 @@ def comparison(result: Segmentation, images: Images = None) -> Image.Image:
     does not, or to another one, have a white rim in its pictures; those that the method adds, in the method's.
 
     Args:
-        result: What to show.
+        result: The segmentation.
         images: As for `overlay`.
 
     Raises:
         InputError: There are more or fewer images than cameras, or one has not the size of the masks.
     """
     changed = result.direct_labels != result.labels
-    pair = [shown(result, "direct", changed), shown(result, "final", changed)]
+    pair = [Shown.of(result, "direct", changed), Shown.of(result, "final", changed)]
     ground = ground_of(result, size_px=(half(WIDTH_PX), half(WIDTH_PX)), fill=True)
-    above = [shown_birds_eye_view(one, ground, boxes=one is pair[1]) for one in pair]
+    above = [birds_eye_of(shown, ground, boxes=shown is pair[1]) for shown in pair]
     return grid(
         [
             _overlays(pair, images_of(result, images)),
@@ -51,13 +51,15 @@ def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]]) -> Ima
     height, width = views[0].view.masks.image_size
     stacked = len(views) == 1 and width > WIDE * height
     each_px = WIDTH_PX if stacked else half(WIDTH_PX)
-    tiles = [overlay_of(what, seen, image, each_px) for seen, image in zip(views, images, strict=True) for what in pair]
+    tiles = [
+        overlay_of(shown, seen, image, each_px) for seen, image in zip(views, images, strict=True) for shown in pair
+    ]
     cameras = [name for seen in views[1:] for name in (seen.view.name, seen.view.name)]
     return grid(tiles, [*captions(pair[0].result), *cameras], columns=1 if stacked else 2)
 
 
 def captions(result: Segmentation) -> list[str]:
-    """What is above either picture: points on objects, and how many of them are marked and why."""
+    """Captions of the two pictures: points on objects, and how many of them are marked and why."""
     before, after = result.direct_labels, result.labels
     lost = int(((before > 0) & (after == 0)).sum())
     won = int(((before == 0) & (after > 0)).sum())

@@ -17,11 +17,11 @@ from ldls.viewing.shown import Images
 
 
 def save_pictures(path: str | PathLike[str], result: Segmentation, images: Images = None) -> list[Path]:
-    """The files written: the overlay at `path`, and beside it NAME-birds-eye.png and NAME-comparison.png.
+    """Write the overlay to `path`, and beside it NAME-birds-eye.png and NAME-comparison.png; return their paths.
 
     Args:
         path: `NAME.png`.
-        result: What to show.
+        result: The segmentation.
         images: As for `overlay`.
 
     Raises:
@@ -34,8 +34,8 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
         path.with_name(f"{path.stem}-birds-eye{path.suffix}"): birds_eye_view(result),
         path.with_name(f"{path.stem}-comparison{path.suffix}"): comparison(result, images),
     }
-    for own, picture in pictures.items():
-        save_picture(own, picture)
+    for file, picture in pictures.items():
+        save_picture(file, picture)
     return list(pictures)
 
 

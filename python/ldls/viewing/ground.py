@@ -1,4 +1,4 @@
-"""The part of the ground that a view from above shows, and where its places lie in the picture."""
+"""The part of the ground that a bird's-eye view shows, and the places of the picture on it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ldls.errors import ParameterError
 from ldls.segmentation import OrientedBox, Segmentation
 
 WIDTH_PX, HEIGHT_PX = 1800, 1200
-"""Most that a picture measures."""
+"""Greatest size of a picture."""
 LEAST_RANGE_M, MOST_RANGE_M = 10.0, 120.0
 MARGIN_M = 1.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ground:
-    """The part of the ground that a picture shows, and where it lies in it.
+    """A part of the ground, and its place in a picture.
 
     Attributes:
         forward: (2,) unit vector in the lidar frame that points up in the picture.
@@ -55,7 +55,7 @@ def ground_of(
 ) -> Ground:
     """The part of the ground that a picture of a result shows, as large as fits into a width and a height.
 
-    With `fill`, what room is left at the sides shows more of the ground.
+    With `fill`, room that is left at the sides shows more of the ground.
 
     Raises:
         ParameterError: The range is not more than 0.
@@ -67,7 +67,7 @@ def ground_of(
     ranges = np.hypot(*seen.T)
     objects = result.labels[result.in_view] > 0
     reach = range_m or _reach(ranges[objects] if objects.any() else ranges)
-    corners = [corners_of(found.box) for found in result.objects if found.box is not None]
+    corners = [corners_of(each.box) for each in result.objects if each.box is not None]
     held = _turned(np.concatenate([np.zeros((1, 2)), *corners]), forward)
     near = np.concatenate([seen[ranges <= reach], held[np.hypot(*held.T) <= (range_m or MOST_RANGE_M)]])
     left, behind = near.min(axis=0) - MARGIN_M
@@ -89,7 +89,7 @@ def corners_of(box: OrientedBox) -> NDArray[np.float64]:
 
 
 def _heading(result: Segmentation) -> NDArray[np.float64]:
-    """Where the first camera looks, along the ground of the lidar frame; x if it looks up or down."""
+    """(2,) direction in which the first camera looks along the ground of the lidar frame; x if it looks up or down."""
     axis: NDArray[np.float64] = result.views[0].view.camera.T_camera_lidar[2, :2]
     length = np.hypot(*axis)
     return axis / length if length > 1e-6 else np.array([1.0, 0.0])

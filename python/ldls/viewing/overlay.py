@@ -11,19 +11,17 @@ from PIL import Image, ImageFilter
 
 from ldls.errors import ParameterError
 from ldls.masks import InstanceMask, InstanceMasks
-from ldls.palette import Colour, instance_colours
+from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView
-from ldls.viewing.grid import grid, half
-from ldls.viewing.marks import disc, stamp
-from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of, shown
+from ldls.viewing.drawing import MARK, disc, grid, half, stamp
+from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of
 from ldls.viewing.tags import Tag, draw_tags
 
 WIDTH_PX = 1800
 """Width of a picture."""
 BACKGROUND: Colour = (225, 225, 225)
 HALO: Colour = (15, 15, 20)
-MARK: Colour = (255, 255, 255)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -45,7 +43,7 @@ def overlay(
     """The camera image with masks, points in the colour of their instance, and the names of those that have points.
 
     Args:
-        result: What to show.
+        result: The segmentation.
         images: (H, W, 3) uint8 RGB image; for several cameras one for each, None where there is none. Without an image
             masks and points stand on a dark one.
         stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
@@ -58,11 +56,11 @@ def overlay(
     """
     if width_px is not None and width_px < 1:
         raise ParameterError(f"width_px: got {width_px}, expected 1 or more")
-    what, each = shown(result, stage), images_of(result, images)
+    shown, each = Shown.of(result, stage), images_of(result, images)
     if len(each) == 1:
-        return overlay_of(what, result.views[0], each[0], width_px or WIDTH_PX)
+        return overlay_of(shown, result.views[0], each[0], width_px or WIDTH_PX)
     pairs = zip(result.views, each, strict=True)
-    tiles = [overlay_of(what, seen, image, width_px or half(WIDTH_PX)) for seen, image in pairs]
+    tiles = [overlay_of(shown, seen, image, width_px or half(WIDTH_PX)) for seen, image in pairs]
     return grid(tiles, [seen.view.name for seen in result.views], columns=2)
 
 
@@ -72,7 +70,7 @@ def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) 
     Raises:
         InputError: The image has not the size of the masks.
     """
-    colours = _as_colours(instance_colours(masks.categories.tolist()))
+    colours = as_tuples(instance_colours(masks.categories.tolist()))
     outlines = [
         Outline(mask=mask, colour=colour, name=f"{mask.name} {mask.score:.2f}")
         for mask, colour in zip(masks, colours, strict=True)
@@ -81,17 +79,20 @@ def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) 
     return _with_tags(*_with_masks(image, outlines, WIDTH_PX / image.shape[1]))
 
 
-def overlay_of(what: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
+def overlay_of(shown: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
     """The picture of one camera's image, marked points with a white rim."""
-    colours = _as_colours(what.colours)
-    found = set(what.labels.tolist())
+    with_points = set(shown.labels.tolist())
     outlines = [
-        Outline(mask=mask, colour=colours[label - 1], name=what.names[label - 1] if label in found else None)
+        Outline(
+            mask=mask,
+            colour=shown.colours[label - 1],
+            name=shown.names[label - 1] if label in with_points else None,
+        )
         for mask, label in zip(seen.view.masks, seen.labels.tolist(), strict=True)
     ]
     scale = width_px / image.shape[1]
     picture, tags, covered = _with_masks(image, outlines, scale)
-    return _with_tags(_with_points(picture, what, seen, scale), tags, covered)
+    return _with_tags(_with_points(picture, shown, seen, scale), tags, covered)
 
 
 def _with_masks(
@@ -112,19 +113,19 @@ def _with_masks(
     return picture, tags, covered
 
 
-def _with_points(picture: Image.Image, what: Shown, seen: SeenView, scale: float) -> Image.Image:
+def _with_points(picture: Image.Image, shown: Shown, seen: SeenView, scale: float) -> Image.Image:
     pen_px = _pen_px(picture)
     canvas = np.array(picture)
     # the farthest first, the nearest above them
-    distances = np.linalg.norm(what.result.points[seen.in_view, :3], axis=1)
+    distances = np.linalg.norm(shown.result.points[seen.in_view, :3], axis=1)
     order = np.argsort(-distances, kind="stable")
     at_px = np.floor((seen.pixels[order] + 0.5) * scale).astype(np.int64)
-    labels, marked = what.labels[seen.in_view][order], what.marked[seen.in_view][order]
+    labels, marked = shown.labels[seen.in_view][order], shown.marked[seen.in_view][order]
     labelled = labels > 0
     stamp(canvas, at_px[~labelled], BACKGROUND, disc(0.45 * pen_px, 0.5))
     stamp(canvas, at_px[labelled & ~marked], HALO, disc(1.7 * pen_px, 0.55))
     stamp(canvas, at_px[labelled & marked], MARK, disc(2.0 * pen_px))
-    stamp(canvas, at_px[labelled], what.colours_of(labels[labelled]), disc(1.1 * pen_px))
+    stamp(canvas, at_px[labelled], shown.colours_of(labels[labelled]), disc(1.1 * pen_px))
     return Image.fromarray(canvas)
 
 
@@ -163,7 +164,3 @@ def _scaled(picture: Image.Image, scale: float) -> tuple[int, int]:
 def _pen_px(picture: Image.Image) -> float:
     """Width of a thin line: pictures of one width look alike."""
     return max(picture.width / 1240, 1)
-
-
-def _as_colours(colours: NDArray[np.uint8]) -> list[Colour]:
-    return [(int(red), int(green), int(blue)) for red, green, blue in colours]

@@ -1,21 +1,23 @@
-"""What pictures show of a result: which labels, in which colours, under which names."""
+"""A result as pictures show it: labels at a stage, colours, names and images."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import InputError, ParameterError
-from ldls.palette import Colour, instance_colours
+from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
 
 Stage = Literal["direct", "diffused", "final"]
 Images = NDArray[np.uint8] | Sequence[NDArray[np.uint8] | None] | None
 
+STAGES = {"direct": "direct_labels", "diffused": "diffused_labels", "final": "labels"}
+"""Field of a result that has the labels of a stage."""
 CANVAS: Colour = (38, 38, 42)
 """Colour of an image that is not there."""
 
@@ -27,48 +29,37 @@ class Shown:
     Attributes:
         result: The result.
         labels: (N,) int32 label of each point at the stage shown.
-        colours: (M, 3) uint8 colour of each instance.
+        colours: Colour of each of the M instances.
         names: Name of each instance, with its label: "car 3".
-        marked: (N,) whether a point is to be marked.
+        marked: (N,) True for points with a white rim.
     """
 
     result: Segmentation
     labels: NDArray[np.int32]
-    colours: NDArray[np.uint8]
-    names: tuple[str, ...]
+    colours: list[Colour]
+    names: list[str]
     marked: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, result: Segmentation, stage: Stage, marked: NDArray[np.bool_] | None = None) -> Self:
+        """A result with its labels by direct projection, after diffusion, or after outlier removal.
+
+        Raises:
+            ParameterError: There is no such stage.
+        """
+        if stage not in STAGES:
+            raise ParameterError(f"stage: got {stage!r}, expected {', '.join(STAGES)}")
+        return cls(
+            result=result,
+            labels=getattr(result, STAGES[stage]),
+            colours=as_tuples(instance_colours(instance.category for instance in result.instances)),
+            names=[f"{instance.name} {instance.label}" for instance in result.instances],
+            marked=np.zeros(len(result.labels), bool) if marked is None else marked,
+        )
 
     def colours_of(self, labels: NDArray[np.int32]) -> NDArray[np.uint8]:
         """(n, 3) colours of the instances `labels` (n,), each 1 or more."""
-        return np.asarray(self.colours[labels - 1])
-
-
-def shown(result: Segmentation, stage: Stage, marked: NDArray[np.bool_] | None = None) -> Shown:
-    """A result at a stage of the method.
-
-    Raises:
-        ParameterError: There is no such stage.
-    """
-    return Shown(
-        result=result,
-        labels=labels_at(result, stage),
-        colours=instance_colours(instance.category for instance in result.instances),
-        names=tuple(f"{instance.name} {instance.label}" for instance in result.instances),
-        marked=np.zeros(len(result.labels), bool) if marked is None else marked,
-    )
-
-
-def labels_at(result: Segmentation, stage: Stage) -> NDArray[np.int32]:
-    """(N,) int32 labels by direct projection, after diffusion, or after outlier removal.
-
-    Raises:
-        ParameterError: There is no such stage.
-    """
-    stages = {"direct": "direct_labels", "diffused": "diffused_labels", "final": "labels"}
-    if stage not in stages:
-        raise ParameterError(f"stage: got {stage!r}, expected {', '.join(stages)}")
-    labels: NDArray[np.int32] = getattr(result, stages[stage])
-    return labels
+        return np.array(self.colours, np.uint8).reshape(-1, 3)[labels - 1]
 
 
 def images_of(result: Segmentation, images: Images) -> list[NDArray[np.uint8]]:

@@ -1,4 +1,4 @@
-"""Name tags on a picture: near what they name, clear of one another and of what is drawn."""
+"""Name tags on a picture: near the things that they name, clear of one another and of the drawing."""
 
 from collections.abc import Sequence
 from math import ceil
@@ -12,12 +12,12 @@ from ldls.palette import Colour
 
 I64 = NDArray[np.int64]
 AVERSION = 4.0
-"""How many of its heights a tag goes aside rather than lie where it had better not be."""
+"""Heights of a tag that it goes aside rather than lie where it had better not be."""
 Box = tuple[int, int, int, int]  # left, top, right, bottom, in pixels of the picture
 
 
 class Tag(NamedTuple):
-    """A text for what lies in `box`."""
+    """A text for the thing in `box`."""
 
     text: str
     colour: Colour
@@ -35,8 +35,8 @@ def draw_tags(
 ) -> None:
     """Draw tags onto the picture; one for which no room is left is not drawn.
 
-    `covered` (H, W), of the picture's shape at any size, is where tags had better not be; `aversion` is how many of its
-    heights a tag goes aside rather than lie there. Tags stay clear of the boxes `taken`.
+    `covered` (H, W), of the picture's shape at any size, is where tags had better not be; `aversion` is the
+    number of its heights that a tag goes aside rather than lie there. Tags stay clear of the boxes `taken`.
     """
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(size=12 * pen_px)
@@ -65,7 +65,7 @@ def place_tags(
     aversion: float = AVERSION,
     taken: Sequence[Box] = (),
 ) -> list[Box | None]:
-    """Return where each tag goes: inside the picture and apart; None where no room is left."""
+    """Place of each tag, inside the picture and apart; None where no room is left."""
     cover = np.pad(covered.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
     places: list[Box | None] = [None] * len(boxes)
     for index in sorted(range(len(boxes)), key=lambda i: -boxes[i][3]):  # the nearest chooses first

@@ -1,12 +1,13 @@
-"""Recordings for the Rerun viewer (https://rerun.io): what a segmentation saw and made, in 3D, in images, over time.
+"""Recordings for the Rerun viewer (https://rerun.io): a segmentation, its input and its diffusion, over time.
 
     with open_recording("000571.rrd", name="000571") as recording:
         recording.add(result, images={"image_2": image})
 
-`log` and `log_frame` log into a recording of one's own instead. Entities, "world" being what they are told to call it:
+In a stream of one's own, `Recording(stream).log_result(result)` logs at the time that is set. Entities, where "world"
+is the `entity` of the call:
 
 =============================  ==================================================================================
-entity                         what it holds
+entity                         content
 =============================  ==================================================================================
 world                          view coordinates (right-handed, z up) and the annotation context: categories as
                                classes, instances as their keypoints
@@ -29,14 +30,11 @@ Positions are in metres in the lidar frame, in single precision. Pixels are thos
 halves: u + 0.5, v + 0.5. A camera with a distorted lens stands in the 3D view as a pinhole without its distortion, for
 Rerun knows no other; points on its image are exact. Keypoint id 0 is background and 65535 out of view.
 
-A `Recording` has the timelines "frame" (0, 1, ...), "time" where frames have stamps and "iteration" where a diffusion
-is recorded; `log` logs at the time that is set. Needs the extra `viz`.
+Frames that are added have the timelines "frame" (0, 1, ...), "time" where they have stamps and "iteration" where a
+diffusion is recorded. Needs the extra `viz`.
 """
 
 from ldls.viewing.recording.blueprint import Contents, layout
-from ldls.viewing.recording.diffusion import log_diffusion
-from ldls.viewing.recording.entities import log
-from ldls.viewing.recording.frames import log_frame
 from ldls.viewing.recording.session import Recording, open_recording
 
-__all__ = ["Contents", "Recording", "layout", "log", "log_diffusion", "log_frame", "open_recording"]
+__all__ = ["Contents", "Recording", "layout", "open_recording"]

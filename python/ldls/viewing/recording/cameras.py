@@ -1,8 +1,10 @@
-"""Cameras in a recording: pose, image, masks and the points that each sees."""
+"""Cameras in a recording: pinhole and pose, image, masks and the points that each sees."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,34 +12,57 @@ from PIL import Image
 
 from ldls.camera import Camera
 from ldls.errors import InputError
-from ldls.segmentation import Segmentation
 from ldls.view import SeenView
-from ldls.viewing.recording.colours import class_ids, keypoint_ids, label_colours
-from ldls.viewing.recording.pinholes import PIXEL_CENTRE, pinhole_of
 from ldls.viewing.recording.stream import Entity, rerun
 
+PIXEL_CENTRE = 0.5
+"""Rerun's pixel centres lie at halves, ours at whole numbers."""
 IMAGE_DISTANCE_M = 2.0
 """How far before its camera an image stands in the 3D view."""
 JPEG_QUALITY = 85
 MASK_OPACITY = 0.4
-POINT_PX = 1.5
-BACKGROUND_POINT_PX = 0.5
-"""Points without an object are small on an image, which they would hide."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pinhole:
+    """A pinhole camera in the lidar frame.
+
+    Attributes:
+        K: (3, 3) intrinsic matrix, upper triangular, of pixels whose centres lie at halves.
+        T_lidar_camera: (4, 4) pose: rigid transform from camera (x right, y down, z forward) to lidar coordinates.
+    """
+
+    K: NDArray[np.float64]
+    T_lidar_camera: NDArray[np.float64]
+
+
+def pinhole_of(camera: Camera) -> Pinhole:
+    """The pinhole with the projection of `camera`, exactly, where its lens is not distorted.
+
+    The last column of a projection K [I | t], as of KITTI's P2, and a rotation in it go to the pose.
+    """
+    K, R = _upper_triangular_times_rotation(camera.projection[:, :3])
+    T_pinhole_camera = np.eye(4)
+    T_pinhole_camera[:3, :3] = R
+    T_pinhole_camera[:3, 3] = np.linalg.solve(K, camera.projection[:, 3])
+    K /= K[2, 2]
+    K[:2] += PIXEL_CENTRE * K[2]
+    return Pinhole(K, np.asarray(np.linalg.inv(T_pinhole_camera @ camera.T_camera_lidar), np.float64))
 
 
 def log_camera(entity: Entity, camera: Camera, image_size: tuple[int, int]) -> None:
-    """Log pinhole and pose."""
+    """Log pinhole and pose of a camera with images of (height, width)."""
     rr = rerun()
-    found = pinhole_of(camera)
+    pinhole = pinhole_of(camera)
     height, width = image_size
     entity.log(
         rr.Pinhole(
-            image_from_camera=found.K,
+            image_from_camera=pinhole.K,
             resolution=[width, height],
             camera_xyz=rr.ViewCoordinates.RDF,
             image_plane_distance=IMAGE_DISTANCE_M,
         ),
-        rr.Transform3D(translation=found.T_lidar_camera[:3, 3], mat3x3=found.T_lidar_camera[:3, :3]),
+        rr.Transform3D(translation=pinhole.T_lidar_camera[:3, 3], mat3x3=pinhole.T_lidar_camera[:3, :3]),
     )
 
 
@@ -58,33 +83,31 @@ def log_image(entity: Entity, pixels: NDArray[np.uint8], image_size: tuple[int, 
 
 
 def log_masks(entity: Entity, seen: SeenView, ids: NDArray[np.uint16]) -> None:
-    """Log the masks of a camera as an image of class ids, `ids` having one for each label."""
-    small = int(ids.max(initial=0)) <= np.iinfo(np.uint8).max
-    image = ids.astype(np.uint8 if small else np.uint16)[label_image(seen)]
-    entity.log(rerun().SegmentationImage(image, opacity=MASK_OPACITY))
+    """Log the masks of a camera as an image of class ids, `ids` having one for each label.
 
-
-def log_pixels(entity: Entity, seen: SeenView, result: Segmentation) -> None:
-    """Log the points that a camera of a result saw, in its image."""
-    rr = rerun()
-    labels = result.labels[seen.in_view]
-    entity.log(
-        rr.Points2D(
-            (seen.pixels + PIXEL_CENTRE).astype(np.float32),
-            colors=label_colours(result)[labels],
-            class_ids=class_ids(result.categories[seen.in_view]),
-            keypoint_ids=keypoint_ids(labels),
-            radii=rr.Radius.ui_points(np.where(labels > 0, POINT_PX, BACKGROUND_POINT_PX)),
-            show_labels=False,
-        )
-    )
-
-
-def label_image(seen: SeenView) -> NDArray[np.int32]:
-    """(H, W) label of the mask that covers each pixel, 0 where there is none; of several, the highest label."""
-    image = np.zeros(seen.view.masks.image_size, np.int32)
+    Where masks overlap, the highest label shows.
+    """
+    labels = np.zeros(seen.view.masks.image_size, np.int32)
     for at in np.argsort(seen.labels, kind="stable").tolist():
         mask = seen.view.masks[at]
         top, left, height, width = mask.bounding_box
-        image[top : top + height, left : left + width][mask.crop()] = seen.labels[at]
-    return image
+        labels[top : top + height, left : left + width][mask.crop()] = seen.labels[at]
+    small = int(ids.max(initial=0)) <= np.iinfo(np.uint8).max
+    image = ids.astype(np.uint8 if small else np.uint16)[labels]
+    entity.log(rerun().SegmentationImage(image, opacity=MASK_OPACITY))
+
+
+def log_pixels(entity: Entity, uv_px: NDArray[np.float64], **fields: Any) -> None:  # noqa: ANN401
+    """Log points on an image: (n, 2) pixels, and their colours, class ids and the like as `rerun.Points2D` has them."""
+    entity.log(rerun().Points2D((uv_px + PIXEL_CENTRE).astype(np.float32), **fields))
+
+
+def _upper_triangular_times_rotation(
+    matrix: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """K and R of K R = `matrix`, K upper triangular with a positive diagonal, R orthogonal (RQ decomposition)."""
+    # numpy has QR only: turned about, a matrix's QR is its RQ
+    Q, U = np.linalg.qr(matrix[::-1].T)
+    K, R = U.T[::-1, ::-1], Q.T[::-1]
+    signs = np.diag(np.where(np.diag(K) < 0, -1.0, 1.0))
+    return K @ signs, signs @ R

@@ -1,29 +1,31 @@
-"""Annotation contexts: which name and colour a number has.
+"""Numbers of a recording, and the names and colours that annotation contexts give them.
 
-Of files the viewer reads contexts that hold for all times only, while labels mean other objects in every frame. So what
-a recording has named is remembered, new names are added to it, and numbers keep their meaning.
+Of files the viewer reads only contexts that hold for all times, while labels mean other objects in every frame. So a
+recording remembers what it has named, new names are added to it, and numbers keep their meaning.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls import palette
 from ldls.categories import category_ids
 from ldls.errors import LimitError
 from ldls.labeling import Labeling
 from ldls.palette import BACKGROUND, Colour, category_colour
 from ldls.segmentation import Instance, Segmentation
-from ldls.viewing.recording.colours import GREATEST_ID, OUT_OF_VIEW_COLOUR, OUT_OF_VIEW_ID, label_colours
-from ldls.viewing.recording.keeping import log_context
 from ldls.viewing.recording.stream import Entity, rerun
 
+OUT_OF_VIEW_COLOUR: Colour = (64, 64, 64)
+"""Darker than background: no camera says what these points are."""
+OUT_OF_VIEW_ID = 2**16 - 1
+"""Keypoint id of points out of view."""
+GREATEST_ID = OUT_OF_VIEW_ID - 1
 CLEAR = (0, 0, 0, 0)
-RECORDINGS = 64
-"""Recordings whose names are remembered at a time."""
 
 
 class Names:
@@ -34,17 +36,21 @@ class Names:
         self._categories: dict[int, str] = {}
         self._instances: dict[tuple[int, int], tuple[str, Colour]] = {}
         self._mask_ids: dict[tuple[int, int, Colour], int] = {}
-
-    def __len__(self) -> int:
-        """How many there are; it only grows."""
-        return len(self._categories) + len(self._instances) + len(self._mask_ids)
+        self._logged: dict[str, int] = {}
 
     def add(self, result: Segmentation) -> None:
         """Name the categories and instances of a result.
 
         Raises:
-            LimitError: There are more than Rerun has numbers for.
+            LimitError: A category or a label is beyond Rerun's ids, or there are more instances than ids.
         """
+        for instance in result.instances:
+            for kind, number in (("category", instance.category), ("label", instance.label)):
+                if not 0 <= number <= GREATEST_ID:
+                    raise LimitError(
+                        f"{kind} {number}: recordings hold 0 to {GREATEST_ID}; number the categories anew, or leave "
+                        "masks out with InstanceMasks.filter"
+                    )
         for instance, colour in _coloured(result):
             self._categories.setdefault(instance.category, instance.name)
             name = f"{instance.name} {instance.label}"
@@ -59,26 +65,39 @@ class Names:
         ids = [self._mask_ids[i.label, i.category, colour] for i, colour in _coloured(result)]
         return np.array([0, *ids], np.uint16)
 
-    def of_points(self) -> Any:  # noqa: ANN401
-        """The context of points: categories as classes, the instances of each as its keypoints."""
+    def log_of_points(self, entity: Entity) -> None:
+        """Log the context of points: categories as classes, the instances of each as its keypoints."""
+        self._log(entity, self._of_points)
+
+    def log_of_masks(self, entity: Entity) -> None:
+        """Log the context of mask images: instances as classes; 0 is clear, so that the image shows."""
+        self._log(entity, self._of_masks)
+
+    def _log(self, entity: Entity, context: Callable[[], Any]) -> None:
+        n_names = len(self._categories) + len(self._instances) + len(self._mask_ids)
+        # names are only ever added: as many are the same
+        if self._logged.get(entity.path) != n_names:
+            entity.stream.log_context(entity, context())
+            self._logged[entity.path] = n_names
+
+    def _of_points(self) -> Any:  # noqa: ANN401
         rr = rerun()
         nothing = [rr.AnnotationInfo(0, "background", BACKGROUND)]
         nothing += [rr.AnnotationInfo(OUT_OF_VIEW_ID, "out of view", OUT_OF_VIEW_COLOUR)]
         classes = [rr.ClassDescription(info=nothing[0], keypoint_annotations=nothing)]
         for category, name in self._categories.items():
-            own = [rr.AnnotationInfo(m, *found) for (of, m), found in self._instances.items() if of == category]
+            own = [rr.AnnotationInfo(m, *named) for (of, m), named in self._instances.items() if of == category]
             info = rr.AnnotationInfo(category, name, category_colour(category))
             classes.append(rr.ClassDescription(info=info, keypoint_annotations=own))
         return rr.AnnotationContext(classes)
 
-    def of_masks(self) -> Any:  # noqa: ANN401
-        """The context of mask images: instances as classes; 0 is clear, so that the image shows."""
+    def _of_masks(self) -> Any:  # noqa: ANN401
         rr = rerun()
-        found = [
+        infos = [
             rr.AnnotationInfo(number, self._instances[category, label][0], colour)
             for (label, category, colour), number in self._mask_ids.items()
         ]
-        return rr.AnnotationContext([rr.AnnotationInfo(0, "background", CLEAR), *found])
+        return rr.AnnotationContext([rr.AnnotationInfo(0, "background", CLEAR), *infos])
 
     def _number(self, instance: Instance, colour: Colour) -> None:
         key = (instance.label, instance.category, colour)
@@ -91,36 +110,34 @@ class Names:
         self._mask_ids[key] = number
 
 
-@lru_cache(maxsize=RECORDINGS)
-def names_in(recording_id: str, path: str) -> Names:
-    """What a recording has named below a path."""
-    return Names()
-
-
-def log_names(root: Entity, result: Segmentation) -> tuple[Names, bool]:
-    """Name what a result has; the names, and whether there are new ones."""
-    names = names_in(root.recording_id, root.path)
-    before = len(names)
-    names.add(result)
-    grown = len(names) > before or not before
-    if grown:
-        log_context(root, names.of_points())
-    return names, grown
-
-
-def of_truth(truth: Labeling) -> Any:  # noqa: ANN401
-    """Classes of true labels by their numbers, in the colours of the categories of their names."""
+def log_truth_context(entity: Entity, truth: Labeling) -> NDArray[np.uint8]:
+    """Log classes of true labels by their numbers; (C, 3) colours, those of the categories of their names."""
     rr = rerun()
-    infos = zip(truth.names, truth_colours(truth), strict=True)
-    return rr.AnnotationContext([rr.AnnotationInfo(at, *info) for at, info in enumerate(infos)])
-
-
-def truth_colours(truth: Labeling) -> list[Colour]:
-    """Colour of each class of true labels; that of the category of its name, background first."""
     ids, _ = category_ids(dict(enumerate(truth.names)))
-    return [BACKGROUND, *(category_colour(ids[at]) for at in range(1, len(truth.names)))]
+    colours = [BACKGROUND, *(category_colour(ids[at]) for at in range(1, len(truth.names)))]
+    infos = [rr.AnnotationInfo(at, *info) for at, info in enumerate(zip(truth.names, colours, strict=True))]
+    entity.stream.log_context(entity, rr.AnnotationContext(infos))
+    return np.array(colours, np.uint8)
+
+
+def label_colours(result: Segmentation) -> NDArray[np.uint8]:
+    """(M + 2, 3) colours by label: background, the instances, and last, where label -1 finds it, out of view."""
+    return palette.label_colours((i.category for i in result.instances), out_of_view=OUT_OF_VIEW_COLOUR)
+
+
+def fields_of_points(result: Segmentation, labels: NDArray[np.int32]) -> dict[str, NDArray[Any]]:
+    """Colour, class id and keypoint id of points with `labels` (n,), as the archetypes of points take them.
+
+    Class ids are categories, keypoint ids labels, save that of points out of view.
+    """
+    categories = np.array([0, *(instance.category for instance in result.instances), 0], np.uint16)
+    return {
+        "colors": label_colours(result)[labels],
+        "class_ids": categories[labels],
+        "keypoint_ids": np.where(labels < 0, OUT_OF_VIEW_ID, labels).astype(np.uint16),
+    }
 
 
 def _coloured(result: Segmentation) -> list[tuple[Instance, Colour]]:
-    colours = label_colours(result)
-    return [(instance, tuple(colours[instance.label].tolist())) for instance in result.instances]
+    colours = palette.as_tuples(palette.instance_colours(instance.category for instance in result.instances))
+    return list(zip(result.instances, colours, strict=True))

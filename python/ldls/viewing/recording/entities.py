@@ -1,115 +1,170 @@
-"""A segmentation in a recording."""
+"""A segmentation, or a frame as it was read, in a recording."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.cloud import finite_rows
+from ldls.cloud import Points, finite_rows
+from ldls.datasets import Frame
 from ldls.errors import InputError
 from ldls.labeling import Labeling
-from ldls.segmentation import Segmentation
+from ldls.palette import category_colour
+from ldls.segmentation import OrientedBox, Segmentation, fit_upright_box
+from ldls.stages import project
 from ldls.view import camera_names
-from ldls.viewing.recording.boxes import boxes_3d
-from ldls.viewing.recording.cameras import POINT_PX, log_camera, log_image, log_masks, log_pixels
-from ldls.viewing.recording.colours import check_ids, class_ids, keypoint_ids, label_colours
-from ldls.viewing.recording.contexts import log_names
-from ldls.viewing.recording.keeping import log_context
-from ldls.viewing.recording.statistics import log_statistics
+from ldls.viewing.depth import depth_colours, depths_m
+from ldls.viewing.object_tables import markdown
+from ldls.viewing.recording.cameras import log_camera, log_image, log_masks, log_pixels
+from ldls.viewing.recording.contexts import Names, fields_of_points, label_colours, log_truth_context
 from ldls.viewing.recording.stream import Entity, rerun
-from ldls.viewing.recording.tables import markdown
-from ldls.viewing.recording.truth import log_truth
+
+POINT_PX = 1.5
+BACKGROUND_POINT_PX = 0.5
+"""Points without an object are small on an image, which they would hide."""
 
 
-def log(
+def log_result(
+    root: Entity,
+    names: Names,
     result: Segmentation,
     *,
-    images: Mapping[str, NDArray[np.uint8]] | None = None,
-    truth: Labeling | None = None,
-    name: str = "",
-    entity: str = "world",
-    recording: Any = None,  # noqa: ANN401
+    images: Mapping[str, NDArray[np.uint8]],
+    truth: Labeling | None,
+    title: str,
 ) -> None:
-    """Log a segmentation at the time that is set; the module's docstring says which entities it makes.
-
-    What an earlier call logged and this one has not, as a truth, stays until `rerun.Clear` takes it away.
-
-    Args:
-        result: The segmentation.
-        images: (H, W, 3) uint8 RGB images by the names of the views; those without one are "camera 0", "camera 1" ...
-        truth: True labels of the points.
-        name: Title of the table of objects.
-        entity: Where all goes.
-        recording: A `rerun.RecordingStream`; the active one by default.
+    """Log a segmentation below `root`, whose names are `names`; `Recording.log_result` has more.
 
     Raises:
-        InputError: No recording is active, or an image has no camera or another size than its masks.
+        InputError: An image has no camera or another size than its masks, or there is not a true label for each point.
         LimitError: A category id is greater than Rerun's ids.
-        ImportError: The extra `viz` is not installed.
     """
-    root = Entity(entity, recording)
-    check_ids(result)
-    _check_images(images or {}, camera_names(result.views))
+    cameras = camera_names(result.views)
+    for name in images:
+        if name not in cameras:
+            raise InputError(f"images: there is no camera {name!r}, expected {', '.join(cameras)}")
+    names.add(result)
     root.log(rerun().ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    names, new = log_names(root, result)
-    _log_points(root, result)
-    _log_boxes(root / "boxes", result)
+    names.log_of_points(root)
+    finite, seen_by_any = finite_rows(result.points), result.in_view
+    _log_points(root / "points", result.points[finite], **fields_of_points(result, result.labels[finite]))
+    direct = fields_of_points(result, result.direct_labels[seen_by_any])
+    _log_points(root / "points" / "direct", result.points[seen_by_any], **direct)
+    _log_object_boxes(root / "boxes", result)
     if truth is not None:
-        log_truth(root / "truth", result.points, truth)
-    for camera, seen in zip(camera_names(result.views), result.views, strict=True):
+        _log_truth(root / "truth", result.points, truth)
+    for camera, seen in zip(cameras, result.views, strict=True):
         place = root / "camera" / camera
         size = seen.view.masks.image_size
         log_camera(place, seen.view.camera, size)
-        if images is not None and camera in images:
+        if camera in images:
             log_image(place / "image", images[camera], size)
         masks = place / "image" / "masks"
-        if new:
-            log_context(masks, names.of_masks())
+        names.log_of_masks(masks)
         log_masks(masks, seen, names.mask_ids(result))
-        log_pixels(place / "image" / "points", seen, result)
-    text = markdown(result, title=name)
-    (root / "objects").log(rerun().TextDocument(text, media_type="text/markdown"))
-    log_statistics(root / "statistics", result)
+        labels = result.labels[seen.in_view]
+        radii = rerun().Radius.ui_points(np.where(labels > 0, POINT_PX, BACKGROUND_POINT_PX))
+        own = fields_of_points(result, labels)
+        log_pixels(place / "image" / "points", seen.pixels, radii=radii, show_labels=False, **own)
+    (root / "objects").log(rerun().TextDocument(markdown(result, title=title), media_type="text/markdown"))
+    _log_statistics(root / "statistics", result)
 
 
-def _log_points(root: Entity, result: Segmentation) -> None:
-    finite = finite_rows(result.points)
-    _log_labelled(root / "points", result, finite, result.labels[finite])
-    _log_labelled(root / "points" / "direct", result, result.in_view, result.direct_labels[result.in_view])
+def log_frame(root: Entity, frame: Frame) -> None:
+    """Log a frame without masks below `root`; `Recording.log_frame` has more.
 
-
-def _log_labelled(entity: Entity, result: Segmentation, rows: NDArray[np.int64], labels: NDArray[np.int32]) -> None:
+    Raises:
+        InputError: There is not a true label for each point.
+        LdlsError: An image cannot be read.
+    """
     rr = rerun()
-    categories = np.array([0, *(instance.category for instance in result.instances), 0], np.int32)
+    radius = rr.Radius.ui_points(POINT_PX)
+    root.log(rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    xyz = frame.points[finite_rows(frame.points), :3].astype(np.float32)
+    distance_m = np.linalg.norm(xyz.astype(np.float64), axis=1)
+    (root / "points").log(rr.Points3D(xyz, colors=depth_colours(distance_m), radii=radius))
+    if frame.truth is not None:
+        _log_truth(root / "truth", frame.points, frame.truth)
+    for image in frame.images:
+        place = root / "camera" / image.name
+        pixels = image.read()
+        size = (pixels.shape[0], pixels.shape[1])
+        log_camera(place, image.camera, size)
+        log_image(place / "image", pixels, size)
+        in_view, uv_px = project(frame.points, image.camera, image_size=size)
+        colours = depth_colours(depths_m(frame.points[in_view], image.camera))
+        log_pixels(place / "image" / "points", uv_px, colors=colours, radii=radius)
+
+
+def _log_truth(entity: Entity, points: Points, truth: Labeling) -> None:
+    """Log points (N, >= 3) by their true class, and a box around each true instance."""
+    if len(truth) != len(points):
+        raise InputError(f"truth: {len(truth):,} labels, {len(points):,} points; expected one label a point")
+    colours = log_truth_context(entity, truth)
+    rows = finite_rows(points)
+    classes = truth.classes[rows].astype(np.uint16)
+    _log_points(entity, points[rows], colors=colours[classes], class_ids=classes)
+    rows = rows[(truth.instances[rows] > 0) & (truth.classes[rows] > 0)]
+    pairs, owner = np.unique([truth.classes[rows], truth.instances[rows]], axis=1, return_inverse=True)
+    xyz = points[rows, :3].astype(np.float64)
+    _log_boxes(
+        entity / "boxes",
+        [fit_upright_box(xyz[owner.ravel() == at]) for at in range(pairs.shape[1])],
+        labels=[f"{truth.names[of_class]} {instance}" for of_class, instance in pairs.T.tolist()],
+        colors=colours[pairs[0]],
+        class_ids=pairs[0].astype(np.uint16),
+    )
+
+
+def _log_object_boxes(entity: Entity, result: Segmentation) -> None:
+    boxed = [(each, each.box) for each in result.objects if each.box is not None]
+    _log_boxes(
+        entity,
+        [box for _, box in boxed],
+        labels=[f"{each.name} {each.label}" for each, _ in boxed],
+        colors=label_colours(result)[np.array([each.label for each, _ in boxed], np.int32)],
+        class_ids=np.array([each.category for each, _ in boxed], np.uint16),
+    )
+
+
+def _log_boxes(entity: Entity, boxes: Sequence[OrientedBox], **fields: Any) -> None:  # noqa: ANN401
+    """Log upright boxes; none, where there are none, take the place of earlier ones."""
+    half_yaws = np.array([box.yaw / 2 for box in boxes])
+    upright = np.zeros_like(half_yaws)
     entity.log(
-        rr.Points3D(
-            result.points[rows, :3].astype(np.float32),
-            colors=label_colours(result)[labels],
-            class_ids=class_ids(categories[labels]),
-            keypoint_ids=keypoint_ids(labels),
-            radii=rr.Radius.ui_points(POINT_PX),
-            show_labels=False,
+        rerun().Boxes3D(
+            centers=np.array([box.center for box in boxes]).reshape(-1, 3),
+            half_sizes=np.array([box.size for box in boxes]).reshape(-1, 3) / 2,
+            quaternions=np.stack([upright, upright, np.sin(half_yaws), np.cos(half_yaws)], axis=1),  # x y z w
+            show_labels=True,
+            fill_mode="MajorWireframe",
+            **fields,
         )
     )
 
 
-def _log_boxes(entity: Entity, result: Segmentation) -> None:
-    found = [(o, o.box) for o in result.objects if o.box is not None]
-    labels = np.array([o.label for o, _ in found], np.int32)
-    entity.log(
-        boxes_3d(
-            [box for _, box in found],
-            labels=[f"{o.name} {o.label}" for o, _ in found],
-            colours=label_colours(result)[labels],
-            class_ids=class_ids(np.array([o.category for o, _ in found], np.int32)),
-        )
-    )
+def _log_points(entity: Entity, points: Points, **fields: NDArray[Any]) -> None:
+    rr = rerun()
+    xyz, radius = points[:, :3].astype(np.float32), rr.Radius.ui_points(POINT_PX)
+    entity.log(rr.Points3D(xyz, radii=radius, show_labels=False, **fields))
 
 
-def _check_images(images: Mapping[str, NDArray[np.uint8]], names: tuple[str, ...]) -> None:
-    for name in images:
-        if name not in names:
-            raise InputError(f"images: there is no camera {name!r}, expected {', '.join(names)}")
+def _log_statistics(entity: Entity, result: Segmentation) -> None:
+    """Log points of each category that has masks, mean confidence of labelled points, milliseconds of each stage."""
+    rr = rerun()
+    colours = {each.name: category_colour(each.category) for each in result.objects}
+    counts: Counter[str] = Counter()
+    for each in result.objects:
+        counts[each.name] += each.n_points
+    for name, count in counts.items():
+        (entity / "points" / name).log(rr.Scalars(count), rr.SeriesLines(names=name, colors=colours[name]))
+    labelled = result.labels > 0
+    if labelled.any():
+        mean = float(result.confidence[labelled].mean(dtype=np.float64))
+        (entity / "confidence").log(rr.Scalars(mean), rr.SeriesLines(names="mean confidence"))
+    for stage, seconds in result.timings.items():
+        (entity / "milliseconds" / stage).log(rr.Scalars(seconds * 1e3), rr.SeriesLines(names=stage))

@@ -14,15 +14,15 @@ ANSWER_S = 1.0
 
 
 def has_display(environment: Mapping[str, str] | None = None, platform: str | None = None) -> bool:
-    """Whether a window can be opened: on Linux if an X or Wayland display is named, always on macOS and Windows."""
+    """Return True if a window can be opened: on macOS and Windows always, on Linux where X or Wayland is named."""
     if (platform or sys.platform) in ("darwin", "win32"):
         return True
-    named = os.environ if environment is None else environment
-    return any(named.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    variables = os.environ if environment is None else environment
+    return any(variables.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def is_open() -> bool:
-    """Whether a viewer, or what takes its place, listens on this machine."""
+    """Return True if a viewer, or a program in its place, listens on this machine."""
     try:
         with socket.create_connection(("127.0.0.1", PORT), timeout=ANSWER_S):
             return True
@@ -31,7 +31,7 @@ def is_open() -> bool:
 
 
 def connect(stream: Any) -> None:  # noqa: ANN401
-    """Send what is logged to `stream` to the viewer that is open, or to one that is started.
+    """Send all that is logged to `stream` to the viewer that is open, or to one that is started.
 
     Raises:
         ConnectionError: None is open and there is no display, or the viewer does not answer.

@@ -1,0 +1,77 @@
+"""Discs set on a picture at many places at once, and several pictures in one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from ldls.palette import Colour
+
+Canvas = NDArray[np.uint8]
+"""(H, W, 3) red, green and blue of a picture that is drawn on."""
+Opacity = NDArray[np.float64]
+"""(2 r + 1, 2 r + 1) share of the picture that a mark covers, 0 to 1."""
+PAPER: Colour = (24, 24, 28)
+INK: Colour = (235, 235, 235)
+MARK: Colour = (255, 255, 255)
+"""Colour of the rim of marked points."""
+GAP_PX = 6
+FONT_PX = 17
+CAPTION_PX = 30
+
+
+def disc(radius_px: float, opacity: float = 1.0) -> Opacity:
+    """A smooth disc in the middle of an odd square."""
+    reach = ceil(radius_px + 0.5)
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
+    return np.asarray(opacity * (radius_px + 0.5 - np.hypot(x, y)).clip(0, 1))
+
+
+def stamp(canvas: Canvas, at_px: NDArray[np.int64], colours: NDArray[np.uint8] | Colour, mark: Opacity) -> None:
+    """Set `mark` on the canvas around every one of `at_px` (n, 2), x and y, each in its colour (n, 3) or all in one.
+
+    Later ones lie above earlier ones; parts beyond the edge are cut off.
+    """
+    reach = mark.shape[0] // 2
+    height, width = canvas.shape[:2]
+    own = np.broadcast_to(np.asarray(colours, np.uint8), (len(at_px), 3))
+    # the faintest pixels of the mark first, so that no rim covers the middle of a neighbour
+    for at in np.argsort(mark, axis=None):
+        dy, dx = divmod(int(at), mark.shape[1])
+        opacity = mark[dy, dx]
+        if opacity == 0:
+            continue
+        x, y = at_px[:, 0] + dx - reach, at_px[:, 1] + dy - reach
+        inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+        x, y = x[inside], y[inside]
+        canvas[y, x] = np.round((1 - opacity) * canvas[y, x] + opacity * own[inside])
+
+
+def grid(pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, columns: int) -> Image.Image:
+    """The pictures row by row, each below its caption if any."""
+    caption_px = CAPTION_PX if captions else 0
+    rows = [range(start, min(start + columns, len(pictures))) for start in range(0, len(pictures), columns)]
+    widths = [max(pictures[i].width for i in range(column, len(pictures), columns)) for column in range(columns)]
+    heights = [max(pictures[i].height for i in row) for row in rows]
+    size = sum(widths) + GAP_PX * (columns - 1), sum(heights) + caption_px * len(rows)
+    whole = Image.new("RGB", size, PAPER)
+    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=FONT_PX)
+    top = 0
+    for row, height in zip(rows, heights, strict=True):
+        left = 0
+        for i, width in zip(row, widths, strict=False):
+            if captions:
+                draw.text((left + FONT_PX // 2, top + CAPTION_PX // 2), captions[i], INK, font, anchor="lm")
+            whole.paste(pictures[i], (left, top + caption_px))
+            left += width + GAP_PX
+        top += caption_px + height
+    return whole
+
+
+def half(width_px: int) -> int:
+    """Width of each of two pictures side by side."""
+    return (width_px - GAP_PX) // 2
