@@ -26,6 +26,7 @@ lint: ## Run all linters and type checks.
 	ruff format --check .
 	mypy
 	python -m mypy.stubtest ldls._ldls
+	lint-imports
 
 .PHONY: format
 format: ## Format Rust and Python.
