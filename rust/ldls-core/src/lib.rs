@@ -7,68 +7,31 @@
 //! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is
 //! taken by one thread in one order.
 
-mod activity;
-mod adjacency;
-mod blocks;
-mod camera;
-mod candidates;
-mod chebyshev;
-mod cloud;
-mod components;
 mod diffusion;
-mod distortion;
 mod error;
 mod graph;
-mod images;
-mod kdtree;
-mod keys;
-mod label_image;
-mod lanes;
-mod leaf_search;
-mod lone_search;
 mod masks;
 mod memory;
-mod morphology;
 mod neighbors;
 mod params;
-mod pass;
-mod pixel_labels;
-mod polygon;
-mod products;
+mod projection;
 mod real;
 mod ring;
-mod rle;
-mod same_objects;
 mod segment;
-mod sightings;
-mod state;
-mod sweeps;
 #[cfg(test)]
-mod test_wall;
-mod tiles;
-mod values;
-mod view;
-mod winners;
+mod test_support;
 
-pub use camera::Camera;
-pub use cloud::Cloud;
-pub use components::keep_largest_components;
-pub use diffusion::{Convergence, Diffused, diffuse, likelihoods};
-pub use distortion::Distortion;
+pub use diffusion::{Convergence, Diffused, Products, diffuse, likelihoods};
 pub use error::Error;
-pub use graph::PointGraph;
-pub use masks::InstanceMasks;
+pub use graph::{PointGraph, keep_largest_components};
+pub use masks::{InstanceMasks, PixelLabels, Rle};
 pub use memory::Memory;
 pub use neighbors::Neighbors;
 pub use params::Params;
-pub use pixel_labels::PixelLabels;
-pub use products::Products;
+pub use projection::{Camera, Cloud, Distortion, View, ViewCounts};
 pub use real::Real;
-pub use ring::{RingSegmentation, RingView, segment_ring};
-pub use rle::Rle;
+pub use ring::{RingSegmentation, RingView, Sighting, segment_ring};
 pub use segment::{Report, Segmentation, Timings, segment};
-pub use sightings::Sighting;
-pub use view::{View, ViewCounts};
 
 /// Result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;

@@ -1,12 +1,11 @@
 //! The method on one screen: points, masks and a camera in, one label a point out.
 
-use crate::adjacency::Adjacency;
-use crate::components::keep_largest_by_index;
-use crate::kdtree::{KdTree, arrange};
-use crate::{
-    Camera, Cloud, Convergence, Error, InstanceMasks, Memory, Params, PixelLabels, PointGraph,
-    Real, Result, View, ViewCounts, diffuse,
-};
+use crate::diffusion::{Convergence, diffuse};
+use crate::graph::{PointGraph, keep_largest_by_index};
+use crate::masks::{InstanceMasks, PixelLabels};
+use crate::neighbors::{Adjacency, KdTree, arrange};
+use crate::projection::{Camera, Cloud, View, ViewCounts};
+use crate::{Error, Memory, Params, Real, Result};
 use std::time::{Duration, Instant};
 
 /// Label of points that the image does not see.

@@ -1,0 +1,420 @@
+//! Label diffusion z <- A z + b (method, steps 5 and 6).
+//!
+//! The products are not run one by one: their result is a polynomial of A times b, which a Chebyshev series
+//! reaches with a third of the sweeps, in single precision. Both leave an error, which is estimated; where two
+//! labels are nearer to one another than that, they are diffused again in double precision. Where the graph
+//! is such that the series cannot be trusted, the products are run as they stand.
+
+mod activity;
+mod blocks;
+mod lanes;
+mod pass;
+mod products;
+mod series;
+mod state;
+mod sweeps;
+mod tiles;
+mod values;
+mod winners;
+
+pub use products::Products;
+
+use self::lanes::{Lane, LaneSeeds, plan};
+use self::pass::{CONVERGED, Scheme, labels_of, largest_overlap};
+use self::series::Tolerance;
+use self::state::Rows;
+use self::sweeps::{Sweep, WIDTH_F32, WIDTH_F64};
+use self::values::Values;
+use self::winners::{Best, Contested, update};
+use crate::graph::PointGraph;
+use crate::masks::PixelLabels;
+use crate::{Error, Memory, Result};
+use rayon::prelude::*;
+
+/// What a series in single precision may leave out.
+const TOLERANCE_F32: Tolerance = Tolerance(1e-7);
+/// What a series in double precision may leave out.
+const TOLERANCE_F64: Tolerance = Tolerance(1e-13);
+/// Rows handled by one task of the thread pool.
+const BLOCK: usize = 2048;
+
+/// How far a diffusion came.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Convergence {
+    /// Sweeps over the graph that were computed for a label.
+    pub sweeps: usize,
+    /// Largest change of any likelihood that one more product would make, where that bounded the run.
+    pub residual: Option<f64>,
+    /// Estimate of the largest error of a likelihood from the terms that the series leaves out.
+    pub error: f64,
+    /// Points whose label was decided in double precision.
+    pub refined: usize,
+}
+
+/// The winning label of every point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diffused {
+    /// argmax over the labels; of equal ones the lowest.
+    pub labels: Vec<u32>,
+    /// Value of the winner over the sum of all values; 0 where nothing reached the point.
+    pub confidence: Vec<f32>,
+    /// How far the diffusion came.
+    pub convergence: Convergence,
+}
+
+impl Diffused {
+    /// Keeps the vectors, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.labels);
+        memory.keep(self.confidence);
+    }
+}
+
+impl Convergence {
+    /// Whether the run went on until one more product would change next to nothing.
+    pub fn converged(&self) -> bool {
+        self.residual.is_some_and(|residual| residual <= CONVERGED)
+    }
+
+    fn merge(&mut self, other: Self) {
+        self.sweeps = self.sweeps.max(other.sweeps);
+        self.residual = self
+            .residual
+            .into_iter()
+            .chain(other.residual)
+            .reduce(f64::max);
+        self.error = self.error.max(other.error);
+    }
+}
+
+/// Diffuses labels 0 to `n_labels` - 1 from their seeds `b` over the graph `a` and picks the winner at every
+/// point. `iterations` is the number of products, `None` as many as it takes. `exact` yields `a` and `b` in
+/// double precision, for points at which single precision does not tell the winner. Works in `memory`.
+///
+/// # Errors
+/// [`Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and whatever `exact` returns.
+pub fn diffuse(
+    a: &PointGraph,
+    b: &PixelLabels,
+    n_labels: usize,
+    iterations: Option<usize>,
+    exact: impl FnOnce(&mut Memory) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    memory: &mut Memory,
+) -> Result<Diffused> {
+    check(a, b, n_labels)?;
+    let mut best = memory.filled(a.len(), Best::default());
+    let labels: Vec<u32> = (0..n_labels as u32).collect();
+    let choose = |lanes: &[Lane], z: &Values<f32, WIDTH_F32>| update(&mut best, lanes, z);
+    let mut convergence = for_each_pass(a, b, &labels, iterations, choose, memory);
+    let contested = Contested::among(&best, convergence.error);
+    if !contested.points.is_empty() {
+        let (a, b) = exact(memory)?;
+        let labels = contested.labels(&best, n_labels);
+        let mut refined = vec![(0, f64::NEG_INFINITY); contested.points.len()];
+        let choose = |lanes: &[Lane], z: &Values<f64, WIDTH_F64>| {
+            contested.refine(&mut refined, lanes, z);
+        };
+        for_each_pass(&a, &b, &labels, iterations, choose, memory);
+        a.keep_in(memory);
+        b.keep_in(memory);
+        for (&point, &(label, _)) in contested.points.iter().zip(&refined) {
+            best[point as usize].labels[0] = label;
+        }
+        convergence.refined = contested.points.len();
+    }
+    let best_of = best.par_iter().with_min_len(BLOCK);
+    let labels = memory.collect(best_of.clone().map(|best| best.labels[0]));
+    let confidence = memory.collect(best_of.map(Best::confidence));
+    memory.keep(best);
+    Ok(Diffused {
+        labels,
+        confidence,
+        convergence,
+    })
+}
+
+/// The likelihoods that [`diffuse`] compares, in single precision: `a.len()` rows of `n_labels`, row by row.
+///
+/// # Errors
+/// As [`diffuse`].
+pub fn likelihoods(
+    a: &PointGraph,
+    b: &PixelLabels,
+    n_labels: usize,
+    iterations: Option<usize>,
+) -> Result<(Vec<f32>, Convergence)> {
+    check(a, b, n_labels)?;
+    let mut all = vec![0.0; a.len() * n_labels];
+    let labels: Vec<u32> = (0..n_labels as u32).collect();
+    let write = |lanes: &[Lane], z: &Values<f32, WIDTH_F32>| {
+        for (i, row) in all.chunks_mut(n_labels).enumerate() {
+            for (label, lane) in labels_of(lanes) {
+                row[label as usize] = z.get(i, lane);
+            }
+        }
+    };
+    let memory = &mut Memory::of_one_frame();
+    let convergence = for_each_pass(a, b, &labels, iterations, write, memory);
+    Ok((all, convergence))
+}
+
+/// Refuses seeds that do not fit the graph or the labels.
+pub(crate) fn check(a: &PointGraph, b: &PixelLabels, n_labels: usize) -> Result<()> {
+    let mismatch = |problem: String| {
+        Err(Error::Mismatch {
+            name: "pixel_labels",
+            problem,
+        })
+    };
+    if b.rows() != a.len() {
+        return mismatch(format!("{} rows, the graph has {}", b.rows(), a.len()));
+    }
+    match b.labels.iter().find(|&&label| label as usize >= n_labels) {
+        Some(label) => mismatch(format!("label {label}, expected labels below {n_labels}")),
+        None => Ok(()),
+    }
+}
+
+/// Calls `done` with the lanes of each pass and their values at all points.
+fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
+    a: &PointGraph<T>,
+    b: &PixelLabels<T>,
+    labels: &[u32],
+    iterations: Option<usize>,
+    mut done: impl FnMut(&[Lane], &Values<T, WIDTH>),
+    memory: &mut Memory,
+) -> Convergence {
+    let tolerance = if WIDTH == WIDTH_F64 {
+        TOLERANCE_F64
+    } else {
+        TOLERANCE_F32
+    };
+    let mut scheme = Scheme::choose(a, iterations, tolerance);
+    let rows = Rows::new(a, memory);
+    let mut convergence = Convergence::default();
+    let probe = WIDTH == WIDTH_F32;
+    for lanes in plan(b, labels, WIDTH, probe) {
+        let seeds = LaneSeeds::new(b, &lanes, memory);
+        let mut pass = scheme.run(&rows, &seeds, memory);
+        if !matches!(scheme, Scheme::Products(_)) && !pass.is_sound(&lanes, largest_overlap(b)) {
+            scheme = iterations.map_or(Scheme::UntilConverged, Scheme::Products);
+            pass.keep_in(memory);
+            pass = scheme.run(&rows, &seeds, memory);
+        }
+        done(&lanes, &pass.z);
+        convergence.merge(pass.convergence());
+        pass.keep_in(memory);
+        seeds.keep_in(memory);
+    }
+    rows.keep_in(memory);
+    convergence
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Real;
+    use crate::neighbors::Neighbors;
+    use proptest::prelude::*;
+
+    /// Two points, each joined to the other with weight 1/4 and to its own pixel with weight 1/2.
+    fn pair() -> (PointGraph, PixelLabels) {
+        let a = PointGraph::from_csr(vec![0, 2, 4], vec![0, 1, 0, 1], vec![0.25; 4]).unwrap();
+        let b = PixelLabels {
+            offsets: vec![0, 1, 2],
+            labels: vec![0, 1],
+            weights: vec![0.5; 2],
+            mass: vec![0.5; 2],
+        };
+        (a, b)
+    }
+
+    fn never(_: &mut Memory) -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
+        panic!("single precision tells the winner")
+    }
+
+    #[test]
+    fn the_first_product_yields_the_seeds_and_the_second_mixes_them() {
+        let (a, b) = pair();
+        assert_eq!(
+            likelihoods(&a, &b, 2, Some(1)).unwrap().0,
+            [0.5, 0.0, 0.0, 0.5]
+        );
+        assert_eq!(
+            likelihoods(&a, &b, 2, Some(2)).unwrap().0,
+            [0.625, 0.125, 0.125, 0.625]
+        );
+    }
+
+    #[test]
+    fn without_a_bound_it_runs_to_the_fixed_point() {
+        let (a, b) = pair();
+        let (z, convergence) = likelihoods(&a, &b, 2, None).unwrap();
+        assert!(convergence.converged());
+        for (value, expected) in z.iter().zip([0.75, 0.25, 0.25, 0.75]) {
+            assert!((value - expected).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_point_that_nothing_reaches_is_background_without_confidence() {
+        let a = PointGraph::from_csr(vec![0, 1], vec![0], vec![1.0]).unwrap();
+        let b = PixelLabels {
+            offsets: vec![0, 0],
+            labels: vec![],
+            weights: vec![],
+            mass: vec![0.0],
+        };
+        let diffused = diffuse(&a, &b, 3, Some(5), never, &mut Memory::of_one_frame()).unwrap();
+        assert_eq!((diffused.labels[0], diffused.confidence[0]), (0, 0.0));
+    }
+
+    #[test]
+    fn a_graph_on_which_the_series_diverges_gets_its_products() {
+        // a ring that passes values on: eigenvalues lie on a circle, far from any real interval
+        let n = 1000_u32;
+        let columns = (0..n).map(|i| (i + 1) % n).collect();
+        let a =
+            PointGraph::from_csr((0..=n as usize).collect(), columns, vec![0.99; 1000]).unwrap();
+        let b = PixelLabels {
+            offsets: (0..=n as usize).collect(),
+            labels: (0..n).map(|i| i / 100).collect(),
+            weights: vec![0.01; 1000],
+            mass: vec![0.01; 1000],
+        };
+        let (z, convergence) = likelihoods(&a, &b, 10, Some(200)).unwrap();
+        assert!(convergence.sweeps >= 200);
+        let expected: f64 = (0..100).map(|k| 0.01 * 0.99_f64.powi(k)).sum();
+        assert!((f64::from(z[0]) - expected).abs() < 1e-5);
+    }
+
+    fn plain_products(
+        a: &PointGraph<f64>,
+        b: &PixelLabels<f64>,
+        n_labels: usize,
+        iterations: usize,
+    ) -> Vec<f64> {
+        let mut z = vec![0.0; a.len() * n_labels];
+        for _ in 0..iterations {
+            let mut next = vec![0.0; z.len()];
+            for i in 0..a.len() {
+                for (label, weight) in b.row(i) {
+                    next[i * n_labels + label] = weight;
+                }
+                for (j, weight) in a.row(i) {
+                    for label in 0..n_labels {
+                        next[i * n_labels + label] += weight * z[j * n_labels + label];
+                    }
+                }
+            }
+            z = next;
+        }
+        z
+    }
+
+    type System<T> = (PointGraph<T>, PixelLabels<T>);
+
+    /// A and b of `points` of which each sees `pixels` windows of two labels, in both precisions.
+    fn system<T: Real>(points: &[[f64; 3]], seen: &[(u32, u32)], lambda: f64) -> System<T> {
+        let mut a =
+            PointGraph::from_neighbors(points, &Neighbors::search(points, 10), 1.0).unwrap();
+        let mut b = PixelLabels {
+            offsets: vec![0],
+            labels: vec![],
+            weights: vec![],
+            mass: vec![],
+        };
+        for &(label, count) in seen {
+            for (label, count) in [(0, 25 - count), (label, count)] {
+                if count > 0 {
+                    b.labels.push(label);
+                    b.weights.push(T::from_f64(lambda * f64::from(count)));
+                }
+            }
+            b.offsets.push(b.labels.len());
+            b.mass.push(T::from_f64(lambda * 25.0));
+        }
+        a.normalize_rows(&mut b, &mut Memory::of_one_frame())
+            .unwrap();
+        (a, b)
+    }
+
+    #[test]
+    fn a_cloud_too_large_for_the_cache_gets_the_likelihoods_of_plain_products() {
+        // a strip, and far points that are joined to both of its ends
+        let strip = (0..100_000).map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0]);
+        let far = (0..40).map(|i| [2500.0, 3000.0 + f64::from(i % 2), f64::from(i)]);
+        let points: Vec<[f64; 3]> = strip.chain(far).collect();
+        let seen: Vec<(u32, u32)> = (0..points.len() as u32)
+            .map(|i| (1 + i / 7000 % 2, i % 26))
+            .collect();
+        let (a, b) = system::<f32>(&points, &seen, 0.01);
+        let (found, _) = likelihoods(&a, &b, 3, Some(60)).unwrap();
+        let (a, b) = system::<f64>(&points, &seen, 0.01);
+        let expected = plain_products(&a, &b, 3, 60);
+        let largest = found
+            .iter()
+            .zip(&expected)
+            .map(|(found, expected)| (f64::from(*found) - expected).abs())
+            .fold(0.0, f64::max);
+        assert!(largest < 1e-5, "likelihoods differ by {largest}");
+    }
+
+    fn clouds() -> impl Strategy<Value = Vec<[f64; 3]>> {
+        let scattered = proptest::collection::vec([-5.0..5.0_f64, -5.0..5.0, -1.0..1.0], 1..400);
+        let graded =
+            proptest::collection::vec((0.0..8.0_f64, 0.0..6.3_f64), 1..400).prop_map(|points| {
+                // density falls by orders of magnitude with the distance from the origin
+                points
+                    .iter()
+                    .map(|&(power, angle)| (10_f64.powf(power - 6.0), angle))
+                    .map(|(r, angle)| [r * angle.cos(), r * angle.sin(), 0.0])
+                    .collect()
+            });
+        let nested = proptest::collection::vec((0_i32..5, 0_i32..9), 1..400).prop_map(|points| {
+            // clusters within clusters, coincident points among them
+            points
+                .iter()
+                .map(|&(level, place)| {
+                    let size = 0.1_f64.powi(level);
+                    [
+                        f64::from(place % 3) * size,
+                        f64::from(place / 3) * size,
+                        size,
+                    ]
+                })
+                .collect()
+        });
+        let coincident = (1_usize..40, 1_usize..30).prop_map(|(places, copies)| {
+            (0..places * copies)
+                .map(|i| [(i / copies) as f64 * 0.3, 0.0, 0.0])
+                .collect()
+        });
+        prop_oneof![scattered, graded, nested, coincident]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+        #[test]
+        fn labels_equal_those_of_plain_products_in_double_precision(
+            points in clouds(),
+            seen in proptest::collection::vec((1_u32..30, 0_u32..26), 1200),
+            iterations in prop_oneof![Just(1_usize), Just(20), Just(200), Just(1000)],
+            lambda in prop_oneof![Just(0.001), Just(0.1), Just(1e-5)],
+        ) {
+            let seen = &seen[..points.len()];
+            let (a, b) = system::<f32>(&points, seen, lambda);
+            let double = |_: &mut Memory| Ok(system::<f64>(&points, seen, lambda));
+            let found = diffuse(&a, &b, 30, Some(iterations), double, &mut Memory::of_one_frame()).unwrap();
+            let (a, b) = system::<f64>(&points, seen, lambda);
+            let expected = plain_products(&a, &b, 30, iterations);
+            for (i, (label, z)) in found.labels.iter().zip(expected.chunks(30)).enumerate() {
+                let best = z.iter().fold(0.0, |best: f64, &z| best.max(z));
+                prop_assert!(
+                    z[*label as usize] >= best * (1.0 - 1e-11),
+                    "point {} has label {} with {:e}, the best has {:e}", i, label, z[*label as usize], best
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The products z <- A z + b as they stand, one after another, for whoever wants to see z on the way (method, step 5).
+//!
+//! [`crate::diffuse`] comes to the same labels with fewer sweeps, but has no z in between. Here all labels are kept at
+//! all points, in double precision: the rounding of hundreds of products then is lost in that of the single precision
+//! in which likelihoods are handed out.
+
+use super::check;
+use super::pass::{CONVERGED, MOST_SWEEPS};
+use crate::graph::PointGraph;
+use crate::masks::PixelLabels;
+use crate::{Real, Result};
+use rayon::prelude::*;
+
+/// Rows handled by one task of the thread pool.
+const BLOCK: usize = 1024;
+
+/// A diffusion that is run some products at a time.
+#[derive(Debug, Clone)]
+pub struct Products {
+    a: PointGraph,
+    b: PixelLabels,
+    n_labels: usize,
+    /// Products to be run; without it, until one changes next to nothing.
+    iterations: Option<usize>,
+    /// Likelihoods after the products done: a row of `n_labels` for each point.
+    z: Vec<f64>,
+    /// What the next product is written to.
+    next: Vec<f64>,
+    done: usize,
+    converged: bool,
+}
+
+impl Products {
+    /// Labels 0 to `n_labels` - 1 before the first product, from their seeds `b` over the graph `a`. `iterations` is
+    /// the number of products, `None` as many as it takes.
+    ///
+    /// # Errors
+    /// [`crate::Error::Mismatch`] where `b` does not fit `a` or `n_labels`.
+    pub fn new(
+        a: PointGraph,
+        b: PixelLabels,
+        n_labels: usize,
+        iterations: Option<usize>,
+    ) -> Result<Self> {
+        check(&a, &b, n_labels)?;
+        let zeros = vec![0.0; a.len() * n_labels];
+        Ok(Self {
+            a,
+            b,
+            n_labels,
+            iterations,
+            next: zeros.clone(),
+            z: zeros,
+            done: 0,
+            converged: false,
+        })
+    }
+
+    /// Runs `products` more, or as many as there are left.
+    pub fn advance(&mut self, products: usize) {
+        for _ in 0..products {
+            if self.is_finished() {
+                return;
+            }
+            self.run_product();
+        }
+    }
+
+    /// Whether all products asked for are done; without a number, whether the last changed no likelihood by more
+    /// than 1e-5 or 20,000 are done.
+    pub fn is_finished(&self) -> bool {
+        match self.iterations {
+            Some(iterations) => self.done >= iterations,
+            None => self.converged || self.done >= MOST_SWEEPS,
+        }
+    }
+
+    /// Products done.
+    pub fn done(&self) -> usize {
+        self.done
+    }
+
+    /// The likelihoods after the products done, row by row.
+    pub fn likelihoods(&self) -> Vec<f32> {
+        let values = self.z.par_iter().with_min_len(BLOCK);
+        values.map(|&value| f32::from_f64(value)).collect()
+    }
+
+    fn run_product(&mut self) {
+        let (a, b, z, n_labels) = (&self.a, &self.b, &self.z, self.n_labels);
+        let rows = self.next.par_chunks_mut(n_labels.max(1)).enumerate();
+        // one row, one thread: sums keep their order, so results do too
+        rows.with_min_len(BLOCK).for_each(|(i, row)| {
+            row.fill(0.0);
+            for (label, weight) in b.row(i) {
+                row[label] += weight.to_f64();
+            }
+            for (j, weight) in a.row(i) {
+                let (weight, from) = (weight.to_f64(), &z[j * n_labels..(j + 1) * n_labels]);
+                row.iter_mut()
+                    .zip(from)
+                    .for_each(|(sum, value)| *sum += weight * value);
+            }
+        });
+        std::mem::swap(&mut self.z, &mut self.next);
+        self.done += 1;
+        if self.iterations.is_none() {
+            self.converged = self.last_change() <= CONVERGED;
+        }
+    }
+
+    /// Largest change of any likelihood by the last product.
+    fn last_change(&self) -> f64 {
+        let pairs = self.z.par_iter().zip(&self.next).with_min_len(BLOCK);
+        let changes = pairs.map(|(after, before)| (after - before).abs());
+        changes.reduce(|| 0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two points, each joined to the other with weight 1/4 and to its own pixel with weight 1/2.
+    fn pair(iterations: Option<usize>) -> Products {
+        let a = PointGraph::from_csr(vec![0, 2, 4], vec![0, 1, 0, 1], vec![0.25; 4]).unwrap();
+        let b = PixelLabels {
+            offsets: vec![0, 1, 2],
+            labels: vec![0, 1],
+            weights: vec![0.5; 2],
+            mass: vec![0.5; 2],
+        };
+        Products::new(a, b, 2, iterations).unwrap()
+    }
+
+    #[test]
+    fn products_are_run_from_zero_one_after_another_and_no_more_than_asked_for() {
+        let mut products = pair(Some(3));
+        assert_eq!(products.likelihoods(), [0.0; 4]);
+        products.advance(1);
+        assert_eq!(products.likelihoods(), [0.5, 0.0, 0.0, 0.5]);
+        products.advance(1);
+        assert_eq!(products.likelihoods(), [0.625, 0.125, 0.125, 0.625]);
+        assert!(!products.is_finished());
+        products.advance(5);
+        assert_eq!((products.done(), products.is_finished()), (3, true));
+    }
+
+    #[test]
+    fn without_a_number_it_ends_where_a_product_changes_next_to_nothing() {
+        let mut products = pair(None);
+        products.advance(usize::MAX);
+        assert!(products.is_finished());
+        // product t changes likelihoods by 2^-(t + 1), and 2^-17 < 1e-5 < 2^-16
+        assert_eq!(products.done(), 16);
+        for (value, expected) in products.likelihoods().iter().zip([0.75, 0.25, 0.25, 0.75]) {
+            assert!((value - expected).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn seeds_of_another_graph_are_refused() {
+        let a = PointGraph::from_csr(vec![0, 1], vec![0], vec![1.0]).unwrap();
+        let b = PixelLabels::from_csr(vec![0, 1], vec![4], vec![0.5], vec![0.5]).unwrap();
+        assert!(Products::new(a.clone(), b.clone(), 4, None).is_err());
+        assert!(Products::new(a, b, 5, None).is_ok());
+    }
+}

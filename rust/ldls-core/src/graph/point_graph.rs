@@ -1,0 +1,311 @@
+//! The point graph as a sparse matrix (method, steps 3 and 4).
+
+use crate::masks::PixelLabels;
+use crate::neighbors::{Adjacency, Neighbors, squared_distance};
+use crate::{Error, Memory, Real, Result};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Rows handled by one task of the thread pool.
+const BLOCK: usize = 1024;
+
+/// Weighted edges between points in compressed sparse rows: row i lists the points that label flows
+/// from to point i.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointGraph<T = f32> {
+    rows: Rows,
+    /// Shared by the graphs of one cloud in both precisions.
+    columns: Arc<Vec<u32>>,
+    weights: Vec<T>,
+}
+
+/// Where the rows of a sparse matrix lie.
+#[derive(Debug, Clone, PartialEq)]
+enum Rows {
+    /// All of one length.
+    Uniform { count: usize, degree: usize },
+    /// Row i at `offsets[i]..offsets[i + 1]`.
+    Varied { offsets: Vec<usize> },
+}
+
+impl Rows {
+    fn count(&self) -> usize {
+        match self {
+            Self::Uniform { count, .. } => *count,
+            Self::Varied { offsets } => offsets.len() - 1,
+        }
+    }
+
+    #[inline(always)]
+    fn range(&self, rows: Range<usize>) -> Range<usize> {
+        match self {
+            Self::Uniform { degree, .. } => rows.start * degree..rows.end * degree,
+            Self::Varied { offsets } => offsets[rows.start]..offsets[rows.end],
+        }
+    }
+}
+
+impl<T: Real> PointGraph<T> {
+    /// The graph in which each of `points` (metres) is joined to itself with weight 1 and to its
+    /// neighbours with weight exp(-d^2 / `sigma`). Rows are not normalised.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where `neighbors` is of other points.
+    pub fn from_neighbors(points: &[[f64; 3]], neighbors: &Neighbors, sigma: f64) -> Result<Self> {
+        let (n, k) = (points.len(), neighbors.k);
+        if neighbors.indices.len() != n * k || neighbors.indices.iter().any(|&j| j as usize >= n) {
+            let problem = format!("expected {k} numbers below {n} for each of {n} points");
+            return Err(Error::Mismatch {
+                name: "neighbors",
+                problem,
+            });
+        }
+        let row = |i: usize| {
+            std::iter::once(i as u32).chain(neighbors.indices[i * k..(i + 1) * k].iter().copied())
+        };
+        let columns = (0..n).flat_map(row).collect();
+        Ok(Self::from_adjacency(
+            points,
+            &Adjacency {
+                degree: k + 1,
+                columns: Arc::new(columns),
+            },
+            sigma,
+            &mut Memory::of_one_frame(),
+        ))
+    }
+
+    /// The same from rows that begin with the point itself.
+    pub(crate) fn from_adjacency(
+        points: &[[f64; 3]],
+        adjacency: &Adjacency,
+        sigma: f64,
+        memory: &mut Memory,
+    ) -> Self {
+        let (count, degree) = (points.len(), adjacency.degree);
+        let mut weights = memory.filled(count * degree, T::default());
+        let rows = weights
+            .par_chunks_mut(degree)
+            .zip(adjacency.columns.par_chunks(degree))
+            .zip(points);
+        rows.with_min_len(BLOCK)
+            .for_each(|((weights, columns), point)| {
+                weights[0] = T::from_f64(1.0);
+                for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
+                    let squared = squared_distance(point, &points[j as usize]);
+                    *weight = T::from_f64(-squared / sigma).exp();
+                }
+            });
+        Self {
+            rows: Rows::Uniform { count, degree },
+            columns: Arc::clone(&adjacency.columns),
+            weights,
+        }
+    }
+
+    /// A graph from the three arrays of a sparse matrix.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where the arrays do not describe a square matrix of finite weights.
+    pub fn from_csr(offsets: Vec<usize>, columns: Vec<u32>, weights: Vec<T>) -> Result<Self> {
+        let mismatch = |problem: String| {
+            Err(Error::Mismatch {
+                name: "graph",
+                problem,
+            })
+        };
+        let entries = columns.len();
+        let ascending = offsets.first() == Some(&0) && offsets.is_sorted();
+        if !ascending || offsets.last() != Some(&entries) {
+            let problem = format!("indptr must ascend from 0 to the number of entries, {entries}");
+            return mismatch(problem);
+        }
+        if entries != weights.len() {
+            return mismatch(format!(
+                "{entries} column indices but {} weights",
+                weights.len()
+            ));
+        }
+        let n = offsets.len() - 1;
+        if let Some(column) = columns.iter().find(|&&column| column as usize >= n) {
+            let problem = format!("column {column} in {n} rows, expected a square matrix");
+            return mismatch(problem);
+        }
+        if let Some(at) = weights
+            .iter()
+            .position(|weight| !weight.to_f64().is_finite())
+        {
+            return mismatch(format!(
+                "entry {at} is {:?}, expected finite weights",
+                weights[at]
+            ));
+        }
+        Ok(Self {
+            rows: Rows::Varied { offsets },
+            columns: Arc::new(columns),
+            weights,
+        })
+    }
+
+    /// Divides every row, point edges and pixel edges together, by its sum.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where `labels` is of another number of points.
+    pub fn normalize_rows(
+        &mut self,
+        labels: &mut PixelLabels<T>,
+        memory: &mut Memory,
+    ) -> Result<()> {
+        if labels.rows() != self.len() {
+            let problem = format!("{} rows, the graph has {}", labels.rows(), self.len());
+            return Err(Error::Mismatch {
+                name: "pixel_labels",
+                problem,
+            });
+        }
+        let scale = |(i, mass): (usize, &T)| {
+            let edges = &self.weights[self.rows.range(i..i + 1)];
+            let sum = edges.iter().map(|w| w.to_f64()).sum::<f64>() + mass.to_f64();
+            // a row without edges stays empty rather than become NaN
+            if sum > 0.0 { 1.0 / sum } else { 0.0 }
+        };
+        let masses = labels.mass.par_iter().enumerate().with_min_len(BLOCK);
+        let scales = memory.collect(masses.map(scale));
+        scale_rows(&mut self.weights, &scales, |rows| self.rows.range(rows));
+        let range = |rows: Range<usize>| labels.offsets[rows.start]..labels.offsets[rows.end];
+        scale_rows(&mut labels.weights, &scales, range);
+        labels
+            .mass
+            .iter_mut()
+            .zip(&scales)
+            .for_each(|(mass, scale)| rescale(mass, *scale));
+        memory.keep(scales);
+        Ok(())
+    }
+
+    /// Keeps the weights, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.weights);
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.rows.count()
+    }
+
+    /// Whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Edges of each point, if it is known that all have as many.
+    pub(crate) fn degree(&self) -> Option<usize> {
+        match self.rows {
+            Rows::Uniform { degree, .. } => Some(degree),
+            Rows::Varied { .. } => None,
+        }
+    }
+
+    /// Columns and weights of row `i`.
+    #[inline]
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, T)> {
+        let (columns, weights) = self.slices(i..i + 1);
+        columns
+            .iter()
+            .map(|&column| column as usize)
+            .zip(weights.iter().copied())
+    }
+
+    /// Columns and weights of `rows`, row after row.
+    #[inline(always)]
+    pub(crate) fn slices(&self, rows: Range<usize>) -> (&[u32], &[T]) {
+        let range = self.rows.range(rows);
+        (&self.columns[range.clone()], &self.weights[range])
+    }
+
+    /// Row starts, column indices and weights.
+    pub fn into_csr(self) -> (Vec<usize>, Vec<u32>, Vec<T>) {
+        let offsets = (0..=self.len())
+            .map(|i| self.rows.range(i..i).start)
+            .collect();
+        (offsets, Arc::unwrap_or_clone(self.columns), self.weights)
+    }
+}
+
+/// Multiplies the values of each row, which lie at `range` of it, by its scale.
+fn scale_rows<T: Real>(
+    mut values: &mut [T],
+    scales: &[f64],
+    range: impl Fn(Range<usize>) -> Range<usize> + Sync,
+) {
+    let mut blocks = Vec::with_capacity(scales.len().div_ceil(BLOCK));
+    for (block, scales) in scales.chunks(BLOCK).enumerate() {
+        let first = block * BLOCK;
+        let (head, tail) = values.split_at_mut(range(first..first + scales.len()).len());
+        blocks.push((head, first, scales));
+        values = tail;
+    }
+    blocks.into_par_iter().for_each(|(values, first, scales)| {
+        let start = range(first..first).start;
+        for (i, &scale) in (first..).zip(scales) {
+            let row = range(i..i + 1);
+            values[row.start - start..row.end - start]
+                .iter_mut()
+                .for_each(|value| rescale(value, scale));
+        }
+    });
+}
+
+fn rescale<T: Real>(value: &mut T, scale: f64) {
+    *value = T::from_f64(value.to_f64() * scale);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chain() -> PointGraph {
+        let points: Vec<[f64; 3]> = (0..4).map(|i| [f64::from(i), 0.0, 0.0]).collect();
+        PointGraph::from_neighbors(&points, &Neighbors::search(&points, 2), 2.0).unwrap()
+    }
+
+    #[test]
+    fn weights_fall_with_the_squared_distance() {
+        let row: Vec<_> = chain().row(0).collect();
+        let weight = |d2: f32| (-d2 / 2.0).exp();
+        assert_eq!(row, [(0, 1.0), (1, weight(1.0)), (2, weight(4.0))]);
+    }
+
+    #[test]
+    fn rows_sum_to_one_with_their_pixel_edges() {
+        let mut labels = PixelLabels {
+            offsets: vec![0, 1, 1, 1, 1],
+            labels: vec![1],
+            weights: vec![0.5],
+            mass: vec![0.5; 4],
+        };
+        let mut graph = chain();
+        graph
+            .normalize_rows(&mut labels, &mut Memory::of_one_frame())
+            .unwrap();
+        for i in 0..4 {
+            let sum: f32 = graph.row(i).map(|(_, weight)| weight).sum::<f32>() + labels.mass[i];
+            assert!((sum - 1.0).abs() < 1e-6, "row {i} sums to {sum}");
+        }
+        assert_eq!(labels.weights[0], labels.mass[0]);
+    }
+
+    #[test]
+    fn arrays_that_are_no_square_matrix_are_refused() {
+        for (offsets, columns, weights) in [
+            (vec![], vec![], vec![]),
+            (vec![0, 2], vec![0], vec![1.0]),
+            (vec![0, 1], vec![1], vec![1.0]),
+            (vec![0, 1], vec![0], vec![f32::NAN]),
+            (vec![0, 1], vec![0], vec![]),
+        ] {
+            assert!(PointGraph::from_csr(offsets, columns, weights).is_err());
+        }
+    }
+}

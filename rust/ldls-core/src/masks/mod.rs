@@ -1,0 +1,12 @@
+//! Instance masks of an image, and the labels that its pixels give to points (method, step 2).
+
+mod instance_masks;
+mod label_image;
+mod morphology;
+mod pixel_labels;
+mod polygon;
+mod rle;
+
+pub use instance_masks::InstanceMasks;
+pub use pixel_labels::PixelLabels;
+pub use rle::Rle;

@@ -1,0 +1,244 @@
+//! The weights b that the pixels around points give them (method, steps 2 and 4).
+
+use super::instance_masks::InstanceMasks;
+use super::label_image::{LabelImage, WindowCounts};
+use crate::projection::nearest_pixel;
+use crate::{Error, Memory, Real, Result};
+use rayon::prelude::*;
+
+/// Points handled by one task of the thread pool.
+const BLOCK: usize = 2048;
+
+/// The pixel edges of every point, added up by label: row i holds the labels found in the window of point i and the
+/// sum of the weights of the edges that end in each. A pixel under several masks counts for each of them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PixelLabels<T = f32> {
+    /// Row i lies at `offsets[i]..offsets[i + 1]`.
+    pub offsets: Vec<usize>,
+    /// Labels, ascending within a row.
+    pub labels: Vec<u32>,
+    /// Weight of each of them.
+    pub weights: Vec<T>,
+    /// Sum of the weights of all pixel edges of a point, each pixel once.
+    pub mass: Vec<T>,
+}
+
+impl InstanceMasks {
+    /// The pixel edges of points that fall on the pixels `uv`: each point is joined to the pixels of the `window` x
+    /// `window` square centred on its nearest pixel that lie in the image, each with weight `pixel_weight`.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where the nearest pixel of a point lies outside the image.
+    pub fn pixel_labels<T: Real>(
+        &self,
+        uv: &[[f64; 2]],
+        window: usize,
+        pixel_weight: f64,
+        memory: &mut Memory,
+    ) -> Result<PixelLabels<T>> {
+        let image = LabelImage::paint(self, memory);
+        let count = uv.len().div_ceil(BLOCK);
+        let mut blocks: Vec<PixelLabels<T>> = memory.as_left(count);
+        let outcomes: Vec<Result<()>> = blocks
+            .par_iter_mut()
+            .zip(uv.par_chunks(BLOCK))
+            .enumerate()
+            .map(|(block, (labels, uv))| {
+                labels.clear();
+                let mut counts = WindowCounts::default();
+                for (i, &uv) in (block * BLOCK..).zip(uv) {
+                    image.count(self.nearest_pixel(i, uv)?, window / 2, &mut counts);
+                    labels.push(&counts, pixel_weight);
+                }
+                Ok(())
+            })
+            .collect();
+        memory.keep(image.pixels);
+        outcomes.into_iter().collect::<Result<()>>()?;
+        let labels = PixelLabels::concatenate(&blocks[..count], memory);
+        memory.keep_as_is(blocks);
+        Ok(labels)
+    }
+
+    /// Direct projection: the label of the pixel nearest to each of `uv`; of several masks, the first.
+    ///
+    /// # Errors
+    /// As [`InstanceMasks::pixel_labels`].
+    pub fn direct_labels(&self, uv: &[[f64; 2]]) -> Result<Vec<u32>> {
+        let image = LabelImage::paint(self, &mut Memory::of_one_frame());
+        let label = |(i, &uv): (usize, &[f64; 2])| {
+            let set = image.set_at(self.nearest_pixel(i, uv)?);
+            Ok(image.labels_of(set).last().unwrap_or(0))
+        };
+        uv.iter().enumerate().map(label).collect()
+    }
+
+    /// The pixel nearest to `uv`, that of point `i`.
+    fn nearest_pixel(&self, i: usize, uv: [f64; 2]) -> Result<[usize; 2]> {
+        nearest_pixel(uv, self.height(), self.width()).ok_or_else(|| {
+            let problem = format!(
+                "row {i} is at ({}, {}), outside the image of {} x {}",
+                uv[0],
+                uv[1],
+                self.height(),
+                self.width()
+            );
+            Error::Mismatch {
+                name: "pixels",
+                problem,
+            }
+        })
+    }
+}
+
+impl<T: Real> PixelLabels<T> {
+    /// Labels from the three arrays of a sparse matrix, and the weight of all pixel edges of each point.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where the arrays do not fit one another.
+    pub fn from_csr(
+        offsets: Vec<usize>,
+        labels: Vec<u32>,
+        weights: Vec<T>,
+        mass: Vec<T>,
+    ) -> Result<Self> {
+        let ascending = offsets.first() == Some(&0)
+            && offsets.is_sorted()
+            && offsets.last() == Some(&labels.len());
+        if !ascending || labels.len() != weights.len() || offsets.len() != mass.len() + 1 {
+            let problem = format!(
+                "indptr of {}, indices of {}, values of {} and mass of {} do not make one sparse matrix",
+                offsets.len(),
+                labels.len(),
+                weights.len(),
+                mass.len()
+            );
+            return Err(Error::Mismatch {
+                name: "pixel_labels",
+                problem,
+            });
+        }
+        Ok(Self {
+            offsets,
+            labels,
+            weights,
+            mass,
+        })
+    }
+
+    fn clear(&mut self) {
+        self.offsets.clear();
+        self.labels.clear();
+        self.weights.clear();
+        self.mass.clear();
+    }
+
+    fn push(&mut self, counts: &WindowCounts, pixel_weight: f64) {
+        for &(label, count) in &counts.labels {
+            self.labels.push(label);
+            self.weights
+                .push(T::from_f64(pixel_weight * f64::from(count)));
+        }
+        self.mass
+            .push(T::from_f64(pixel_weight * f64::from(counts.pixels)));
+        self.offsets.push(self.labels.len());
+    }
+
+    fn concatenate(blocks: &[Self], memory: &mut Memory) -> Self {
+        let points: usize = blocks.iter().map(Self::rows).sum();
+        let entries = blocks.iter().map(|block| block.labels.len()).sum();
+        let mut all = Self {
+            offsets: memory.empty(points + 1),
+            labels: memory.empty(entries),
+            weights: memory.empty(entries),
+            mass: memory.empty(points),
+        };
+        all.offsets.push(0);
+        for block in blocks {
+            let start = all.labels.len();
+            all.offsets
+                .extend(block.offsets.iter().map(|offset| start + offset));
+            all.labels.extend_from_slice(&block.labels);
+            all.weights.extend_from_slice(&block.weights);
+            all.mass.extend_from_slice(&block.mass);
+        }
+        all
+    }
+
+    /// Keeps the vectors, which are no longer needed.
+    pub(crate) fn keep_in(self, memory: &mut Memory) {
+        memory.keep(self.offsets);
+        memory.keep(self.labels);
+        memory.keep(self.weights);
+        memory.keep(self.mass);
+    }
+
+    /// Number of points.
+    pub fn rows(&self) -> usize {
+        self.mass.len()
+    }
+
+    /// Labels and weights of point `i`.
+    #[inline]
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, T)> {
+        let range = self.offsets[i]..self.offsets[i + 1];
+        self.labels[range.clone()]
+            .iter()
+            .map(|&label| label as usize)
+            .zip(self.weights[range].iter().copied())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::masks::Rle;
+    use proptest::prelude::*;
+
+    fn masks(height: usize, width: usize, pixels: &[Vec<bool>]) -> InstanceMasks {
+        let rles = pixels
+            .iter()
+            .map(|p| Rle::from_pixels(height, width, p).unwrap())
+            .collect();
+        InstanceMasks::new(height, width, rles).unwrap()
+    }
+
+    #[test]
+    fn a_window_at_the_corner_has_fewer_pixels() {
+        let labels = masks(6, 6, &[vec![true; 36]])
+            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0, &mut Memory::of_one_frame())
+            .unwrap();
+        assert_eq!(
+            (labels.mass[0], labels.row(0).collect::<Vec<_>>()),
+            (9.0, vec![(1, 9.0)])
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn weights_equal_a_count_of_every_pixel(
+            pixels in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 63), 0..4),
+            u in -0.5..8.49_f64, v in -0.5..6.49_f64, reach in 0_usize..4,
+        ) {
+            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, &mut Memory::of_one_frame()).unwrap();
+            let mut expected = vec![0.0_f32; pixels.len() + 1];
+            let mut mass = 0.0;
+            for row in 0..7_usize {
+                for column in 0..9_usize {
+                    let near = |c: f64, p: usize| (c + 0.5).floor() as i64 - p as i64;
+                    if near(u, column).abs() > reach as i64 || near(v, row).abs() > reach as i64 {
+                        continue;
+                    }
+                    mass += 1.0;
+                    let inside: Vec<_> = (0..pixels.len()).filter(|&m| pixels[m][row * 9 + column]).collect();
+                    if inside.is_empty() { expected[0] += 1.0; }
+                    for m in inside { expected[m + 1] += 1.0 }
+                }
+            }
+            let mut dense = vec![0.0; expected.len()];
+            found.row(0).for_each(|(label, weight)| dense[label] = weight);
+            prop_assert_eq!(dense, expected);
+            prop_assert_eq!(found.mass[0], mass);
+        }
+    }
+}

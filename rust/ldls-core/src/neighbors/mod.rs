@@ -1,0 +1,154 @@
+//! The K nearest neighbours of every point, exactly.
+//!
+//! Distances are those of double precision; of equally distant points the one of lower index is nearer.
+
+mod adjacency;
+mod candidates;
+mod kdtree;
+mod keys;
+mod leaf_search;
+mod lone_search;
+
+pub(crate) use adjacency::Adjacency;
+pub(crate) use candidates::squared_distance;
+pub(crate) use kdtree::{KdTree, arrange};
+
+use crate::Memory;
+use rayon::prelude::*;
+
+/// The `k` nearest other points of every point, nearest first.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Neighbors {
+    /// Neighbours a point: what was asked for, or one less than there are points.
+    pub k: usize,
+    /// Neighbours of point i at `i * k..(i + 1) * k`.
+    pub indices: Vec<u32>,
+}
+
+impl Neighbors {
+    /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; the point itself is none
+    /// of them.
+    pub fn search(points: &[[f64; 3]], k: usize) -> Self {
+        let memory = &mut Memory::of_one_frame();
+        let tree = KdTree::new(points, memory);
+        let found = Adjacency::search(&tree, &tree.arrange(points, memory), k, memory);
+        let k = found.degree - 1;
+        let mut indices = vec![0; points.len() * k];
+        if k > 0 {
+            for (&index, row) in tree.order.iter().zip(found.columns.chunks(found.degree)) {
+                let slots = &mut indices[index as usize * k..][..k];
+                for (slot, &position) in slots.iter_mut().zip(&row[1..]) {
+                    *slot = tree.order[position as usize];
+                }
+            }
+        }
+        Self { k, indices }
+    }
+
+    /// Squared distances of the neighbours of `points`, in square metres, in the order of `indices`.
+    pub fn squared_distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        let rows = self.indices.par_chunks(self.k.max(1)).zip(points);
+        let of_row = |(row, point): (&[u32], &[f64; 3])| {
+            let point = *point;
+            let distance = move |&j: &u32| squared_distance(&point, &points[j as usize]);
+            row.iter().map(distance).collect::<Vec<_>>()
+        };
+        rows.flat_map_iter(of_row).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn brute_force(points: &[[f64; 3]], k: usize) -> Neighbors {
+        let k = k.min(points.len().saturating_sub(1));
+        let mut neighbors = Neighbors {
+            k,
+            indices: Vec::new(),
+        };
+        for (i, from) in points.iter().enumerate() {
+            let others = (0..points.len()).filter(|&j| j != i);
+            let mut row: Vec<(f64, usize)> = others
+                .map(|j| (squared_distance(from, &points[j]), j))
+                .collect();
+            row.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            neighbors
+                .indices
+                .extend(row[..k].iter().map(|&(_, j)| j as u32));
+        }
+        neighbors
+    }
+
+    /// Coordinates on a lattice of `step` metres: ties and coincident points abound.
+    fn quantised(step: f64, most: usize) -> impl Strategy<Value = Vec<[f64; 3]>> {
+        let axis = || (-8_i32..8).prop_map(move |c| f64::from(c) * step);
+        proptest::collection::vec([axis(), axis(), axis()], 0..most)
+    }
+
+    proptest! {
+        #[test]
+        fn quantised_clouds_equal_brute_force(points in quantised(0.25, 600), k in 1_usize..14) {
+            prop_assert_eq!(Neighbors::search(&points, k), brute_force(&points, k));
+        }
+
+        #[test]
+        fn flat_clouds_equal_brute_force(mut points in quantised(0.1, 600), axis in 0_usize..3) {
+            for point in &mut points {
+                point[axis] = -0.0;
+            }
+            prop_assert_eq!(Neighbors::search(&points, 10), brute_force(&points, 10));
+        }
+
+        #[test]
+        fn scattered_clouds_equal_brute_force(
+            points in proptest::collection::vec([-9.0..9.0_f64, -9.0..9.0, -2.0..2.0], 0..600),
+            k in prop_oneof![Just(1_usize), Just(10), Just(11), Just(12), Just(30), Just(100), Just(255)],
+            far in prop_oneof![Just(0.0), Just(5e6)],
+        ) {
+            let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + far, p[1] - far, p[2]]).collect();
+            prop_assert_eq!(Neighbors::search(&points, k), brute_force(&points, k));
+        }
+
+        #[test]
+        fn clouds_of_single_precision_equal_brute_force(
+            points in proptest::collection::vec([-9.0..9.0_f32, -9.0..9.0, -2.0..2.0], 0..600)
+        ) {
+            let points: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
+            prop_assert_eq!(Neighbors::search(&points, 10), brute_force(&points, 10));
+        }
+    }
+
+    #[test]
+    fn coincident_points_are_each_others_neighbours() {
+        let points = vec![[1.0, 2.0, 3.0]; 120_000];
+        let neighbors = Neighbors::search(&points, 10);
+        assert_eq!(neighbors.indices[..10], [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
+        assert_eq!(
+            neighbors.indices[119_999 * 10..],
+            [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
+        );
+    }
+
+    #[test]
+    fn a_lattice_equals_brute_force_at_its_corners() {
+        let side = |c: usize| (c as f64) * 0.5;
+        let points: Vec<[f64; 3]> = (0..125_000)
+            .map(|i| [side(i % 50), side(i / 50 % 50), side(i / 2500)])
+            .collect();
+        let neighbors = Neighbors::search(&points, 3);
+        assert_eq!(neighbors.indices[..3], [1, 50, 2500]);
+        assert_eq!(
+            neighbors.indices[3 * 124_999..],
+            [122_499, 124_949, 124_998]
+        );
+    }
+
+    #[test]
+    fn fewer_points_than_neighbours_are_joined_to_all_others() {
+        let points = [[0.0; 3], [1.0; 3], [3.0; 3]];
+        assert_eq!(Neighbors::search(&points, 10).indices, [1, 2, 0, 2, 1, 0]);
+        assert_eq!(Neighbors::search(&[[0.0; 3]], 10), Neighbors::default());
+    }
+}

@@ -1,0 +1,242 @@
+//! Points to pixels: a general pinhole camera. What it sees of a cloud is the business of [`super::in_view`].
+
+use super::distortion::{Distortion, Lens};
+use crate::{Error, Result};
+use nalgebra::{Matrix3, Matrix3x4, Matrix4};
+
+/// How far a rotation may be from orthonormal; calibration files round to 7 digits.
+const ROTATION_LIMIT: f64 = 1e-3;
+
+/// A camera: a rigid transform to the camera frame (x right, y down, z forward), then a 3 x 4 projection to pixels, with
+/// the distortion of the lens between them. Pixel centres lie at integer coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// projection * T_camera_lidar; of a distorted camera, of the plane z = 1 before the lens.
+    matrix: Matrix3x4<f64>,
+    lens: Lens,
+    /// From the plane z = 1 behind the lens to pixels; unused without distortion.
+    intrinsic: Matrix3<f64>,
+    /// Points at this depth or nearer are not seen, in metres.
+    min_depth_m: f64,
+}
+
+/// What a camera has of a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Sight {
+    /// At or behind the smallest depth.
+    Behind,
+    /// In front of the camera, beside the image.
+    Outside,
+    /// At these pixels, u and v.
+    Seen([f64; 2]),
+}
+
+impl Camera {
+    /// A camera from its 3 x 4 projection (camera frame to homogeneous pixels) and the 4 x 4 rigid transform
+    /// `T_camera_lidar` from the lidar to the camera frame, both given row by row.
+    ///
+    /// # Errors
+    /// [`Error::CameraNotFinite`], [`Error::CameraSingular`], [`Error::CameraNotRigid`], [`Error::CameraLastRow`], or
+    /// [`Error::Parameter`] for the depth.
+    pub fn new(
+        projection: &[f64; 12],
+        t_camera_lidar: &[f64; 16],
+        min_depth_m: f64,
+    ) -> Result<Self> {
+        let projection = Matrix3x4::from_row_slice(projection);
+        let transform = Matrix4::from_row_slice(t_camera_lidar);
+        check_finite("projection", projection.as_slice(), 3)?;
+        check_finite("T_camera_lidar", transform.as_slice(), 4)?;
+        check_projection(&projection)?;
+        check_rigid(&transform)?;
+        if !(min_depth_m >= 0.0 && min_depth_m.is_finite()) {
+            return Err(Error::Parameter {
+                name: "min_depth_m",
+                found: min_depth_m.to_string(),
+                expected: "0 or a positive number of metres",
+            });
+        }
+        // the third row then yields metres, whatever the scale of a homogeneous projection
+        let projection = projection / projection.fixed_view::<1, 3>(2, 0).norm();
+        Ok(Self {
+            matrix: projection * transform,
+            lens: Lens::new(Distortion::None)?,
+            intrinsic: Matrix3::identity(),
+            min_depth_m,
+        })
+    }
+
+    /// A camera whose lens departs from a pinhole, from its 3 x 3 intrinsic matrix K, given row by row; else as
+    /// [`Camera::new`].
+    ///
+    /// # Errors
+    /// As [`Camera::new`]; [`Error::CameraIntrinsic`] where the last row of K is not 0 0 1, and [`Error::Distortion`].
+    pub fn with_distortion(
+        intrinsic: &[f64; 9],
+        distortion: Distortion,
+        t_camera_lidar: &[f64; 16],
+        min_depth_m: f64,
+    ) -> Result<Self> {
+        let k = Matrix3::from_row_slice(intrinsic);
+        let last = [k[(2, 0)], k[(2, 1)], k[(2, 2)]];
+        if last != [0.0, 0.0, 1.0] {
+            return Err(Error::CameraIntrinsic { found: last });
+        }
+        let mut projection = [0.0; 12];
+        for row in 0..3 {
+            projection[4 * row..4 * row + 3].copy_from_slice(&intrinsic[3 * row..3 * row + 3]);
+        }
+        let pinhole = Self::new(&projection, t_camera_lidar, min_depth_m)?;
+        let lens = Lens::new(distortion)?;
+        if lens.is_none() {
+            return Ok(pinhole);
+        }
+        let transform = Matrix4::from_row_slice(t_camera_lidar);
+        Ok(Self {
+            matrix: transform.fixed_rows::<3>(0).into(),
+            lens,
+            intrinsic: k,
+            min_depth_m,
+        })
+    }
+
+    /// Where a point of the lidar frame falls on an image of `height` x `width` pixels.
+    #[inline]
+    pub(crate) fn sight(&self, xyz: &[f64; 3], height: usize, width: usize) -> Sight {
+        let [u, v, depth] = self.project(xyz);
+        if !(depth > self.min_depth_m) {
+            Sight::Behind
+        } else if nearest_pixel([u, v], height, width).is_some() {
+            Sight::Seen([u, v])
+        } else {
+            Sight::Outside
+        }
+    }
+
+    /// u and v in pixels, and the depth in metres, of a point in the lidar frame. Points beyond the reach of the lens
+    /// have no pixel: u and v are NaN.
+    #[inline]
+    pub fn project(&self, [x, y, z]: &[f64; 3]) -> [f64; 3] {
+        let m = &self.matrix;
+        let row = |i: usize| m[(i, 0)] * x + m[(i, 1)] * y + m[(i, 2)] * z + m[(i, 3)];
+        let w = row(2);
+        let [x, y] = [row(0) / w, row(1) / w];
+        if self.lens.is_none() {
+            return [x, y, w];
+        }
+        let k = &self.intrinsic;
+        match self.lens.bend([x, y]) {
+            Some([x, y]) => [
+                k[(0, 0)] * x + k[(0, 1)] * y + k[(0, 2)],
+                k[(1, 0)] * x + k[(1, 1)] * y + k[(1, 2)],
+                w,
+            ],
+            None => [f64::NAN, f64::NAN, w],
+        }
+    }
+}
+
+/// The pixel nearest to `uv`, as column and row, if it lies in an image of `height` x `width` pixels.
+#[inline]
+pub(crate) fn nearest_pixel([u, v]: [f64; 2], height: usize, width: usize) -> Option<[usize; 2]> {
+    let [column, row] = [u, v].map(|c| (c + 0.5).floor());
+    // written so that NaN fails
+    let inside = column >= 0.0 && column < width as f64 && row >= 0.0 && row < height as f64;
+    inside.then_some([column as usize, row as usize])
+}
+
+fn check_finite(matrix: &'static str, column_major: &[f64], rows: usize) -> Result<()> {
+    match column_major.iter().position(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(at) => Err(Error::CameraNotFinite {
+            matrix,
+            row: at % rows,
+            column: at / rows,
+            value: column_major[at],
+        }),
+    }
+}
+
+fn check_projection(projection: &Matrix3x4<f64>) -> Result<()> {
+    let left: Matrix3<f64> = projection.fixed_columns::<3>(0).into();
+    // relative to its size, so that a camera of long focal length is not taken for a flat one
+    let size = left.norm();
+    if size > 0.0 && (left / size).determinant().abs() > 1e-12 {
+        return Ok(());
+    }
+    Err(Error::CameraSingular {
+        fx: left[(0, 0)],
+        fy: left[(1, 1)],
+        w: left[(2, 2)],
+    })
+}
+
+fn check_rigid(transform: &Matrix4<f64>) -> Result<()> {
+    let last = [
+        transform[(3, 0)],
+        transform[(3, 1)],
+        transform[(3, 2)],
+        transform[(3, 3)],
+    ];
+    if last != [0.0, 0.0, 0.0, 1.0] {
+        return Err(Error::CameraLastRow { found: last });
+    }
+    let rotation: Matrix3<f64> = transform.fixed_view::<3, 3>(0, 0).into();
+    let deviation = (rotation.transpose() * rotation - Matrix3::identity())
+        .abs()
+        .max();
+    let determinant = rotation.determinant();
+    if deviation <= ROTATION_LIMIT && determinant > 0.0 {
+        return Ok(());
+    }
+    Err(Error::CameraNotRigid {
+        deviation,
+        determinant,
+        limit: ROTATION_LIMIT,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IDENTITY: [f64; 16] = [
+        1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
+    ];
+    const PROJECTION: [f64; 12] = [100., 0., 50., 0., 0., 100., 40., 0., 0., 0., 1., 0.];
+
+    #[test]
+    fn the_image_reaches_half_a_pixel_beyond_its_outer_centres() {
+        let pixel = |u| nearest_pixel([u, 3.2], 5, 10);
+        assert_eq!((pixel(-0.5), pixel(9.49)), (Some([0, 3]), Some([9, 3])));
+        assert_eq!([pixel(-0.51), pixel(9.5), pixel(f64::NAN)], [None; 3]);
+    }
+
+    #[test]
+    fn matrices_that_cannot_be_cameras_are_refused() {
+        let flat = [0.0; 12];
+        assert!(matches!(
+            Camera::new(&flat, &IDENTITY, 0.1),
+            Err(Error::CameraSingular { .. })
+        ));
+        let mut mirrored = IDENTITY;
+        mirrored[0] = -1.0;
+        assert!(matches!(
+            Camera::new(&PROJECTION, &mirrored, 0.1),
+            Err(Error::CameraNotRigid { .. })
+        ));
+        let mut moved = IDENTITY;
+        moved[12] = 3.0;
+        assert!(matches!(
+            Camera::new(&PROJECTION, &moved, 0.1),
+            Err(Error::CameraLastRow { .. })
+        ));
+        let mut nan = PROJECTION;
+        nan[6] = f64::NAN;
+        let error = Camera::new(&nan, &IDENTITY, 0.1).unwrap_err();
+        assert!(
+            error.to_string().contains("projection[1, 2] is NaN"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,200 @@
+//! Which instances of several images show one object: those on which the points agree that both cameras see.
+
+use super::RingView;
+use super::sightings::{Sighting, UNSEEN};
+use crate::masks::InstanceMasks;
+use crate::projection::nearest_pixel;
+use std::collections::BTreeMap;
+
+/// The instances of all views, those that show one object together.
+pub(crate) fn same_objects(
+    views: &[RingView],
+    sightings: &[Sighting],
+    slots: &[Vec<u32>],
+    same_object: f64,
+) -> Vec<Vec<(usize, u32)>> {
+    let mut groups: Vec<Vec<(usize, u32)>> = Vec::new();
+    let mut group_of: Vec<Vec<usize>> = Vec::new();
+    for (camera, view) in views.iter().enumerate() {
+        let first = groups.len();
+        groups.extend((1..=view.masks.len() as u32).map(|m| vec![(camera, m)]));
+        group_of.push((first..groups.len()).collect());
+    }
+    for [one, other] in best_first(agreements(views, sightings, slots), same_object) {
+        let [kept, joined] = {
+            let mut pair = [one, other].map(|(camera, m)| group_of[camera][m as usize - 1]);
+            pair.sort_unstable();
+            pair
+        };
+        let cameras = |group: usize| groups[group].iter().map(|&(camera, _)| camera);
+        // two instances of one image are two objects
+        if kept == joined || cameras(kept).any(|camera| cameras(joined).any(|c| c == camera)) {
+            continue;
+        }
+        let moved = std::mem::take(&mut groups[joined]);
+        for &(camera, m) in &moved {
+            group_of[camera][m as usize - 1] = kept;
+        }
+        groups[kept].extend(moved);
+        groups[kept].sort_unstable();
+    }
+    groups.retain(|group| !group.is_empty());
+    groups
+}
+
+/// How many points of two instances agree.
+#[derive(Debug, Clone, Copy)]
+struct Agreement {
+    /// Points on both masks.
+    both: usize,
+    /// Points on at least one of them.
+    either: usize,
+}
+
+type Pair = [(usize, u32); 2];
+
+/// Pairs that agree well enough, the best first.
+fn best_first(agreements: BTreeMap<Pair, Agreement>, same_object: f64) -> Vec<Pair> {
+    let mut pairs: Vec<(Pair, Agreement)> = agreements
+        .into_iter()
+        .filter(|(_, found)| found.both as f64 >= same_object * found.either as f64)
+        .collect();
+    // a / b > c / d where a d > c b; the order of the map among equals
+    pairs.sort_by(|(_, a), (_, b)| (b.both * a.either).cmp(&(a.both * b.either)));
+    pairs.into_iter().map(|(pair, _)| pair).collect()
+}
+
+/// Agreement of each two instances of one category in two images on which a point falls that both cameras see.
+fn agreements(
+    views: &[RingView],
+    sightings: &[Sighting],
+    slots: &[Vec<u32>],
+) -> BTreeMap<Pair, Agreement> {
+    let mut found = BTreeMap::new();
+    for one in 0..views.len() {
+        for other in one + 1..views.len() {
+            let shared: Vec<usize> = (0..slots[one].len())
+                .filter(|&point| slots[one][point] != UNSEEN && slots[other][point] != UNSEEN)
+                .collect();
+            let [here, there] = [one, other].map(|camera| {
+                let uv = shared
+                    .iter()
+                    .map(|&point| sightings[camera].uv[slots[camera][point] as usize]);
+                instances_at(views[camera].masks, uv)
+            });
+            let totals = [&here, &there].map(|lists| count(lists.iter().flatten().copied()));
+            let pairs = here.iter().zip(&there).flat_map(|(here, there)| {
+                here.iter()
+                    .flat_map(|&m| there.iter().map(move |&other| (m, other)))
+            });
+            for ((m, k), both) in count(pairs) {
+                let category = |camera: usize, m: u32| views[camera].categories[m as usize - 1];
+                if category(one, m) == category(other, k) {
+                    let either = totals[0][&m] + totals[1][&k] - both;
+                    found.insert([(one, m), (other, k)], Agreement { both, either });
+                }
+            }
+        }
+    }
+    found
+}
+
+fn count<T: Ord>(values: impl Iterator<Item = T>) -> BTreeMap<T, usize> {
+    let mut counts = BTreeMap::new();
+    for value in values {
+        *counts.entry(value).or_default() += 1;
+    }
+    counts
+}
+
+/// The instances on whose masks each of `uv` falls.
+fn instances_at(masks: &InstanceMasks, uv: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<u32>> {
+    let pixels: Vec<[usize; 2]> = uv
+        .filter_map(|uv| nearest_pixel(uv, masks.height(), masks.width()))
+        .collect();
+    let mut found = vec![Vec::new(); pixels.len()];
+    for (m, mask) in (1..).zip(masks.masks()) {
+        let [top, left, height, width] = mask.bounding_box();
+        let ends: Vec<usize> = mask
+            .runs()
+            .iter()
+            .scan(0, |end, &run| {
+                *end += run as usize;
+                Some(*end)
+            })
+            .collect();
+        for ([column, row], instances) in pixels.iter().zip(&mut found) {
+            let near = (left..left + width).contains(column) && (top..top + height).contains(row);
+            let at = column * masks.height() + row;
+            // runs of ones have odd numbers
+            if near && ends.partition_point(|&end| end <= at) % 2 == 1 {
+                instances.push(m);
+            }
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::RingView;
+    use crate::test_support::{camera, masks, segment};
+    use proptest::prelude::*;
+
+    #[test]
+    fn an_object_in_two_images_is_one_and_objects_of_one_image_are_not() {
+        // the second image begins 20 pixels farther to the right
+        let (left, right) = (camera(40.0), camera(20.0));
+        let first = masks(&[[5, 24, 12, 10], [5, 2, 8, 8]]);
+        let second = masks(&[[5, 4, 12, 10], [5, 5, 12, 10], [5, 30, 8, 8]]);
+        let view = |masks, camera, categories| RingView {
+            masks,
+            categories,
+            camera,
+        };
+        let ring = segment(&[
+            view(&first, &left, &[3, 3]),
+            view(&second, &right, &[3, 3, 3]),
+        ]);
+        let expected: [&[(usize, u32)]; 4] = [&[(0, 1), (1, 1)], &[(0, 2)], &[(1, 2)], &[(1, 3)]];
+        assert_eq!(ring.objects, expected);
+        let other = segment(&[
+            view(&first, &left, &[3, 3]),
+            view(&second, &right, &[1, 1, 3]),
+        ]);
+        assert_eq!(
+            other.objects.len(),
+            5,
+            "instances of two categories stay apart"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn every_instance_belongs_to_one_object(
+            rectangles in proptest::collection::vec(
+                (0_usize..20, 0_usize..30, 1_usize..10, 1_usize..10).prop_map(|(t, l, h, w)| [t, l, h, w]), 0..6),
+            split in 0_usize..6,
+        ) {
+            let split = split.min(rectangles.len());
+            let parts = [masks(&rectangles[..split]), masks(&rectangles[split..])];
+            let cameras = [camera(30.0), camera(20.0)];
+            let categories = [1; 6];
+            let views: Vec<RingView> = parts.iter().zip(&cameras).map(|(masks, camera)| RingView {
+                masks, camera, categories: &categories[..masks.len()],
+            }).collect();
+            let found = segment(&views);
+            let mut members: Vec<(usize, u32)> = found.objects.concat();
+            members.sort_unstable();
+            let all: Vec<(usize, u32)> = parts.iter().enumerate()
+                .flat_map(|(camera, part)| (1..=part.len() as u32).map(move |m| (camera, m))).collect();
+            prop_assert_eq!(members, all);
+            for group in &found.objects {
+                let cameras: std::collections::BTreeSet<usize> = group.iter().map(|&(camera, _)| camera).collect();
+                prop_assert_eq!(cameras.len(), group.len());
+            }
+            let highest = found.segmentation.labels.iter().max().copied().unwrap_or(0);
+            prop_assert!(highest <= found.objects.len() as i32);
+        }
+    }
+}
