@@ -10,8 +10,8 @@ from datasets import layouts
 
 @pytest.fixture(scope="session")
 def source(tmp_path_factory):
-    """300 frames with stored masks; nobody changes them."""
-    return layouts.many_frames(tmp_path_factory.mktemp("source"))
+    """60 frames with stored masks; nobody changes them."""
+    return layouts.many_frames(tmp_path_factory.mktemp("source"), 60)
 
 
 @pytest.fixture(scope="session")
@@ -34,7 +34,7 @@ def small_disk(tmp_path):
     """What mounts a file system of so many KiB."""
     place = tmp_path / "small"
     place.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(place)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=120k", "none", str(place)]
     if sys.platform != "linux" or os.geteuid() != 0 or subprocess.run(mount, check=False).returncode != 0:
         pytest.skip("only root may mount a small file system")
     yield place

@@ -1,10 +1,15 @@
-"""Runs `ldls` and kills it at the n-th time that it comes to a step: killed_at.py STEP N run SOURCE ..."""
+"""Runs `ldls` and kills it at the n-th time that it comes to a step: killed_at.py STEP N run SOURCE ...
+
+With `work` for a step, it is killed when its threads have computed for N seconds since it took hold of the folder.
+"""
 
 import os
 import signal
 import sys
+import time
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 
 from ldls.batch import journal
 from ldls.batch.lock import LOCK_NAME
@@ -67,7 +72,33 @@ STEPS = {
     "journal renamed, lock not let go": lambda: setattr(Path, "unlink", before(UNLINK, is_lock)),
 }  # fmt: skip
 
+WORK = "work"
+
+
+def kill_after_work(seconds):
+    """Let the run end at a moment that hangs on nothing but its own work; SIGPROF ends it as SIGKILL does."""
+    open_journal = journal.Journal.__init__
+
+    def opened(*arguments):
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+        open_journal(*arguments)
+
+    journal.Journal.__init__ = opened
+
+
+def every_sixth_frame_ends_a_group():
+    """Let lines reach the journal in groups of six, on fast machines and on slow ones."""
+    ticks = count()
+    # the function of that name hides the module
+    run = sys.modules["ldls.batch.run"]
+    run.time = SimpleNamespace(monotonic=lambda: next(ticks) * run.GROUP_S / 5.5, perf_counter=time.perf_counter)
+
+
 if __name__ == "__main__":
-    COUNT, N = count(1), int(sys.argv[2])
-    STEPS[sys.argv[1]]()
+    every_sixth_frame_ends_a_group()
+    if sys.argv[1] == WORK:
+        kill_after_work(float(sys.argv[2]))
+    else:
+        COUNT, N = count(1), int(sys.argv[2])
+        STEPS[sys.argv[1]]()
     app(sys.argv[3:])

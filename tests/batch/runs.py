@@ -7,7 +7,10 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from typer.testing import CliRunner
+
 from ldls.batch.lock import LOCK_NAME
+from ldls.cli import app
 
 KILLED_AT = Path(__file__).with_name("killed_at.py")
 PATIENCE_S = 60
@@ -17,10 +20,10 @@ from ldls.batch.frame_work import FrameWork
 from ldls.cli import app
 
 read = FrameWork.read
-FrameWork.read = lambda work, frame: (time.sleep(0.02), read(work, frame))
+FrameWork.read = lambda work, frame: (time.sleep(0.1), read(work, frame))
 app()
 """
-"""A program that does what `ldls` does, at most 50 frames a second a reader."""
+"""A program that does what `ldls` does, at most ten frames a second a reader."""
 
 
 def arguments(source, out, *more):
@@ -47,6 +50,11 @@ def hears_ctrl_c():
 def finished(arguments, program=("-m", "ldls")):
     """A run's process after its end."""
     return subprocess.run([sys.executable, *program, *arguments], capture_output=True, text=True, check=False)
+
+
+def resumed(arguments):
+    """The outcome of a run in this process."""
+    return CliRunner().invoke(app, arguments)
 
 
 def has_begun(running, out):

@@ -51,7 +51,7 @@ def test_a_worker_killed_on_the_way_costs_nothing(ray, source, undisturbed, tmp_
     killed = []
 
     def kill_one(finished, _failed, _total):
-        if finished in (60, 150):
+        if finished in (15, 35):
             pids = [pid for pid in worker_pids(os.getpid()) if pid not in killed]
             assert len(pids) == 2 - len(killed) or killed
             os.kill(pids[0], signal.SIGKILL)
@@ -59,17 +59,17 @@ def test_a_worker_killed_on_the_way_costs_nothing(ray, source, undisturbed, tmp_
 
     summary = batch.run(source, tmp_path, stored(source), engine="ray", workers=2, on_progress=kill_one)
     assert len(killed) == 2
-    assert (summary.n_done, summary.failures) == (300, ())
+    assert (summary.n_done, summary.failures) == (60, ())
     assert runs.contents(tmp_path) == undisturbed
     assert not ray.is_initialized()
 
 
 def test_a_killed_run_goes_on_on_either_engine(ray, source, undisturbed, tmp_path):
     words = runs.arguments(source, tmp_path)
-    assert runs.killed_after(words, tmp_path, 0.2)
+    killed = runs.finished(["file renamed", "10", *words], [str(runs.KILLED_AT)])
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
     with runs.process([*words, *map(str, WORKERS)]) as running:
-        n_local = len(list(tmp_path.glob("*.label")))
-        while len(list(tmp_path.glob("*.label"))) < min(n_local + 20, 290):
+        while len(list(tmp_path.glob("*.label"))) < 20:
             assert running.poll() is None
         running.kill()
     outcome = runs.finished([*words, *map(str, WORKERS)])

@@ -43,13 +43,13 @@ def test_outputs_are_those_of_segment_frame_by_frame(source, undisturbed, tmp_pa
     masks = ldls.read_masks(source / "masks/000007.json")
     ldls.save(ldls.segment(frame.points, masks, frame.images[0].camera), tmp_path / "one.label")
     assert undisturbed["000007.label"] == (tmp_path / "one.label").read_bytes()
-    assert len({undisturbed[f"{number:06d}.label"] for number in range(300)}) > 250
-    assert set(undisturbed) == {"journal.jsonl", *(f"{number:06d}.label" for number in range(300))}
+    assert len({undisturbed[f"{number:06d}.label"] for number in range(60)}) > 50
+    assert set(undisturbed) == {"journal.jsonl", *(f"{number:06d}.label" for number in range(60))}
 
 
 @pytest.mark.parametrize("workers", [1, 2, 7])
 def test_any_number_of_workers_yields_the_same_bytes(source, undisturbed, tmp_path, workers):
-    assert run(source, tmp_path, workers=workers).n_done == 300
+    assert run(source, tmp_path, workers=workers).n_done == 60
     assert runs.contents(tmp_path) == undisturbed
 
 
@@ -230,7 +230,7 @@ def test_files_that_went_missing_or_shrank_are_made_again(source, undisturbed, t
     run(source, tmp_path)
     (tmp_path / "000003.label").unlink()
     (tmp_path / "000004.label").write_bytes(b"")
-    assert run(source, tmp_path).n_earlier == 298
+    assert run(source, tmp_path).n_earlier == 58
     assert runs.contents(tmp_path) == undisturbed
 
 
@@ -317,7 +317,7 @@ def test_full_disk(source, undisturbed, small_disk):
         assert "No space left on device while" in outcome.output
         assert "ing frame 000" in outcome.output
         left = runs.contents(small_disk)
-        assert 10 < len(left) < 150
+        assert 10 < len(left) < 45
         assert {name for name in left if name.startswith(".")} == set()
         assert all(content == undisturbed[name] for name, content in left.items() if name != "journal.jsonl")
         assert left["journal.jsonl"].endswith(b"\n")
@@ -327,7 +327,7 @@ def test_full_disk(source, undisturbed, small_disk):
     assert runs.contents(small_disk) == undisturbed
 
 
-@pytest.mark.parametrize("n", [1, 2, 40, 301], ids=lambda n: f"sync {n}")
+@pytest.mark.parametrize("n", [1, 2, 20, 61], ids=lambda n: f"sync {n}")
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EROFS], ids=errno.errorcode.get)
 def test_disk_trouble_of_every_kind(source, undisturbed, tmp_path, monkeypatch, n, code):
     calls = iter(range(1, 10_000))
