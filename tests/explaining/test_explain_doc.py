@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from ldls.cli import app
 
-DOC = (Path(__file__).parents[1] / "docs/explain.md").read_text()
+DOC = (Path(__file__).parents[2] / "docs/explain.md").read_text()
 
 
 @pytest.fixture(scope="module")
