@@ -38,10 +38,10 @@ class View:
                 "make them with InstanceMasks.from_array, or ldls.read_masks of a file"
             )
         check_camera(self.camera)
-        expected, found = self.camera.image_size, self.masks.image_size
-        if expected is not None and found != tuple(expected):
-            hint = "; swapped?" if found == tuple(expected)[::-1] else ""
-            raise MaskError(f"masks: {found}, the camera's image is {expected}{hint}")
+        expected, size = self.camera.image_size, self.masks.image_size
+        if expected is not None and size != tuple(expected):
+            hint = "; swapped?" if size == tuple(expected)[::-1] else ""
+            raise MaskError(f"masks: {size}, the camera's image is {expected}{hint}")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -26,8 +26,8 @@ class Fields:
 
     def find(self, *spellings: str) -> object | None:
         """The first entry under one of `spellings`; None where there is none."""
-        found = {str(name).lower(): value for name, value in self.entries.items()}
-        return next((found[name.lower()] for name in spellings if name.lower() in found), None)
+        by_name = {str(name).lower(): value for name, value in self.entries.items()}
+        return next((by_name[name.lower()] for name in spellings if name.lower() in by_name), None)
 
     def get(self, *spellings: str, mend: str = "") -> object:
         """The first entry under one of `spellings`.
@@ -37,10 +37,10 @@ class Fields:
         """
         value = self.find(*spellings)
         if value is None:
-            found = " ".join(map(str, self.entries)) or "none"
+            keys = " ".join(map(str, self.entries)) or "none"
             others = f", expected that or {', '.join(spellings[1:])}" if len(spellings) > 1 else ""
             hint = f"; {mend}" if mend else ""
-            raise CalibrationError(f"{self.place}: key '{spellings[0]}' missing; found {found}{others}{hint}")
+            raise CalibrationError(f"{self.place}: key '{spellings[0]}' missing; found {keys}{others}{hint}")
         return value
 
     def section(self, name: str) -> Fields:
@@ -77,8 +77,8 @@ class Fields:
         expected = int(np.prod(shape))
         if values.size != expected or (values.ndim == 2 and values.shape != shape and 1 not in values.shape):
             size = " x ".join(map(str, shape))
-            found = f"{values.size} as {' x '.join(map(str, values.shape))}" if values.ndim > 1 else str(values.size)
-            raise CalibrationError(f"{self.place}: {spellings[0]}: expected {expected} numbers ({size}), got {found}")
+            amount = f"{values.size} as {' x '.join(map(str, values.shape))}" if values.ndim > 1 else str(values.size)
+            raise CalibrationError(f"{self.place}: {spellings[0]}: expected {expected} numbers ({size}), got {amount}")
         return values.reshape(shape)
 
     def whole_number(self, *spellings: str) -> int | None:

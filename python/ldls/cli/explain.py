@@ -76,11 +76,11 @@ def explain(
 
     if result is not None:
         _refuse_files(points, calib, masks, image_id)
-        found, view = read_result(result), camera
+        segmentation, view = read_result(result), camera
     else:
-        found, view = _segmented(points, calib, masks, camera, image_id), None
-    chosen = chosen_point(point, found, view)
-    explanation = explain_point(found, chosen.row)
+        segmentation, view = _segmented(points, calib, masks, camera, image_id), None
+    chosen = chosen_point(point, segmentation, view)
+    explanation = explain_point(segmentation, chosen.row)
     if as_json:
         typer.echo(json.dumps(explanation.to_dict(), allow_nan=False, indent=2, ensure_ascii=False))
         return
@@ -112,5 +112,5 @@ def _segmented(
     number = str(COLOUR_CAMERA) if camera is None else camera
     if number not in ("0", "1", "2", "3"):
         raise ParameterError(f"--camera: got {camera!r}, expected 0 to 3, a camera of the calibration")
-    found = masks_of(None, masks=masks, segmenter=None, image_id=image_id)
-    return segment_files(points, found, calib, camera=int(number), params=Params())
+    instance_masks = masks_of(None, masks=masks, segmenter=None, image_id=image_id)
+    return segment_files(points, instance_masks, calib, camera=int(number), params=Params())

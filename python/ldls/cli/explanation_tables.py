@@ -95,17 +95,17 @@ def edge_table(explanation: Explanation) -> Table:
     return table
 
 
-def component_table(explanation: Explanation, found: Components) -> Table:
+def component_table(explanation: Explanation, components: Components) -> Table:
     """The components of the points that diffusion gave one label, the largest and that of the point."""
-    table = Table(title=escape(f"components of {named(explanation, found.label)}"))
+    table = Table(title=escape(f"components of {named(explanation, components.label)}"))
     table.add_column("points", justify="right")
     table.add_column("")
-    listed = sorted({*range(min(SHOWN_COMPONENTS, len(found.sizes))), found.own})
+    listed = sorted({*range(min(SHOWN_COMPONENTS, len(components.sizes))), components.own})
     for number in listed:
-        table.add_row(f"{found.sizes[number]:,}", _component(found, number))
-    rest = sum(found.sizes) - sum(found.sizes[number] for number in listed)
+        table.add_row(f"{components.sizes[number]:,}", _component(components, number))
+    rest = sum(components.sizes) - sum(components.sizes[number] for number in listed)
     if rest:
-        table.add_row(f"{rest:,}", f"in {len(found.sizes) - len(listed)} more")
+        table.add_row(f"{rest:,}", f"in {len(components.sizes) - len(listed)} more")
     return table
 
 
@@ -117,11 +117,11 @@ def _place(explanation: Explanation) -> str:
 
 
 def _course(explanation: Explanation) -> str:
-    found = {sight.camera: sight.direct_label for sight in explanation.sights if sight.direct_label is not None}
-    if not found:
+    labels = {sight.camera: sight.direct_label for sight in explanation.sights if sight.direct_label is not None}
+    if not labels:
         return ""
     direct = (
-        named(explanation, label) + (f" by {camera}" if len(found) > 1 else "") for camera, label in found.items()
+        named(explanation, label) + (f" by {camera}" if len(labels) > 1 else "") for camera, label in labels.items()
     )
     diffused, final = (named(explanation, label) for label in (explanation.diffused_label, explanation.label))
     course = f"Direct projection: {', '.join(direct)}. After diffusion: {diffused}."
@@ -154,12 +154,12 @@ def _standing(explanation: Explanation, each: Likelihood) -> str:
 
 
 def _provenance(explanation: Explanation) -> str:
-    found = explanation.provenance
-    if found is None:
+    origin = explanation.provenance
+    if origin is None:
         return ""
     return (
-        f"Of the likelihood of {named(explanation, explanation.diffused_label)}, {percent(found.own_share)} comes from "
-        f"the point's own pixels, and half from pixels of points within {found.half_within_m:.2f} m."
+        f"Of the likelihood of {named(explanation, explanation.diffused_label)}, {percent(origin.own_share)} comes from "
+        f"the point's own pixels, and half from pixels of points within {origin.half_within_m:.2f} m."
     )
 
 
@@ -169,18 +169,18 @@ def _object(explanation: Explanation, each: Neighbor) -> str:
 
 
 def _island(explanation: Explanation) -> str:
-    found = explanation.island
-    if found is None or found.islands == 1:
+    island = explanation.island
+    if island is None or island.islands == 1:
         return ""
     return (
-        f"It lies in a part of the graph of {count_points(found.points)}; no label crosses to the "
-        f"{found.islands - 1} others."
+        f"It lies in a part of the graph of {count_points(island.points)}; no label crosses to the "
+        f"{island.islands - 1} others."
     )
 
 
-def _component(found: Components, number: int) -> str:
-    own = "this point's" if number == found.own else ""
-    if not found.removal:
+def _component(components: Components, number: int) -> str:
+    own = "this point's" if number == components.own else ""
+    if not components.removal:
         return own
     fate = "kept" if number == 0 else "removed"
     return f"{own}, {fate}" if own else fate

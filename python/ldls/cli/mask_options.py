@@ -48,8 +48,8 @@ def masks_of(
         raise InputError(f"give --masks FILE or --segmenter NAME, got {given}; see --help for the segmenters")
     if masks is not None:
         size = None if image is None else (image.shape[0], image.shape[1])
-        found = read_masks(masks, image_id=image_id, image_size=size)
-        return wanted(found, min_score=min_score, categories=categories)
+        stored = read_masks(masks, image_id=image_id, image_size=size)
+        return wanted(stored, min_score=min_score, categories=categories)
     from ldls.segmenters import open_segmenter
 
     assert segmenter is not None

@@ -106,14 +106,14 @@ def convert(
 
     Example: ldls masks convert masks/000571.json masks/000571.png --resolve score --min-score 0.7
     """
-    found = read_masks(
+    read = read_masks(
         masks,
         image_id=image_id,
         image_size=parsed_size(image_size),
         instance_axis=AXES[instance_axis],
         class_divisor=class_divisor,
     )
-    kept = wanted(found, min_score=min_score, categories=categories).filter(min_area=min_area)
+    kept = wanted(read, min_score=min_score, categories=categories).filter(min_area=min_area)
     if shrink:
         kept = kept.shrink(shrink)
     if grow:
@@ -121,7 +121,7 @@ def convert(
     if resolve is not None:
         kept = kept.resolve_overlaps(resolve.value)
     save(kept, out, **(VARIANTS[variant] if variant else {}))
-    console().print(f"wrote {len(kept)} of {len(found)} masks to {out}", highlight=False, soft_wrap=True)
+    console().print(f"wrote {len(kept)} of {len(read)} masks to {out}", highlight=False, soft_wrap=True)
 
 
 @app.command()
@@ -167,8 +167,8 @@ def show(
     Example: ldls masks show masks/000571.json --image image_2/000571.png --picture masks.png
     """
     pixels = None if image is None else read_image(image)
-    found = masks_of(pixels, masks=masks, segmenter=None, image_id=image_id, min_score=min_score, categories=categories)
-    _show(found, pixels, picture)
+    shown = masks_of(pixels, masks=masks, segmenter=None, image_id=image_id, min_score=min_score, categories=categories)
+    _show(shown, pixels, picture)
 
 
 def _show(masks: InstanceMasks, pixels: np.ndarray | None, picture: Path | None) -> None:

@@ -81,5 +81,5 @@ def timing_table(timings: Mapping[str, float]) -> Table:
 
 def console() -> Console:
     """Return the console for tables: as wide as the terminal, and wide enough where there is none."""
-    found = Console()
-    return found if found.is_terminal else Console(width=100)
+    terminal = Console()
+    return terminal if terminal.is_terminal else Console(width=100)

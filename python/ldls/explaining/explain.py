@@ -160,8 +160,8 @@ def _structure(graph: csr_array) -> csr_array:
 
 def _connected(graph: csr_array) -> NDArray[np.int32]:
     _, component = require("scipy.sparse.csgraph", "eval").connected_components(graph, directed=False)
-    found: NDArray[np.int32] = component
-    return found
+    numbers: NDArray[np.int32] = component
+    return numbers
 
 
 def influences(A: csr_array, row: int, iterations: int | None) -> NDArray[np.float64]:

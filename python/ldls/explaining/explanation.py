@@ -169,10 +169,10 @@ def verdict_of(explanation: Explanation) -> str:
     point = f"Point {explanation.point}"
     if explanation.label < 0:
         return f"{point} is out of view: {_why_unseen(explanation.sights)}."
-    found = explanation.components
-    if found is not None and found.removed:
-        given = named(explanation, found.label)
-        return f"{point} is background: diffusion gave it to {given}, but it lies in a {_where(found)}."
+    components = explanation.components
+    if components is not None and components.removed:
+        given = named(explanation, components.label)
+        return f"{point} is background: diffusion gave it to {given}, but it lies in a {_where(components)}."
     return f"{point} is {named(explanation, explanation.label)}: {_lead(explanation)}."
 
 
@@ -192,8 +192,8 @@ def count_points(count: int) -> str:
     return f"{count:,} point{'' if count == 1 else 's'}"
 
 
-def _where(found: Components) -> str:
-    own, largest = found.sizes[found.own], found.sizes[0]
+def _where(components: Components) -> str:
+    own, largest = components.sizes[components.own], components.sizes[0]
     if own == largest:
         return f"component of {count_points(own)}, as large as the one kept, which has the lowest row: removed"
     return f"component of {count_points(own)}, the largest has {largest:,}: removed"

@@ -46,7 +46,7 @@ def read_array(file: IO[bytes], n_bytes: int) -> NDArray[Any]:
         CorruptFileError: It is no `.npy` file.
     """
     if n_bytes == 0:
-        raise CorruptFileError("expected a .npy file, got an empty one")
+        raise CorruptFileError("not a whole .npy file: got an empty one")
     try:
         version = npy.read_magic(file)
         read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0

@@ -34,8 +34,8 @@ def regular_file(path: str | PathLike[str]) -> Path:
     path = Path(path)
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode):
-        found = next((name for is_kind, name in KINDS if is_kind(mode)), "something else")
-        raise FileFormatError(f"{path}: expected a regular file, got {found}")
+        kind = next((name for is_kind, name in KINDS if is_kind(mode)), "something else")
+        raise FileFormatError(f"{path}: expected a regular file, got {kind}")
     return path
 
 

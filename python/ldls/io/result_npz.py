@@ -192,11 +192,11 @@ def _json(parts: Mapping[str, Any]) -> NDArray[np.str_]:
     return np.array(json.dumps(parts))
 
 
-def _centroid(found: SegmentedObject) -> NDArray[np.float64]:
-    return np.full(3, np.nan) if found.centroid is None else found.centroid
+def _centroid(segmented: SegmentedObject) -> NDArray[np.float64]:
+    return np.full(3, np.nan) if segmented.centroid is None else segmented.centroid
 
 
-def _box(found: SegmentedObject) -> NDArray[np.float64]:
-    if found.box is None:
+def _box(segmented: SegmentedObject) -> NDArray[np.float64]:
+    if segmented.box is None:
         return np.full(7, np.nan)
-    return np.concatenate([found.box.center, found.box.size, [found.box.yaw]])
+    return np.concatenate([segmented.box.center, segmented.box.size, [segmented.box.yaw]])

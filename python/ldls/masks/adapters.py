@@ -88,12 +88,12 @@ def _classes(detections: Any, count: int, names: Mapping[int, str] | None) -> di
         return {}
     indices = whole_numbers("class_id", detections.class_id)
     own = dict(names or {})
-    found = [own.get(index, f"class {index}") for index in indices]
-    found = [str(name) for name in detections.data.get("class_name", found)]
-    if not len(indices) == len(found) == count:
-        raise MaskError(f"detections: {count} masks, {len(indices)} class ids, {len(found)} class names")
-    by_index = dict(zip(indices, found, strict=True))
-    for i, (index, name) in enumerate(zip(indices, found, strict=True)):
+    class_names = [own.get(index, f"class {index}") for index in indices]
+    class_names = [str(name) for name in detections.data.get("class_name", class_names)]
+    if not len(indices) == len(class_names) == count:
+        raise MaskError(f"detections: {count} masks, {len(indices)} class ids, {len(class_names)} class names")
+    by_index = dict(zip(indices, class_names, strict=True))
+    for i, (index, name) in enumerate(zip(indices, class_names, strict=True)):
         if index < 0:
             raise MaskError(f"mask {i}: class {index}, expected 0 or more")
         if by_index[index] != name:

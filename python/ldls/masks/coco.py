@@ -82,15 +82,15 @@ def _parts(content: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, A
 
 def _by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[str, Any]]:
     records = _records(name, values)
-    found: dict[Any, dict[str, Any]] = {}
+    by_id: dict[Any, dict[str, Any]] = {}
     for i, record in enumerate(records):
         key = record.get("id")
         if type(key) not in types:
             expected = " or ".join(t.__name__ for t in types)
             raise CorruptFileError(f"{name}[{i}] has id {key!r}, expected {expected}")
-        if found.setdefault(key, record) != record:
+        if by_id.setdefault(key, record) != record:
             raise CorruptFileError(f"{name}[{i}] has id {key!r}, which another of {name} has already")
-    return found
+    return by_id
 
 
 def _records(name: str, values: object) -> list[dict[str, Any]]:
@@ -125,11 +125,11 @@ def _size_of(
     given = None if image_size is None else checked_size(image_size)
     image = images.get(image_id, {})
     if image.get("height") is not None and image.get("width") is not None:
-        found = checked_size((image["height"], image["width"]))
-        if given not in (None, found):
-            hint = "; swapped?" if given == found[::-1] else ""
-            raise MaskError(f"masks of {found} (height, width), the image is {given}{hint}")
-        return found
+        own = checked_size((image["height"], image["width"]))
+        if given not in (None, own):
+            hint = "; swapped?" if given == own[::-1] else ""
+            raise MaskError(f"masks of {own} (height, width), the image is {given}{hint}")
+        return own
     if given is not None:
         return given
     segmentations = (a.get("segmentation") for a in annotations)

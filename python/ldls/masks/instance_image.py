@@ -72,10 +72,10 @@ def split(image: ArrayLike) -> tuple[NDArray[Any], list[_ldls.Rle]]:
     starts = np.concatenate([[0], np.flatnonzero(columns[1:] != columns[:-1]) + 1])
     ends = np.append(starts[1:], columns.size)
     order = np.argsort(columns[starts], kind="stable")
-    found, first = np.unique(columns[starts][order], return_index=True)
+    values_in_image, first = np.unique(columns[starts][order], return_index=True)
     spans = np.split(np.column_stack([starts, ends])[order], first[1:])
-    rles = [_from_spans(s, height, width) for value, s in zip(found, spans, strict=True) if value]
-    return found[found != 0], rles
+    rles = [_from_spans(s, height, width) for value, s in zip(values_in_image, spans, strict=True) if value]
+    return values_in_image[values_in_image != 0], rles
 
 
 def join(rles: Sequence[_ldls.Rle], image_size: tuple[int, int]) -> NDArray[np.uint8] | NDArray[np.uint16]:

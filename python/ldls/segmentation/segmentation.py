@@ -128,9 +128,9 @@ class Segmentation:
         for seen in reversed(self.views):
             # label 0, the background, stays
             names = np.concatenate([np.zeros(1, np.int32), seen.labels])
-            found = names[_ldls.direct_labels(seen.pixels, seen.view.masks.core)]
+            of_masks = names[_ldls.direct_labels(seen.pixels, seen.view.masks.core)]
             kept = np.maximum(labels[seen.in_view], 0)
-            labels[seen.in_view] = np.where(found > 0, found, kept)
+            labels[seen.in_view] = np.where(of_masks > 0, of_masks, kept)
         return labels
 
     @cached_property
@@ -141,7 +141,7 @@ class Segmentation:
         starts = np.searchsorted(self.labels[inside], labels, side="left")
         ends = np.searchsorted(self.labels[inside], labels, side="right")
         rows = (inside[start:end] for start, end in zip(starts, ends, strict=True))
-        return tuple(self._object(*found) for found in zip(self.instances, rows, strict=True))
+        return tuple(self._object(*parts) for parts in zip(self.instances, rows, strict=True))
 
     def _object(self, instance: Instance, rows: NDArray[np.int64]) -> SegmentedObject:
         xyz = self.points[rows, :3].astype(np.float64)
@@ -156,8 +156,8 @@ class Segmentation:
         )
 
     def __repr__(self) -> str:
-        found = sum(o.n_points > 0 for o in self.objects)
+        n_found = sum(o.n_points > 0 for o in self.objects)
         return (
             f"Segmentation({len(self.labels)} points, {len(self.in_view)} in view, "
-            f"{found} of {len(self.instances)} objects found)"
+            f"{n_found} of {len(self.instances)} objects found)"
         )

@@ -84,12 +84,12 @@ class BoxSegmenter:
             FileNotFoundError: There is no such file.
         """
         try:
-            found = kitti_boxes.read_boxes(path, names=names)
+            objects = kitti_boxes.read_boxes(path, names=names)
             return cls(
-                found.boxes,
-                categories=found.categories,
-                scores=found.scores,
-                names=found.names,
+                objects.boxes,
+                categories=objects.categories,
+                scores=objects.scores,
+                names=objects.names,
                 grabcut=grabcut,
                 min_score=min_score,
             )

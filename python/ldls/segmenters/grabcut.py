@@ -33,10 +33,10 @@ def cut(image: NDArray[np.uint8], top: int, left: int, height: int, width: int) 
     rows = _widened(top, height, image.shape[0])
     columns = _widened(left, width, image.shape[1])
     surroundings = image[rows, columns]
-    found = _foreground(surroundings, (top - rows.start, left - columns.start, height, width))
-    if np.count_nonzero(found) < MIN_SHARE * height * width:
+    foreground = _foreground(surroundings, (top - rows.start, left - columns.start, height, width))
+    if np.count_nonzero(foreground) < MIN_SHARE * height * width:
         return ellipse(height, width)
-    return found
+    return foreground
 
 
 def ellipse(height: int, width: int) -> Bool:
@@ -69,7 +69,7 @@ def _foreground(surroundings: NDArray[np.uint8], box: tuple[int, int, int, int])
     cv2.setRNGSeed(SEED)
     models = np.zeros((2, 1, 65))
     cv2.grabCut(np.ascontiguousarray(small), marks, None, models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
-    found = np.isin(marks, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.uint8)
-    whole = cv2.resize(found, surroundings.shape[1::-1], interpolation=cv2.INTER_NEAREST)
+    foreground = np.isin(marks, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.uint8)
+    whole = cv2.resize(foreground, surroundings.shape[1::-1], interpolation=cv2.INTER_NEAREST)
     inside: Bool = whole[top : top + height, left : left + width].astype(np.bool_)
     return inside

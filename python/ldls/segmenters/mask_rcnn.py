@@ -56,12 +56,13 @@ class MaskRcnn:
 
     def masks(self, outputs: list[NDArray[Any]], image_size: tuple[int, int], min_score: float) -> InstanceMasks:
         """Instances of at least `min_score`; a pixel counts from probability 0.5."""
-        found = _detections(outputs, self.classes, min_score)
+        detections = _detections(outputs, self.classes, min_score)
         crops: Iterable[Crop]
         if outputs[3].shape[2:] == image_size:
-            crops = _whole(outputs[3], found)
+            crops = _whole(outputs[3], detections)
         else:
-            crops = _pasted(padded_paste, found, _small_grids(outputs[3], found, image_size), image_size, HALF)
+            grids = _small_grids(outputs[3], detections, image_size)
+            crops = _pasted(padded_paste, detections, grids, image_size, HALF)
         return assemble(crops, image_size, self.classes)
 
 
@@ -94,9 +95,9 @@ class ZooMaskRcnn:
     def masks(self, outputs: list[NDArray[Any]], image_size: tuple[int, int], min_score: float) -> InstanceMasks:
         """Instances of at least `min_score`; a pixel counts above probability 0.5."""
         ratio = np.float32(_zoo_ratio(image_size))
-        found = [replace(one, box=one.box / ratio) for one in _detections(outputs, self.classes, min_score)]
-        grids = _small_grids(outputs[3], found, image_size)
-        crops = _pasted(plain_paste, found, grids, image_size, np.nextafter(HALF, np.float32(1)))
+        detections = [replace(one, box=one.box / ratio) for one in _detections(outputs, self.classes, min_score)]
+        grids = _small_grids(outputs[3], detections, image_size)
+        crops = _pasted(plain_paste, detections, grids, image_size, np.nextafter(HALF, np.float32(1)))
         return assemble(crops, image_size, self.classes)
 
 
@@ -153,31 +154,31 @@ def _detections(outputs: list[NDArray[Any]], classes: Classes, min_score: float)
     ]
 
 
-def _whole(masks: NDArray[Any], found: list[_Detection]) -> Iterator[Crop]:
-    for one in found:
+def _whole(masks: NDArray[Any], detections: list[_Detection]) -> Iterator[Crop]:
+    for one in detections:
         probabilities = masks[one.index]
         check_finite("mask", probabilities, np.array([one.index]))
         yield Crop(probabilities[0] >= HALF, 0, 0, one.category, one.score)
 
 
-def _small_grids(masks: NDArray[Any], found: list[_Detection], image_size: tuple[int, int]) -> F32:
+def _small_grids(masks: NDArray[Any], detections: list[_Detection], image_size: tuple[int, int]) -> F32:
     """(n, S, S) probabilities of what was found."""
     height, width = masks.shape[2:]
-    if found and (height != width or not 0 < height <= MAX_CELLS):
+    if detections and (height != width or not 0 < height <= MAX_CELLS):
         raise FileFormatError(
             f"output masks: {height} x {width} cells, expected those of the image, {image_size[0]} x {image_size[1]}, "
             f"or squares of at most {MAX_CELLS}"
         )
-    kept = np.array([one.index for one in found], np.int64)
+    kept = np.array([one.index for one in detections], np.int64)
     grids: F32 = masks[kept, 0].astype(np.float32)
     check_finite("mask", grids, kept)
     return grids
 
 
 def _pasted(
-    paste: Paste, found: list[_Detection], grids: F32, image_size: tuple[int, int], lowest: np.float32
+    paste: Paste, detections: list[_Detection], grids: F32, image_size: tuple[int, int], lowest: np.float32
 ) -> Iterator[Crop]:
-    for one, grid in zip(found, grids, strict=True):
+    for one, grid in zip(detections, grids, strict=True):
         left, top, right, bottom = one.box
         if left < right and top < bottom:
             probabilities, row, column = paste(grid, one.box, image_size)

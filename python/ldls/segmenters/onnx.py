@@ -147,13 +147,13 @@ KINDS: dict[str, Kind] = {
 
 def _kind(signature: Signature) -> str:
     fitting = (name for name, kind in KINDS.items() if kind.fits(signature))
-    found = next(fitting, None)
-    if found is None:
+    family = next(fitting, None)
+    if family is None:
         raise UnsupportedFormatError(
             f"{signature.source}: no known kind of model ({', '.join(KINDS)}) has {signature}; "
             "docs/segmenters.md says how to export one"
         )
-    return found
+    return family
 
 
 def _named_kind(kind: str) -> str:

@@ -70,15 +70,15 @@ class TorchvisionSegmenter:
             MaskError: A score is NaN; the message names the instance.
         """
         pixels = check_image(image)
-        found = self._found(pixels)
-        scores = check_scores(found["scores"].cpu().numpy())
+        output = self._output(pixels)
+        scores = check_scores(output["scores"].cpu().numpy())
         classes = coco_classes()
         crops = (
             Crop(
-                found["masks"][i, 0].ge(0.5).cpu().numpy(),
+                output["masks"][i, 0].ge(0.5).cpu().numpy(),
                 0,
                 0,
-                classes.id(i, int(found["labels"][i])),
+                classes.id(i, int(output["labels"][i])),
                 float(scores[i]),
             )
             for i in np.flatnonzero(scores >= np.float32(self.min_score)).tolist()
@@ -88,12 +88,12 @@ class TorchvisionSegmenter:
     def __repr__(self) -> str:
         return f"TorchvisionSegmenter({self.name!r}, device={self.device!r}, min_score={self.min_score})"
 
-    def _found(self, pixels: NDArray[np.uint8]) -> dict[str, Any]:
+    def _output(self, pixels: NDArray[np.uint8]) -> dict[str, Any]:
         # a copy, as PyTorch warns of arrays that it may not write to
         tensor = self._torch.from_numpy(pixels.transpose(2, 0, 1).copy()).to(self.device)
         with self._torch.inference_mode():
-            found: dict[str, Any] = self.model([tensor.float() / 255])[0]
-        return found
+            output: dict[str, Any] = self.model([tensor.float() / 255])[0]
+        return output
 
 
 def mask_models() -> list[str]:

@@ -128,13 +128,13 @@ class YoloSeg:
         expect_shape(self.outputs[1], outputs[1], (1, None, None, None))
         rows, prototypes = (output[0].astype(np.float32) for output in outputs)
         layout, classes = self._layout(rows.shape, prototypes.shape[0])
-        found = layout.candidates(rows)
-        kept = _best(found, layout.max_iou, min_score)
-        check_finite("mask coefficients", found.coefficients[kept], kept)
+        candidates = layout.candidates(rows)
+        kept = _best(candidates, layout.max_iou, min_score)
+        check_finite("mask coefficients", candidates.coefficients[kept], kept)
         _check_prototypes(self.outputs[1], prototypes)
         letterbox = self._letterbox(image_size)
-        boxes = letterbox.boxes_in_image(found.boxes[kept])
-        crops = _drawn(found, kept, boxes, prototypes, letterbox, classes)
+        boxes = letterbox.boxes_in_image(candidates.boxes[kept])
+        crops = _drawn(candidates, kept, boxes, prototypes, letterbox, classes)
         return assemble(crops, image_size, classes)
 
     def _letterbox(self, image_size: tuple[int, int]) -> Letterbox:
@@ -177,13 +177,13 @@ def layout_of(sides: tuple[int, int], n_coefficients: int, n_classes: int | None
     return next(fits, None)
 
 
-def _best(found: Candidates, max_iou: float, min_score: float) -> I64:
-    sure = np.flatnonzero(found.scores >= np.float32(min_score))
-    check_finite("box", found.boxes[sure], sure)
+def _best(candidates: Candidates, max_iou: float, min_score: float) -> I64:
+    sure = np.flatnonzero(candidates.scores >= np.float32(min_score))
+    boxes, scores, classes = candidates.boxes[sure], candidates.scores[sure], candidates.classes[sure]
+    check_finite("box", boxes, sure)
     if max_iou >= 1:
         return sure[:MAX_INSTANCES]
-    kept = suppress(found.boxes[sure], found.scores[sure], found.classes[sure], max_iou=max_iou, max_kept=MAX_INSTANCES)
-    return sure[kept]
+    return sure[suppress(boxes, scores, classes, max_iou=max_iou, max_kept=MAX_INSTANCES)]
 
 
 def _check_prototypes(name: str, prototypes: F32) -> None:
@@ -194,19 +194,19 @@ def _check_prototypes(name: str, prototypes: F32) -> None:
 
 
 def _drawn(
-    found: Candidates, kept: I64, boxes: F32, prototypes: F32, letterbox: Letterbox, classes: Classes
+    candidates: Candidates, kept: I64, boxes: F32, prototypes: F32, letterbox: Letterbox, classes: Classes
 ) -> Iterator[Crop]:
     """Masks within their boxes: a pixel belongs to a box from its first edge on and before its last."""
     if not len(kept):
         return
-    grids = np.tensordot(found.coefficients[kept], prototypes, axes=1)
+    grids = np.tensordot(candidates.coefficients[kept], prototypes, axes=1)
     rows, columns = letterbox.upsampling((prototypes.shape[1], prototypes.shape[2]))
     for i, box, grid in zip(kept.tolist(), np.ceil(boxes).astype(np.int64).tolist(), grids, strict=True):
         left, top, right, bottom = box
         with np.errstate(over="ignore", invalid="ignore"):  # finite, but too large to add: such pixels are left out
             logits = rows[top : max(top, bottom)] @ grid @ columns[left : max(left, right)].T
-        category = classes.id(i, int(found.classes[i]))
-        yield Crop(logits > 0, top, left, category, float(found.scores[i]))
+        category = classes.id(i, int(candidates.classes[i]))
+        yield Crop(logits > 0, top, left, category, float(candidates.scores[i]))
 
 
 def _corners(centred: F32) -> F32:

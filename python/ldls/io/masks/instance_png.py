@@ -132,12 +132,12 @@ def _from_chunk(values: NDArray[Any], content: dict[str, Any]) -> InstanceMasks:
     if content["version"] != VERSION:
         raise UnsupportedFormatError(f"version {content['version']}, this ldls reads {VERSION}; update ldls")
     height, width = values.shape
-    numbers, found = instance_image.split(values)
+    numbers, own_rles = instance_image.split(values)
     count = len(content["categories"])
     if numbers.size and numbers[-1] > count:
         raise CorruptFileError(f"value {numbers[-1]}, but text chunk {CHUNK} describes {count} instances")
     empty = _ldls.Rle.from_runs(height, width, np.array([height * width], np.uint32))
-    rles = dict(zip(numbers.tolist(), found, strict=True))
+    rles = dict(zip(numbers.tolist(), own_rles, strict=True))
     return InstanceMasks(
         [rles.get(m + 1, empty) for m in range(count)],
         (height, width),

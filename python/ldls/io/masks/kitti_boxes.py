@@ -48,13 +48,13 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
         MaskError: A class without category id, or a score outside 0 to 1.
         FileFormatError: The file is broken; see `read_kitti_objects`.
     """
-    objects = [found for found in read_kitti_objects(path) if not found.is_region]
+    objects = [each for each in read_kitti_objects(path) if not each.is_region]
     all_names = KITTI_NAMES | dict(names or {})
     ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
     return KittiBoxes(
-        boxes=[found.bbox for found in objects],
-        categories=[_category(i, found, ids) for i, found in enumerate(objects)],
-        scores=[_score(i, found) for i, found in enumerate(objects)],
+        boxes=[each.bbox for each in objects],
+        categories=[_category(i, each, ids) for i, each in enumerate(objects)],
+        scores=[_score(i, each) for i, each in enumerate(objects)],
         names=all_names,
     )
 
@@ -86,17 +86,17 @@ def read(
         )
 
 
-def _category(index: int, found: KittiObject, ids: Mapping[str, int]) -> int:
-    if found.type not in ids:
+def _category(index: int, box: KittiObject, ids: Mapping[str, int]) -> int:
+    if box.type not in ids:
         known = ", ".join(KITTI_CATEGORIES)
         raise MaskError(
-            f"box {index}: class {found.type!r} is none of {known}; pass names={{104: {found.type!r}}} to give it an id"
+            f"box {index}: class {box.type!r} is none of {known}; pass names={{104: {box.type!r}}} to give it an id"
         )
-    return ids[found.type]
+    return ids[box.type]
 
 
-def _score(index: int, found: KittiObject) -> float:
-    score = 1.0 if found.score is None else found.score
+def _score(index: int, box: KittiObject) -> float:
+    score = 1.0 if box.score is None else box.score
     if not 0 <= score <= 1:
         raise MaskError(
             f"box {index}: score is {score}, expected 0 to 1; KITTI allows any number: map the detector's scores "

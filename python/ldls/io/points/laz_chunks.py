@@ -51,9 +51,9 @@ def check_chunks(path: Path, vlrs: bytes, offset: int, record_bytes: int, n_poin
         return
     n_layers = sum(LAYERS.get(kind, size) for kind, size in items)
     head = struct.Struct(f"<{record_bytes}x{1 + n_layers}I")
-    found, end = _walk(path, head, offset + TABLE_POINTER.size, n_points)
-    if found != n_points:
-        raise CorruptFileError(f"{path}: the header says {n_points} points, the chunks {found}")
+    counted, end = _walk(path, head, offset + TABLE_POINTER.size, n_points)
+    if counted != n_points:
+        raise CorruptFileError(f"{path}: the header says {n_points} points, the chunks {counted}")
     if end != table:
         raise CorruptFileError(f"{path}: the chunks end at byte {end}, their table begins at {table}")
 
@@ -76,9 +76,9 @@ def _walk(path: Path, head: struct.Struct, start: int, n_points: int) -> tuple[i
 
     A chunk is one whole point, a count, the size of each layer, and the layers.
     """
-    found, file_bytes = 0, path.stat().st_size
+    counted, file_bytes = 0, path.stat().st_size
     with path.open("rb") as file:
-        while found < n_points:
+        while counted < n_points:
             file.seek(start)
             content = file.read(head.size)
             count, *layer_bytes = head.unpack(content) if len(content) == head.size else (0,)
@@ -86,10 +86,10 @@ def _walk(path: Path, head: struct.Struct, start: int, n_points: int) -> tuple[i
             if count == 0 or start > file_bytes:
                 raise TruncatedFileError(
                     f"{path}: a chunk of {count} points ends at byte {start}, the file at {file_bytes}; "
-                    f"{n_points - found} points are missing"
+                    f"{n_points - counted} points are missing"
                 )
-            found += count
-    return found, start
+            counted += count
+    return counted, start
 
 
 def _table_offset(path: Path, offset: int, record_bytes: int) -> int:

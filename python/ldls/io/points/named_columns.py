@@ -35,9 +35,9 @@ class NamedColumns:
         plain = [plain_name(name) for name in names]
         for axis in "xyz":
             if plain.count(axis) != 1:
-                found = " ".join(names) or "none"
+                there = " ".join(names) or "none"
                 fault = "missing" if axis not in plain else f"there {plain.count(axis)} times"
-                raise CorruptFileError(f"{place}: column {axis} is {fault}; found {found}; expected one each of x y z")
+                raise CorruptFileError(f"{place}: column {axis} is {fault}; found {there}; expected one each of x y z")
         intensity = [plain.index(name) for name in INTENSITY_NAMES if name in plain][:1]
         return cls((*(plain.index(axis) for axis in "xyz"), *intensity))
 

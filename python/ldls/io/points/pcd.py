@@ -140,16 +140,16 @@ def _unpack(path: Path, header: Header, body: bytes) -> bytes:
     except ValueError as error:
         raise CorruptFileError(f"{path}: {error}, expected LZF") from None
     if unpacked is None or len(unpacked) != size:
-        found = "more" if unpacked is None else str(len(unpacked))
-        raise CorruptFileError(f"{path}: unpacks to {found} bytes, the file says {size}")
+        unpacked_bytes = "more" if unpacked is None else str(len(unpacked))
+        raise CorruptFileError(f"{path}: unpacks to {unpacked_bytes} bytes, the file says {size}")
     return unpacked
 
 
-def _check_amount(path: Path, header: Header, unit: str, needed: int, found: int, slack: int) -> None:
-    said = f"{path}: POINTS {header.n_points} need {needed} {unit} after DATA {header.encoding}, the file has {found}"
-    if found < needed:
+def _check_amount(path: Path, header: Header, unit: str, needed: int, amount: int, slack: int) -> None:
+    said = f"{path}: POINTS {header.n_points} need {needed} {unit} after DATA {header.encoding}, the file has {amount}"
+    if amount < needed:
         raise TruncatedFileError(said)
-    if found > needed + slack:
+    if amount > needed + slack:
         raise CorruptFileError(f"{said}; mend the header")
 
 
