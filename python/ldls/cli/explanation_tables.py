@@ -158,8 +158,8 @@ def _provenance(explanation: Explanation) -> str:
     if origin is None:
         return ""
     return (
-        f"Of the likelihood of {named(explanation, explanation.diffused_label)}, {percent(origin.own_share)} comes from "
-        f"the point's own pixels, and half from pixels of points within {origin.half_within_m:.2f} m."
+        f"Of the likelihood of {named(explanation, explanation.diffused_label)}, {percent(origin.own_share)} comes "
+        f"from the point's own pixels, and half from pixels of points within {origin.half_within_m:.2f} m."
     )
 
 
