@@ -23,8 +23,8 @@ class Recorded:
         for chunk in reader.stream():
             for row_id, row in _rows(chunk):
                 self.rows.setdefault(chunk.entity_path.lstrip("/"), []).append((row_id, row))
-        for found in self.rows.values():
-            found.sort(key=lambda pair: pair[0])
+        for rows in self.rows.values():
+            rows.sort(key=lambda pair: pair[0])
         sent = sorted((_views(reader, store) for store in reader.blueprints()), key=lambda views: views[0])
         self.views = [(views, timeline) for _, views, timeline in sent]
 
@@ -46,13 +46,13 @@ class Recorded:
 
     def names(self, path):
         """{(class, keypoint or None): (name, (r, g, b))} of the context that holds in the end."""
-        found = {}
+        names = {}
         for entry in self.last(path, "AnnotationContext:context")[0].as_py():
             info = entry["class_description"]["info"]
-            found[entry["class_id"], None] = (info["label"], rgb([info["color"]])[0])
+            names[entry["class_id"], None] = (info["label"], rgb([info["color"]])[0])
             for point in entry["class_description"]["keypoint_annotations"]:
-                found[entry["class_id"], point["id"]] = (point["label"], rgb([point["color"]])[0])
-        return found
+                names[entry["class_id"], point["id"]] = (point["label"], rgb([point["color"]])[0])
+        return names
 
 
 def rgb(packed):

@@ -64,10 +64,10 @@ def test_rings_stand_at_their_ranges() -> None:
         angle = np.radians(np.arange(60, 85))
         places = ground.at(range_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)).astype(int)
         inside = (places >= 1).all(axis=1) & (places[:, 0] < picture.shape[1] - 1)
-        found = [
+        drawn = [
             np.abs(picture[y - 1 : y + 2, x - 1 : x + 2] - RINGS).max(axis=2).min() < 25 for x, y in places[inside]
         ]
-        assert len(found) > 5 and np.mean(found) > 0.6
+        assert len(drawn) > 5 and np.mean(drawn) > 0.6
 
 
 def test_points_in_view_and_out_of_it_are_two_greys() -> None:
@@ -115,11 +115,11 @@ def test_the_picture_fits_and_follows_the_range() -> None:
 
 
 def test_corners_go_around_the_box() -> None:
-    (found,) = street(X_FORWARD).objects
-    corners = corners_of(found.box)
+    (car,) = street(X_FORWARD).objects
+    corners = corners_of(car.box)
     sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-    np.testing.assert_allclose(sides, found.box.size[[1, 0, 1, 0]])
-    np.testing.assert_allclose(corners.mean(axis=0), found.box.center[:2])
+    np.testing.assert_allclose(sides, car.box.size[[1, 0, 1, 0]])
+    np.testing.assert_allclose(corners.mean(axis=0), car.box.center[:2])
 
 
 def test_boxes_can_be_left_out() -> None:

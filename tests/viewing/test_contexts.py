@@ -20,18 +20,18 @@ def results(small_scene):
     return [ldls.segment(points, each, camera) for each in (masks, other)]
 
 
-def contexts(found, place):
-    return [row.times for row in found.each(place, CONTEXT)]
+def contexts(rrd, place):
+    return [row.times for row in rrd.each(place, CONTEXT)]
 
 
 def test_a_file_has_one_context_a_place_and_it_has_all_names(results, tmp_path) -> None:
     with open_recording(tmp_path / "a.rrd") as recording:
         for result in results:
             recording.add(result)
-    found = Recorded(tmp_path / "a.rrd")
+    rrd = Recorded(tmp_path / "a.rrd")
     for place in PLACES:
-        assert contexts(found, place) == [{}]
-    assert {name for name, _ in found.names("world").values()} >= {"person", "car", "dog", "car 2", "dog 2"}
+        assert contexts(rrd, place) == [{}]
+    assert {name for name, _ in rrd.names("world").values()} >= {"person", "car", "dog", "car 2", "dog 2"}
 
 
 def test_a_stream_has_contexts_at_their_times(results, tmp_path) -> None:
@@ -42,9 +42,9 @@ def test_a_stream_has_contexts_at_their_times(results, tmp_path) -> None:
         stream.set_time("frame", sequence=number)
         recording.log_result(result)
     stream.disconnect()
-    found = Recorded(tmp_path / "a.rrd")
+    rrd = Recorded(tmp_path / "a.rrd")
     for place in PLACES:
-        assert [times["frame"] for times in contexts(found, place)] == [0, 1]
+        assert [times["frame"] for times in contexts(rrd, place)] == [0, 1]
 
 
 def test_a_recording_of_ones_own_has_them_for_all_times(results, tmp_path) -> None:
@@ -64,9 +64,9 @@ def test_contexts_of_ones_own_recording_can_be_held_back(results, tmp_path) -> N
         recording.log_result(result)
     recording.log_held_contexts()
     stream.disconnect()
-    found = Recorded(tmp_path / "a.rrd")
-    assert [contexts(found, place) for place in PLACES] == [[{}], [{}]]
-    assert {name for name, _ in found.names("world").values()} >= {"car", "dog"}
+    rrd = Recorded(tmp_path / "a.rrd")
+    assert [contexts(rrd, place) for place in PLACES] == [[{}], [{}]]
+    assert {name for name, _ in rrd.names("world").values()} >= {"car", "dog"}
 
 
 def test_a_camera_that_comes_later_has_a_context_too(small_scene, tmp_path) -> None:
@@ -74,9 +74,9 @@ def test_a_camera_that_comes_later_has_a_context_too(small_scene, tmp_path) -> N
     with open_recording(tmp_path / "a.rrd") as recording:
         for name in ("left", "right"):
             recording.add(ldls.segment(points, [ldls.View(masks, camera, name)]))
-    found = Recorded(tmp_path / "a.rrd")
+    rrd = Recorded(tmp_path / "a.rrd")
     for name in ("left", "right"):
-        assert contexts(found, f"world/camera/{name}/image/masks") == [{}]
+        assert contexts(rrd, f"world/camera/{name}/image/masks") == [{}]
 
 
 def test_recordings_and_entities_have_names_of_their_own(small_scene, tmp_path) -> None:
@@ -89,9 +89,9 @@ def test_recordings_and_entities_have_names_of_their_own(small_scene, tmp_path) 
     recording.log_result(ldls.segment(points, swapped, camera), entity="b")
     Recording(stream).log_result(ldls.segment(points, swapped, camera), entity="c")
     stream.disconnect()
-    found = Recorded(tmp_path / "a.rrd")
+    rrd = Recorded(tmp_path / "a.rrd")
     for entity, expected in (("a", {"person 1", "car 2"}), ("b", {"car 1", "person 2"}), ("c", {"car 1", "person 2"})):
-        assert {name for name, _ in found.names(rf"{entity}/camera/camera\ 0/image/masks").values()} == {
+        assert {name for name, _ in rrd.names(rf"{entity}/camera/camera\ 0/image/masks").values()} == {
             "background", *expected,
         }  # fmt: skip
 

@@ -19,13 +19,13 @@ def result(small_scene):
 
 def test_a_result_shows_two_pictures_and_its_objects(result) -> None:
     html = result._repr_html_()
-    pictures = [Image.open(io.BytesIO(base64.b64decode(found))) for found in re.findall(r'base64,([^"]+)"', html)]
+    pictures = [Image.open(io.BytesIO(base64.b64decode(png))) for png in re.findall(r'base64,([^"]+)"', html)]
     assert [picture.width for picture in pictures] == [1200, 1200]
     rows = re.findall(r"<tr>(<td.*?)</tr>", html)
     assert len(rows) == 2
     for row, name in zip(sorted(rows), ("person", "car"), strict=True):
         assert f"<td>{name}</td>" in row
-    person = next(found for found in result.objects if found.name == "person")
+    person = next(each for each in result.objects if each.name == "person")
     red, green, blue = instance_colours([1])[0].tolist()
     row = next(row for row in rows if "person" in row)
     assert f"rgb({red}, {green}, {blue})" in row

@@ -57,12 +57,12 @@ def numbers(array):
 
 
 def test_the_docstring_names_every_entity(tmp_path, result, truth):
-    found = recorded(tmp_path / "a.rrd", result, images={"camera 0": IMAGE}, truth=truth, diffusion=50)
+    rrd = recorded(tmp_path / "a.rrd", result, images={"camera 0": IMAGE}, truth=truth, diffusion=50)
     named = set(re.findall(r"^(?:world|diffusion)\S*", recording.__doc__, re.MULTILINE))
     there = {re.sub(r"statistics/.*", "statistics/...", path).replace(r"camera/camera\ 0", "camera/NAME")
-             for path in found.entities}  # fmt: skip
+             for path in rrd.entities}  # fmt: skip
     assert there == named
-    statistics = {path.removeprefix("world/statistics/") for path in found.entities if "statistics" in path}
+    statistics = {path.removeprefix("world/statistics/") for path in rrd.entities if "statistics" in path}
     assert statistics == {"confidence", "points/person", "points/car", *(f"milliseconds/{s}" for s in result.timings)}
 
 
@@ -91,7 +91,7 @@ def test_direct_projection_has_the_labels_of_its_stage(tmp_path, result):
 
 def test_boxes_stand_where_the_objects_are(tmp_path, result):
     row = recorded(tmp_path / "a.rrd", result).each("world/boxes")[0].values
-    boxes = [found.box for found in result.objects]
+    boxes = [each.box for each in result.objects]
     assert row["Boxes3D:labels"].to_pylist() == ["person 1", "car 2"]
     np.testing.assert_allclose(vectors(row["Boxes3D:centers"]), [box.center for box in boxes], rtol=1e-6)
     np.testing.assert_allclose(2 * vectors(row["Boxes3D:half_sizes"]), [box.size for box in boxes], rtol=1e-6)
@@ -101,16 +101,16 @@ def test_boxes_stand_where_the_objects_are(tmp_path, result):
 
 
 def test_names_and_colours_are_those_of_categories_and_instances(tmp_path, result):
-    found = recorded(tmp_path / "a.rrd", result)
+    rrd = recorded(tmp_path / "a.rrd", result)
     person, car = (tuple(colour) for colour in instance_colours([1, 3]).tolist())
-    assert found.names("world") == {
+    assert rrd.names("world") == {
         (0, None): ("background", BACKGROUND), (0, 0): ("background", BACKGROUND), (0, 65535): ("out of view", DARK),
         (1, None): ("person", category_colour(1)), (1, 1): ("person 1", person),
         (3, None): ("car", category_colour(3)), (3, 2): ("car 2", car),
     }  # fmt: skip
-    masks = found.names(r"world/camera/camera\ 0/image/masks")
+    masks = rrd.names(r"world/camera/camera\ 0/image/masks")
     assert {of: info for (of, _), info in masks.items() if of} == {1: ("person 1", person), 2: ("car 2", car)}
-    assert all(row.times == {} for row in found.each("world", "AnnotationContext:context")), "others are not shown"
+    assert all(row.times == {} for row in rrd.each("world", "AnnotationContext:context")), "others are not shown"
 
 
 def test_numbers_keep_their_meaning_from_frame_to_frame(tmp_path, small_scene):
@@ -119,14 +119,14 @@ def test_numbers_keep_their_meaning_from_frame_to_frame(tmp_path, small_scene):
     with open_recording(tmp_path / "a.rrd") as made:
         for chosen in (masks, swapped, masks):
             made.add(ldls.segment(points, chosen, camera))
-    found = Recorded(tmp_path / "a.rrd")
-    names = {of: name for (of, _), (name, _) in found.names(r"world/camera/camera\ 0/image/masks").items()}
+    rrd = Recorded(tmp_path / "a.rrd")
+    names = {of: name for (of, _), (name, _) in rrd.names(r"world/camera/camera\ 0/image/masks").items()}
     shown = [
         [names[of] for of in np.unique(numbers(row.values["SegmentationImage:buffer"][0].values).view(np.uint8)) if of]
-        for row in found.each(r"world/camera/camera\ 0/image/masks", "SegmentationImage:buffer")
+        for row in rrd.each(r"world/camera/camera\ 0/image/masks", "SegmentationImage:buffer")
     ]
     assert shown == [["person 1", "car 2"], ["car 1", "person 2"], ["person 1", "car 2"]]
-    assert {name for name, _ in found.names("world").values()} >= {"person 1", "person 2", "car 1", "car 2"}
+    assert {name for name, _ in rrd.names("world").values()} >= {"person 1", "person 2", "car 1", "car 2"}
 
 
 def test_of_masks_that_overlap_the_highest_label_shows(tmp_path, small_scene):
@@ -143,25 +143,25 @@ def test_of_masks_that_overlap_the_highest_label_shows(tmp_path, small_scene):
 
 
 def test_images_and_their_points_are_there(tmp_path, result):
-    found = recorded(tmp_path / "a.rrd", result, images={"camera 0": IMAGE})
-    blob = found.last(r"world/camera/camera\ 0/image", "EncodedImage:blob")[0].as_py()
+    rrd = recorded(tmp_path / "a.rrd", result, images={"camera 0": IMAGE})
+    blob = rrd.last(r"world/camera/camera\ 0/image", "EncodedImage:blob")[0].as_py()
     with Image.open(io.BytesIO(bytes(blob))) as jpeg:
         assert jpeg.format == "JPEG" and jpeg.size == (80, 60)
-    row = found.each(r"world/camera/camera\ 0/image/points")[0].values
+    row = rrd.each(r"world/camera/camera\ 0/image/points")[0].values
     np.testing.assert_allclose(vectors(row["Points2D:positions"], 2), result.pixels + 0.5, rtol=1e-6)
     np.testing.assert_array_equal(numbers(row["Points2D:keypoint_ids"]), result.labels[result.in_view])
 
 
 def test_the_table_and_the_curves_say_what_was_found(tmp_path, result):
-    found = recorded(tmp_path / "a.rrd", result, name="000571")
-    text = found.last("world/objects", "TextDocument:text")[0].as_py()
+    rrd = recorded(tmp_path / "a.rrd", result, name="000571")
+    text = rrd.last("world/objects", "TextDocument:text")[0].as_py()
     assert text.startswith("# 000571\n") and "| n points | 500 |" in text
     for one in result.objects:
         assert f"| {one.label} | {one.name} | {one.score:.2f} | {one.n_points} |" in text
-        assert found.last(f"world/statistics/points/{one.name}", "Scalars:scalars").to_pylist() == [one.n_points]
-    mean = found.last("world/statistics/confidence", "Scalars:scalars")[0].as_py()
+        assert rrd.last(f"world/statistics/points/{one.name}", "Scalars:scalars").to_pylist() == [one.n_points]
+    mean = rrd.last("world/statistics/confidence", "Scalars:scalars")[0].as_py()
     assert mean == pytest.approx(result.confidence[result.labels > 0].mean())
-    stage = found.last("world/statistics/milliseconds/graph", "Scalars:scalars")[0].as_py()
+    stage = rrd.last("world/statistics/milliseconds/graph", "Scalars:scalars")[0].as_py()
     assert stage == pytest.approx(result.timings["graph"] * 1e3)
 
 
@@ -188,36 +188,36 @@ def test_pinholes_give_the_pixels_of_their_cameras(camera):
     points = np.random.default_rng(1).uniform([-4, -2, 3], [4, 2, 40], (300, 3))
     in_view, pixels = stages.project(points, camera, image_size=(375, 1242))
     assert len(in_view) > 20
-    found = pinhole_of(camera)
-    assert np.allclose(found.K, np.triu(found.K)) and found.K[2, 2] == pytest.approx(1)
-    rays = np.linalg.inv(found.T_lidar_camera) @ np.vstack([points[in_view].T, np.ones(len(in_view))])
-    u, v, depth = found.K @ rays[:3]
+    K, T_lidar_camera = pinhole_of(camera)
+    assert np.allclose(K, np.triu(K)) and K[2, 2] == pytest.approx(1)
+    rays = np.linalg.inv(T_lidar_camera) @ np.vstack([points[in_view].T, np.ones(len(in_view))])
+    u, v, depth = K @ rays[:3]
     np.testing.assert_allclose(np.stack([u, v], axis=1) / depth[:, None], pixels + PIXEL_CENTRE, atol=1e-9)
     assert (depth > 0).all(), "they look along z"
-    np.testing.assert_allclose(found.T_lidar_camera[:3, :3] @ found.T_lidar_camera[:3, :3].T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(T_lidar_camera[:3, :3] @ T_lidar_camera[:3, :3].T, np.eye(3), atol=1e-12)
 
 
 def test_a_recorded_camera_is_that_pinhole(tmp_path, small_scene):
     points, masks, _ = small_scene
     camera = ldls.Camera(projection=KITTI, T_camera_lidar=POSE)
     row = recorded(tmp_path / "a.rrd", ldls.segment(points, masks, camera)).each(r"world/camera/camera\ 0")[0].values
-    expected = pinhole_of(camera)
+    K, pose = pinhole_of(camera)
     columns = numbers(row["Pinhole:image_from_camera"].flatten()).reshape(3, 3)
-    np.testing.assert_allclose(columns.T, expected.K, rtol=1e-6)
+    np.testing.assert_allclose(columns.T, K, rtol=1e-6)
     assert numbers(row["Pinhole:resolution"].flatten()).tolist() == [80, 60]
-    np.testing.assert_allclose(vectors(row["Transform3D:translation"])[0], expected.T_lidar_camera[:3, 3], rtol=1e-5)
+    np.testing.assert_allclose(vectors(row["Transform3D:translation"])[0], pose[:3, 3], rtol=1e-5)
     rotation = numbers(row["Transform3D:mat3x3"].flatten()).reshape(3, 3).T
-    np.testing.assert_allclose(rotation, expected.T_lidar_camera[:3, :3], atol=1e-6)
+    np.testing.assert_allclose(rotation, pose[:3, :3], atol=1e-6)
 
 
 def test_a_distorted_lens_stands_as_a_pinhole_and_its_points_are_exact(tmp_path, small_scene):
     points, masks, _ = small_scene
     camera = pinhole(distortion=ldls.Distortion("plumb_bob", (-0.3, 0.1, 0, 0, 0)))
     result = ldls.segment(points, masks, camera)
-    found = recorded(tmp_path / "a.rrd", result)
-    columns = numbers(found.last(r"world/camera/camera\ 0", "Pinhole:image_from_camera").flatten()).reshape(3, 3)
+    rrd = recorded(tmp_path / "a.rrd", result)
+    columns = numbers(rrd.last(r"world/camera/camera\ 0", "Pinhole:image_from_camera").flatten()).reshape(3, 3)
     np.testing.assert_allclose(columns.T[:2, 2], [40.5, 30.5])
-    uv = vectors(found.last(r"world/camera/camera\ 0/image/points", "Points2D:positions"), 2)
+    uv = vectors(rrd.last(r"world/camera/camera\ 0/image/points", "Points2D:positions"), 2)
     np.testing.assert_allclose(uv, result.pixels + 0.5, rtol=1e-6)
 
 
@@ -235,10 +235,10 @@ def test_frames_follow_one_another_on_their_timelines(tmp_path, result, stamps, 
     with open_recording(tmp_path / "a.rrd") as made:
         for stamp in stamps:
             made.add(result, stamp=stamp)
-    found = Recorded(tmp_path / "a.rrd")
-    assert found.timelines == {"frame", *([line] if line else [])}
-    assert found.each("world/boxes")[-1].times.keys() == {"frame", *([line] if line and stamps[-1] else [])}
-    rows = found.each("world/points", "Points3D:positions")
+    rrd = Recorded(tmp_path / "a.rrd")
+    assert rrd.timelines == {"frame", *([line] if line else [])}
+    assert rrd.each("world/boxes")[-1].times.keys() == {"frame", *([line] if line and stamps[-1] else [])}
+    rows = rrd.each("world/points", "Points3D:positions")
     assert [row.times["frame"] for row in rows] == [0, 1, 2]
     if line:
         assert [row.times.get(line) for row in rows] == expected
@@ -249,8 +249,8 @@ def test_what_a_later_frame_lacks_is_taken_away(tmp_path, result, truth):
         made.add(result, images={"camera 0": IMAGE}, truth=truth)
         made.add(result)
         made.add_frame(ldls.datasets.Frame(name="raw", points=result.points))
-    found = Recorded(tmp_path / "a.rrd")
-    gone = {path: [row.times["frame"] for row in found.each(path, "Clear:is_recursive")] for path in found.entities}
+    rrd = Recorded(tmp_path / "a.rrd")
+    gone = {path: [row.times["frame"] for row in rrd.each(path, "Clear:is_recursive")] for path in rrd.entities}
     assert {path: frames for path, frames in gone.items() if frames} == {
         "world/truth": [1], r"world/camera/camera\ 0/image": [1], r"world/camera/camera\ 0": [2],
         r"world/camera/camera\ 0/image/masks": [2], "world/points/direct": [2], "world/boxes": [2],
@@ -259,16 +259,16 @@ def test_what_a_later_frame_lacks_is_taken_away(tmp_path, result, truth):
 
 
 def test_diffusion_spreads_from_grey_to_the_labels(tmp_path, result):
-    found = recorded(tmp_path / "a.rrd", result, diffusion=30, alone=True)
-    rows = found.each("diffusion/points", "Points3D:colors")
+    rrd = recorded(tmp_path / "a.rrd", result, diffusion=30, alone=True)
+    rows = rrd.each("diffusion/points", "Points3D:colors")
     assert [row.times["iteration"] for row in rows] == [0, 30, 60, 90, 120, 150, 180, 200]
     assert set(rgb(rows[0].values["Points3D:colors"].to_pylist())) == {BACKGROUND}
     labels = result.diffused_labels[result.in_view]
     np.testing.assert_array_equal(numbers(rows[-1].values["Points3D:keypoint_ids"]), labels)
-    (positions,) = found.each("diffusion/points", "Points3D:positions")
+    (positions,) = rrd.each("diffusion/points", "Points3D:positions")
     np.testing.assert_array_equal(vectors(positions.values["Points3D:positions"]), result.points[result.in_view])
-    assert found.each("world/points")[0].times == {"frame": 0, "iteration": 0}, "all is on the timeline that shows"
-    assert found.views[-1][1] == "iteration" and found.views[-1][0]["diffusion"] == "diffusion"
+    assert rrd.each("world/points")[0].times == {"frame": 0, "iteration": 0}, "all is on the timeline that shows"
+    assert rrd.views[-1][1] == "iteration" and rrd.views[-1][0]["diffusion"] == "diffusion"
 
 
 def test_colours_of_the_diffusion_are_winners_by_their_share(tmp_path, result):
@@ -289,12 +289,12 @@ def test_frames_after_a_diffusion_are_not_on_its_timeline(tmp_path, result):
     with open_recording(tmp_path / "a.rrd") as made:
         for _ in range(2):
             made.add(result, diffusion=100)
-    found = Recorded(tmp_path / "a.rrd")
-    assert [row.times for row in found.each("world/points")] == [{"frame": 0}, {"frame": 1}]
-    rows = found.each("diffusion/points", "Points3D:colors")
+    rrd = Recorded(tmp_path / "a.rrd")
+    assert [row.times for row in rrd.each("world/points")] == [{"frame": 0}, {"frame": 1}]
+    rows = rrd.each("diffusion/points", "Points3D:colors")
     times = [(row.times["frame"], row.times["iteration"]) for row in rows]
     assert times == [(0, 0), (0, 100), (0, 200), (1, 0), (1, 100), (1, 200)]
-    assert found.views[-1][1] == "frame"
+    assert rrd.views[-1][1] == "frame"
 
 
 @pytest.mark.parametrize("every", [0, -4, float("nan")])
@@ -313,20 +313,20 @@ def test_a_diffusion_of_no_steps_is_refused(result, every):
 )
 def test_empty_results_are_recorded_too(tmp_path, small_scene, change):
     result = ldls.segment(*change(*small_scene))
-    found = recorded(tmp_path / "a.rrd", result, images={"camera 0": IMAGE}, diffusion=100)
-    assert len(found.last("world/points", "Points3D:positions")) == len(result.points)
-    assert len(found.last("world/boxes", "Boxes3D:centers")) == 0
-    assert len(found.each("diffusion/points", "Points3D:colors")) == 3
+    rrd = recorded(tmp_path / "a.rrd", result, images={"camera 0": IMAGE}, diffusion=100)
+    assert len(rrd.last("world/points", "Points3D:positions")) == len(result.points)
+    assert len(rrd.last("world/boxes", "Boxes3D:centers")) == 0
+    assert len(rrd.each("diffusion/points", "Points3D:colors")) == 3
 
 
 def test_truth_has_its_own_names_and_boxes(tmp_path, result, truth):
-    found = recorded(tmp_path / "a.rrd", result, truth=truth)
-    row = found.each("world/truth", "Points3D:positions")[0].values
+    rrd = recorded(tmp_path / "a.rrd", result, truth=truth)
+    row = rrd.each("world/truth", "Points3D:positions")[0].values
     np.testing.assert_array_equal(numbers(row["Points3D:class_ids"]), truth.classes)
-    assert found.names("world/truth")[2, None] == ("car", category_colour(3))
+    assert rrd.names("world/truth")[2, None] == ("car", category_colour(3))
     colours = rgb(row["Points3D:colors"].to_pylist())
     assert {colours[i] for i in np.flatnonzero(truth.classes == 2)} == {category_colour(3)}
-    assert found.last("world/truth/boxes", "Boxes3D:labels").to_pylist() == ["car 1", "car 2"]
+    assert rrd.last("world/truth/boxes", "Boxes3D:labels").to_pylist() == ["car 1", "car 2"]
     short = replace_length(truth, 3)
     with pytest.raises(ldls.errors.InputError, match="3 labels, 500 points"):
         recorded(tmp_path / "b.rrd", result, truth=short)
@@ -369,11 +369,11 @@ def test_a_result_goes_into_ones_own_recording_at_ones_own_time(tmp_path, result
         own.log_result(result, entity="robot/front lidar")
         own.log_frame(ldls.datasets.Frame(name="f", points=result.points), entity="raw")
     stream.disconnect()
-    found = Recorded(tmp_path / "own.rrd")
-    assert found.recording.application_id == "robot"
-    roots = {path.split("/")[0] for path in found.entities}
+    rrd = Recorded(tmp_path / "own.rrd")
+    assert rrd.recording.application_id == "robot"
+    roots = {path.split("/")[0] for path in rrd.entities}
     assert roots == {"robot", "raw"}
-    (row,) = found.each(r"robot/front\ lidar/points")
+    (row,) = rrd.each(r"robot/front\ lidar/points")
     assert row.times["tick"] == 7
 
 
@@ -382,17 +382,17 @@ def test_frames_without_masks_are_coloured_by_distance(tmp_path, result):
     frame = ldls.datasets.Frame(name="f", points=result.points, images=(image,), stamp=3.0)
     with open_recording(tmp_path / "a.rrd") as made:
         made.add_frame(frame)
-    found = Recorded(tmp_path / "a.rrd")
+    rrd = Recorded(tmp_path / "a.rrd")
     below = {"points", "camera/front", "camera/front/image", "camera/front/image/points"}
-    assert found.entities == {"world", *(f"world/{path}" for path in below)}
+    assert rrd.entities == {"world", *(f"world/{path}" for path in below)}
     xyz = result.points.astype(float)
-    distance = rgb(found.last("world/points", "Points3D:colors").to_pylist())
+    distance = rgb(rrd.last("world/points", "Points3D:colors").to_pylist())
     np.testing.assert_array_equal(distance, depth_colours(np.sqrt((xyz**2).sum(axis=1))))
-    depth = rgb(found.last("world/camera/front/image/points", "Points2D:colors").to_pylist())
+    depth = rgb(rrd.last("world/camera/front/image/points", "Points2D:colors").to_pylist())
     np.testing.assert_array_equal(depth, depth_colours(xyz[result.in_view, 2]))
-    uv = vectors(found.last("world/camera/front/image/points", "Points2D:positions"), 2)
+    uv = vectors(rrd.last("world/camera/front/image/points", "Points2D:positions"), 2)
     np.testing.assert_allclose(uv, result.pixels + 0.5, rtol=1e-6)
-    assert set(found.views[-1][0]) == {"points", "front"}
+    assert set(rrd.views[-1][0]) == {"points", "front"}
 
 
 def test_the_layout_shows_what_there_is(tmp_path, result, truth):
@@ -482,7 +482,7 @@ def test_targets_are_files_of_rerun_or_a_viewer(target):
         pytest.param({}, "win32", True, id="Windows"),
     ],
 )
-def test_displays_are_found(environment, platform, expected):
+def test_displays_are_seen(environment, platform, expected):
     assert viewer.has_display(environment, platform) is expected
 
 
@@ -513,7 +513,7 @@ def test_what_listens_for_viewers_gets_all(tmp_path, no_display, result):
             wait_for(viewer.is_open)
             with open_recording("spawn") as made:
                 made.add(result)
-            wait_for(lambda: (found := received(path)) and LAST_LOGGED in found.entities)
+            wait_for(lambda: (rrd := received(path)) and LAST_LOGGED in rrd.entities)
         finally:
             listener.terminate()
 
@@ -549,10 +549,10 @@ def test_a_missing_library_is_named_with_its_extra(monkeypatch, tmp_path, result
 def test_a_street_with_its_diffusion_takes_few_megabytes(tmp_path, frame_571):
     result = ldls.segment(frame_571.points, frame_571.masks, frame_571.camera)
     image = ldls.read_image(frame_571.image_path)
-    found = recorded(tmp_path / "a.rrd", result, images={"camera 0": image}, diffusion=4, alone=True)
-    assert len(found.each("diffusion/points", "Points3D:colors")) == 51
+    rrd = recorded(tmp_path / "a.rrd", result, images={"camera 0": image}, diffusion=4, alone=True)
+    assert len(rrd.each("diffusion/points", "Points3D:colors")) == 51
     assert (tmp_path / "a.rrd").stat().st_size < 10e6
-    np.testing.assert_array_equal(vectors(found.last("world/points", "Points3D:positions")), frame_571.points[:, :3])
+    np.testing.assert_array_equal(vectors(rrd.last("world/points", "Points3D:positions")), frame_571.points[:, :3])
 
 
 def test_a_ring_has_all_its_cameras(tmp_path, data_folder):
@@ -565,11 +565,11 @@ def test_a_ring_has_all_its_cameras(tmp_path, data_folder):
         views.append(ldls.View(masks, image.camera, image.name))
     result = ldls.segment(frame.points, views)
     images = {image.name: image.read() for image in frame.images}
-    found = recorded(tmp_path / "a.rrd", result, images=images, stamp=frame.stamp, diffusion=100, alone=True)
-    assert {path.split("/")[2] for path in found.entities if path.startswith("world/camera/")} == set(images)
+    rrd = recorded(tmp_path / "a.rrd", result, images=images, stamp=frame.stamp, diffusion=100, alone=True)
+    assert {path.split("/")[2] for path in rrd.entities if path.startswith("world/camera/")} == set(images)
     for seen in result.views:
-        row = found.each(f"world/camera/{seen.view.name}/image/points")[0].values
+        row = rrd.each(f"world/camera/{seen.view.name}/image/points")[0].values
         np.testing.assert_array_equal(numbers(row["Points2D:keypoint_ids"]), result.labels[seen.in_view])
-    final = found.each("diffusion/points", "Points3D:keypoint_ids")[-1].values["Points3D:keypoint_ids"]
+    final = rrd.each("diffusion/points", "Points3D:keypoint_ids")[-1].values["Points3D:keypoint_ids"]
     np.testing.assert_array_equal(numbers(final), result.diffused_labels[result.in_view])
     assert {path.name for path in tmp_path.iterdir()} == {"a.rrd"}

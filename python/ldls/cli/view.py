@@ -16,7 +16,7 @@ from ldls.cli.options import FRAMES_FAILED, refuse
 from ldls.cli.outputs import PictureOption
 from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, where_recorded
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
-from ldls.cli.view_source import MOST_FRAMES, chosen_frames, record_frames, settings_of
+from ldls.cli.view_source import MOST_FRAMES, chosen_frames, labelled, record_frames
 from ldls.errors import InputError
 from ldls.io import read_image, read_result
 
@@ -85,27 +85,19 @@ def view(
     check_recording(target)
     failures: list[str] = []
     if path.is_file() and path.suffix.lower() == ".npz":
-        of_sources: dict[str, object] = {
-            "dataset": dataset,
-            "option": option,
-            "frames": frames,
-            "masks": masks,
-            "results": results,
-        }
-        of_sources |= {"segmenter": segmenter, "min-score": min_score, "categories": categories}
-        refuse(of_sources, f"{path} is a result, which has its masks and labels")
+        of_sources = {"dataset": dataset, "option": option, "frames": frames, "masks": masks, "results": results}
+        of_masks = {"segmenter": segmenter, "min-score": min_score, "categories": categories}
+        refuse({**of_sources, **of_masks}, f"{path} is a result, which has its masks and labels")
         message = view_result(path, image or [], target, name=name, diffusion=diffusion, picture=picture)
     else:
         refuse({"image": image}, f"{path} is a source, which has its images")
         refuse({"picture": picture}, f"{path} is a source; pictures show a result")
         assert target is not None
-        settings = settings_of(
-            masks=masks, segmenter=segmenter, min_score=min_score, categories=categories, results=results
-        )
         source, indices = chosen_frames(path, dataset, option or [], frames)
-        failures = record_frames(
-            source, indices, target, name=name, diffusion=diffusion, settings=settings, results=results
+        label = labelled(
+            source, masks=masks, segmenter=segmenter, min_score=min_score, categories=categories, results=results
         )
+        failures = record_frames(source, indices, target, name=name, diffusion=diffusion, label=label)
         for failure in failures:
             console().print(failure, highlight=False, soft_wrap=True)
         count = f"{len(indices) - len(failures):,} of {len(source):,} frames; "

@@ -16,7 +16,6 @@ from ldls.errors import InputError, LdlsError, ParameterError
 from ldls.io import read_result
 
 if TYPE_CHECKING:
-    from ldls.batch import RunSettings
     from ldls.batch.frame_work import FrameWork
     from ldls.datasets import Frame, Source
     from ldls.segmentation import Segmentation
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 MOST_FRAMES = 100
 """Frames that are shown where none are chosen."""
 Labelled = Callable[[int], "tuple[Frame, Segmentation | None]"]
-"""Gives the frame of a number in its source, and its labels if it has any."""
+"""The frame of a number in its source, and its labels if it has any."""
 
 
 def chosen_frames(
@@ -47,27 +46,36 @@ def chosen_frames(
     return source, indices
 
 
-def settings_of(
+def labelled(
+    source: Source,
     *,
     masks: str | None,
     segmenter: str | None,
     min_score: float | None,
     categories: str | None,
     results: Path | None,
-) -> RunSettings | None:
-    """How frames are segmented; None where they are not.
+) -> Labelled:
+    """Frames of a source, segmented, or with stored results, or without labels.
 
     Raises:
         ParameterError: Labels would come from two places, or options choose among masks and there are none.
+        InputError: There are no stored results.
     """
-    from ldls.batch import RunSettings
-
     if masks is None and segmenter is None:
         refuse({"min-score": min_score, "categories": categories}, "they choose among --masks or --segmenter's masks")
-        return None
+        if results is None:
+            return lambda index: (source[index], None)
+        if not any(results.glob("*.npz")):
+            raise InputError(f"--results: {results} has no .npz; give `ldls run` --formats npz to have them written")
+        return partial(_stored, source, results)
     refuse({"results": results}, "labels come from --masks, --segmenter or --results, one of them")
+    from ldls.batch import RunSettings
+    from ldls.batch.frame_work import FrameWork
+
     chosen = chosen_categories(categories)
-    return RunSettings(masks=masks, segmenter=segmenter, min_score=min_score, categories=chosen)
+    settings = RunSettings(masks=masks, segmenter=segmenter, min_score=min_score, categories=chosen)
+    # nothing is written, so there is no folder to write to
+    return partial(_segmented, source, FrameWork(source, settings, Path()))
 
 
 def record_frames(
@@ -77,17 +85,15 @@ def record_frames(
     *,
     name: str,
     diffusion: int | None,
-    settings: RunSettings | None,
-    results: Path | None,
+    label: Labelled,
 ) -> list[str]:
-    """Record frames of a source; a line for each that cannot be.
+    """Record frames of a source, labelled by `label`; a line for each that cannot be.
 
     Raises:
         LdlsError: None can be; the error is that of the first.
     """
     from ldls.viewing.recording import open_recording
 
-    label = _labelled(source, settings, results)
     every = every_of(diffusion, len(indices))
     failures: list[tuple[str, Exception]] = []
     with open_recording(target, name=name) as recording:
@@ -111,19 +117,6 @@ def record_frames(
         if len(failures) == len(indices):
             raise failures[0][1]
     return [f"{frame} failed: {error}" for frame, error in failures]
-
-
-def _labelled(source: Source, settings: RunSettings | None, results: Path | None) -> Labelled:
-    if settings is not None:
-        from ldls.batch.frame_work import FrameWork
-
-        # nothing is written, so there is no folder to write to
-        return partial(_segmented, source, FrameWork(source, settings, Path()))
-    if results is not None:
-        if not any(results.glob("*.npz")):
-            raise InputError(f"--results: {results} has no .npz; give `ldls run` --formats npz to have them written")
-        return partial(_stored, source, results)
-    return lambda index: (source[index], None)
 
 
 def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segmentation]:

@@ -12,6 +12,7 @@ from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets import Frame
 from ldls.stages import project
+from ldls.viewing.drawing import grid
 
 NEAR_M, FAR_M = 3.0, 60.0
 """Depths at the ends of the colours: red and violet."""
@@ -28,12 +29,7 @@ def depth_picture(frame: Frame) -> Image.Image:
     """
     width = ONE_PX if len(frame.images) == 1 else TILE_PX
     tiles = [_tile(image.read(), frame.points, image.camera, width) for image in frame.images]
-    columns = ceil(sqrt(len(tiles)))
-    height = max(tile.height for tile in tiles)
-    picture = Image.new("RGB", (width * min(columns, len(tiles)), height * ceil(len(tiles) / columns)))
-    for number, tile in enumerate(tiles):
-        picture.paste(tile, (width * (number % columns), height * (number // columns)))
-    return picture
+    return grid(tiles, columns=ceil(sqrt(len(tiles))), gap_px=0)
 
 
 def depth_colours(depth_m: NDArray[np.float64]) -> NDArray[np.uint8]:

@@ -51,13 +51,15 @@ def stamp(canvas: Canvas, at_px: NDArray[np.int64], colours: NDArray[np.uint8] |
         canvas[y, x] = np.round((1 - opacity) * canvas[y, x] + opacity * own[inside])
 
 
-def grid(pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, columns: int) -> Image.Image:
+def grid(
+    pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, columns: int, gap_px: int = GAP_PX
+) -> Image.Image:
     """The pictures row by row, each below its caption if any."""
     caption_px = CAPTION_PX if captions else 0
     rows = [range(start, min(start + columns, len(pictures))) for start in range(0, len(pictures), columns)]
     widths = [max(pictures[i].width for i in range(column, len(pictures), columns)) for column in range(columns)]
     heights = [max(pictures[i].height for i in row) for row in rows]
-    size = sum(widths) + GAP_PX * (columns - 1), sum(heights) + caption_px * len(rows)
+    size = sum(widths) + gap_px * (columns - 1), sum(heights) + caption_px * len(rows)
     whole = Image.new("RGB", size, PAPER)
     draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=FONT_PX)
     top = 0
@@ -67,7 +69,7 @@ def grid(pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, colum
             if captions:
                 draw.text((left + FONT_PX // 2, top + CAPTION_PX // 2), captions[i], INK, font, anchor="lm")
             whole.paste(pictures[i], (left, top + caption_px))
-            left += width + GAP_PX
+            left += width + gap_px
         top += caption_px + height
     return whole
 

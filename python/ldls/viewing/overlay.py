@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
 
 from ldls.errors import ParameterError
-from ldls.masks import InstanceMask, InstanceMasks
+from ldls.masks import InstanceMasks
 from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView
@@ -22,15 +21,6 @@ WIDTH_PX = 1800
 """Width of a picture."""
 BACKGROUND: Colour = (225, 225, 225)
 HALO: Colour = (15, 15, 20)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Outline:
-    """A mask to be drawn, with its name if it has one."""
-
-    mask: InstanceMask
-    colour: Colour
-    name: str | None
 
 
 def overlay(
@@ -71,45 +61,45 @@ def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) 
         InputError: The image has not the size of the masks.
     """
     colours = as_tuples(instance_colours(masks.categories.tolist()))
-    outlines = [
-        Outline(mask=mask, colour=colour, name=f"{mask.name} {mask.score:.2f}")
-        for mask, colour in zip(masks, colours, strict=True)
-    ]
+    names = [f"{mask.name} {mask.score:.2f}" for mask in masks]
     image = image_like(image, masks.image_size)
-    return _with_tags(*_with_masks(image, outlines, WIDTH_PX / image.shape[1]))
+    picture, tags, covered = _with_masks(image, masks, colours, names, WIDTH_PX / image.shape[1])
+    draw_tags(picture, tags, covered, _pen_px(picture))
+    return picture
 
 
 def overlay_of(shown: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
     """The picture of one camera's image, marked points with a white rim."""
-    with_points = set(shown.labels.tolist())
-    outlines = [
-        Outline(
-            mask=mask,
-            colour=shown.colours[label - 1],
-            name=shown.names[label - 1] if label in with_points else None,
-        )
-        for mask, label in zip(seen.view.masks, seen.labels.tolist(), strict=True)
-    ]
+    labels, with_points = seen.labels.tolist(), set(shown.labels.tolist())
+    colours = [shown.colours[label - 1] for label in labels]
+    names = [shown.names[label - 1] if label in with_points else None for label in labels]
     scale = width_px / image.shape[1]
-    picture, tags, covered = _with_masks(image, outlines, scale)
-    return _with_tags(_with_points(picture, shown, seen, scale), tags, covered)
+    picture, tags, covered = _with_masks(image, seen.view.masks, colours, names, scale)
+    picture = _with_points(picture, shown, seen, scale)
+    draw_tags(picture, tags, covered, _pen_px(picture))
+    return picture
 
 
 def _with_masks(
-    image: NDArray[np.uint8], outlines: Iterable[Outline], scale: float
+    image: NDArray[np.uint8],
+    masks: InstanceMasks,
+    colours: Sequence[Colour],
+    names: Sequence[str | None],
+    scale: float,
 ) -> tuple[Image.Image, list[Tag], NDArray[np.bool_]]:
+    """The image with masks, a tag for each mask that has a name, and (H, W) True where masks are."""
     picture = _subdued(image, scale)
     covered = np.zeros(image.shape[:2], bool)
     tags = []
-    for outline in outlines:
-        top, left, height, width = outline.mask.bounding_box
-        crop = outline.mask.crop()
+    for mask, colour, name in zip(masks, colours, names, strict=True):
+        top, left, height, width = mask.bounding_box
+        crop = mask.crop()
         box = (round(scale * left), round(scale * top), round(scale * (left + width)), round(scale * (top + height)))
         if height:
-            _draw_mask(picture, crop, outline.colour, (left, top), scale)
+            _draw_mask(picture, crop, colour, (left, top), scale)
         covered[top : top + height, left : left + width] |= crop
-        if outline.name is not None:
-            tags.append(Tag(outline.name, outline.colour, box))
+        if name is not None:
+            tags.append(Tag(name, colour, box))
     return picture, tags, covered
 
 
@@ -129,13 +119,8 @@ def _with_points(picture: Image.Image, shown: Shown, seen: SeenView, scale: floa
     return Image.fromarray(canvas)
 
 
-def _with_tags(picture: Image.Image, tags: Sequence[Tag], covered: NDArray[np.bool_]) -> Image.Image:
-    draw_tags(picture, tags, covered, _pen_px(picture))
-    return picture
-
-
 def _subdued(image: NDArray[np.uint8], scale: float) -> Image.Image:
-    """Return the image, enlarged, darker and nearly grey: colour belongs to the labels."""
+    """The image, scaled, darker and nearly grey: colour belongs to the labels."""
     picture = Image.fromarray(image)
     nearly_grey = Image.blend(picture.convert("L").convert("RGB"), picture, 0.3)
     darker = Image.blend(nearly_grey, Image.new("RGB", picture.size), 0.22)

@@ -30,8 +30,8 @@ Positions are in metres in the lidar frame, in single precision. Pixels are thos
 halves: u + 0.5, v + 0.5. A camera with a distorted lens stands in the 3D view as a pinhole without its distortion, for
 Rerun knows no other; points on its image are exact. Keypoint id 0 is background and 65535 out of view.
 
-Frames that are added have the timelines "frame" (0, 1, ...), "time" where they have stamps and "iteration" where a
-diffusion is recorded. Needs the extra `viz`.
+Frames that are added have the timelines "frame" (0, 1, ...), "time" where they have stamps, and "iteration" where
+their diffusion is recorded. Needs the extra `viz`.
 """
 
 from ldls.viewing.recording.blueprint import Contents, layout

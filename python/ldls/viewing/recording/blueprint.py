@@ -1,4 +1,4 @@
-"""How the viewer shows a recording at first."""
+"""The layout in which the viewer first shows a recording."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BEHIND_M, ABOVE_M, AHEAD_M = 8.0, 5.0, 15.0
 """Place of the eye and of the point that it looks at, seen from the first camera."""
 
 STEPS_PER_S = {"frame": 10.0, "iteration": 40.0}
-"""How fast timelines run; lidars turn ten times a second."""
+"""Speed of timelines; lidars turn ten times a second."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ def eye_behind(cameras: Sequence[Camera]) -> tuple[tuple[float, ...], tuple[floa
     """Place of an eye behind and above the first camera, and one ahead of it, in metres; None without cameras."""
     if not cameras:
         return None
-    pose = pinhole_of(cameras[0]).T_lidar_camera
+    _, pose = pinhole_of(cameras[0])
     middle, ahead, up = pose[:3, 3], pose[:3, 2], np.array([0.0, 0.0, 1.0])
     return _place(middle - BEHIND_M * ahead + ABOVE_M * up), _place(middle + AHEAD_M * ahead)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
@@ -18,28 +17,17 @@ from ldls.viewing.recording.stream import Entity, rerun
 PIXEL_CENTRE = 0.5
 """Rerun's pixel centres lie at halves, ours at whole numbers."""
 IMAGE_DISTANCE_M = 2.0
-"""How far before its camera an image stands in the 3D view."""
+"""Distance of an image from its camera in the 3D view."""
 JPEG_QUALITY = 85
 MASK_OPACITY = 0.4
 
 
-@dataclass(frozen=True, eq=False)
-class Pinhole:
-    """A pinhole camera in the lidar frame.
+def pinhole_of(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """K and T_lidar_camera of the pinhole with the projection of `camera`, exactly, where its lens is not distorted.
 
-    Attributes:
-        K: (3, 3) intrinsic matrix, upper triangular, of pixels whose centres lie at halves.
-        T_lidar_camera: (4, 4) pose: rigid transform from camera (x right, y down, z forward) to lidar coordinates.
-    """
-
-    K: NDArray[np.float64]
-    T_lidar_camera: NDArray[np.float64]
-
-
-def pinhole_of(camera: Camera) -> Pinhole:
-    """The pinhole with the projection of `camera`, exactly, where its lens is not distorted.
-
-    The last column of a projection K [I | t], as of KITTI's P2, and a rotation in it go to the pose.
+    K (3, 3) is upper triangular, of pixels whose centres lie at halves. T_lidar_camera (4, 4) is the pose: the rigid
+    transform from camera (x right, y down, z forward) to lidar coordinates. The last column of a projection K [I | t],
+    as of KITTI's P2, and a rotation in it go to the pose.
     """
     K, R = _upper_triangular_times_rotation(camera.projection[:, :3])
     T_pinhole_camera = np.eye(4)
@@ -47,22 +35,17 @@ def pinhole_of(camera: Camera) -> Pinhole:
     T_pinhole_camera[:3, 3] = np.linalg.solve(K, camera.projection[:, 3])
     K /= K[2, 2]
     K[:2] += PIXEL_CENTRE * K[2]
-    return Pinhole(K, np.asarray(np.linalg.inv(T_pinhole_camera @ camera.T_camera_lidar), np.float64))
+    return K, np.asarray(np.linalg.inv(T_pinhole_camera @ camera.T_camera_lidar), np.float64)
 
 
 def log_camera(entity: Entity, camera: Camera, image_size: tuple[int, int]) -> None:
     """Log pinhole and pose of a camera with images of (height, width)."""
     rr = rerun()
-    pinhole = pinhole_of(camera)
-    height, width = image_size
+    K, pose = pinhole_of(camera)
+    size, axes = image_size[::-1], rr.ViewCoordinates.RDF
     entity.log(
-        rr.Pinhole(
-            image_from_camera=pinhole.K,
-            resolution=[width, height],
-            camera_xyz=rr.ViewCoordinates.RDF,
-            image_plane_distance=IMAGE_DISTANCE_M,
-        ),
-        rr.Transform3D(translation=pinhole.T_lidar_camera[:3, 3], mat3x3=pinhole.T_lidar_camera[:3, :3]),
+        rr.Pinhole(image_from_camera=K, resolution=size, camera_xyz=axes, image_plane_distance=IMAGE_DISTANCE_M),
+        rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]),
     )
 
 

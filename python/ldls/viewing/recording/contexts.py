@@ -17,7 +17,7 @@ from ldls.categories import category_ids
 from ldls.errors import LimitError
 from ldls.labeling import Labeling
 from ldls.palette import BACKGROUND, Colour, category_colour
-from ldls.segmentation import Instance, Segmentation
+from ldls.segmentation import Segmentation
 from ldls.viewing.recording.stream import Entity, rerun
 
 OUT_OF_VIEW_COLOUR: Colour = (64, 64, 64)
@@ -29,13 +29,12 @@ CLEAR = (0, 0, 0, 0)
 
 
 class Names:
-    """Categories and instances that a recording has named below an entity."""
+    """Instances that a recording has named below an entity: one for each category, label and shade."""
 
     def __init__(self) -> None:
         """No names yet."""
-        self._categories: dict[int, str] = {}
-        self._instances: dict[tuple[int, int], tuple[str, Colour]] = {}
-        self._mask_ids: dict[tuple[int, int, Colour], int] = {}
+        # number on mask images, and name of the category
+        self._named: dict[tuple[int, int, Colour], tuple[int, str]] = {}
         self._logged: dict[str, int] = {}
 
     def add(self, result: Segmentation) -> None:
@@ -51,19 +50,20 @@ class Names:
                         f"{kind} {number}: recordings hold 0 to {GREATEST_ID}; number the categories anew, or leave "
                         "masks out with InstanceMasks.filter"
                     )
-        for instance, colour in _coloured(result):
-            self._categories.setdefault(instance.category, instance.name)
-            name = f"{instance.name} {instance.label}"
-            self._instances.setdefault((instance.category, instance.label), (name, colour))
-            self._number(instance, colour)
+        for key, instance in zip(_keys(result), result.instances, strict=True):
+            if key not in self._named:
+                taken = {number for number, _ in self._named.values()}
+                number = instance.label if instance.label not in taken else max(taken) + 1
+                if number > GREATEST_ID:
+                    raise LimitError(f"masks: one recording names at most {GREATEST_ID} instances; begin another")
+                self._named[key] = number, instance.name
 
     def mask_ids(self, result: Segmentation) -> NDArray[np.uint16]:
         """(M + 1,) class id of the masks of each label of a result that was added, 0 for 0.
 
         It is the label, unless an earlier frame used that number for another object.
         """
-        ids = [self._mask_ids[i.label, i.category, colour] for i, colour in _coloured(result)]
-        return np.array([0, *ids], np.uint16)
+        return np.array([0, *(self._named[key][0] for key in _keys(result))], np.uint16)
 
     def log_of_points(self, entity: Entity) -> None:
         """Log the context of points: categories as classes, the instances of each as its keypoints."""
@@ -74,40 +74,32 @@ class Names:
         self._log(entity, self._of_masks)
 
     def _log(self, entity: Entity, context: Callable[[], Any]) -> None:
-        n_names = len(self._categories) + len(self._instances) + len(self._mask_ids)
         # names are only ever added: as many are the same
-        if self._logged.get(entity.path) != n_names:
+        if self._logged.get(entity.path) != len(self._named):
             entity.stream.log_context(entity, context())
-            self._logged[entity.path] = n_names
+            self._logged[entity.path] = len(self._named)
 
     def _of_points(self) -> Any:  # noqa: ANN401
         rr = rerun()
         nothing = [rr.AnnotationInfo(0, "background", BACKGROUND)]
         nothing += [rr.AnnotationInfo(OUT_OF_VIEW_ID, "out of view", OUT_OF_VIEW_COLOUR)]
         classes = [rr.ClassDescription(info=nothing[0], keypoint_annotations=nothing)]
-        for category, name in self._categories.items():
-            own = [rr.AnnotationInfo(m, *named) for (of, m), named in self._instances.items() if of == category]
-            info = rr.AnnotationInfo(category, name, category_colour(category))
-            classes.append(rr.ClassDescription(info=info, keypoint_annotations=own))
+        names: dict[int, str] = {}
+        instances: dict[int, dict[int, Any]] = {}
+        for (category, label, colour), (_, name) in self._named.items():
+            names.setdefault(category, name)
+            info = rr.AnnotationInfo(label, f"{name} {label}", colour)
+            instances.setdefault(category, {}).setdefault(label, info)
+        for category, own in instances.items():
+            info = rr.AnnotationInfo(category, names[category], category_colour(category))
+            classes.append(rr.ClassDescription(info=info, keypoint_annotations=list(own.values())))
         return rr.AnnotationContext(classes)
 
     def _of_masks(self) -> Any:  # noqa: ANN401
         rr = rerun()
-        infos = [
-            rr.AnnotationInfo(number, self._instances[category, label][0], colour)
-            for (label, category, colour), number in self._mask_ids.items()
-        ]
+        named = self._named.items()
+        infos = [rr.AnnotationInfo(n, f"{name} {label}", colour) for (_, label, colour), (n, name) in named]
         return rr.AnnotationContext([rr.AnnotationInfo(0, "background", CLEAR), *infos])
-
-    def _number(self, instance: Instance, colour: Colour) -> None:
-        key = (instance.label, instance.category, colour)
-        if key in self._mask_ids:
-            return
-        taken = set(self._mask_ids.values())
-        number = instance.label if instance.label not in taken else max(taken) + 1
-        if number > GREATEST_ID:
-            raise LimitError(f"masks: one recording names at most {GREATEST_ID} instances; begin another")
-        self._mask_ids[key] = number
 
 
 def log_truth_context(entity: Entity, truth: Labeling) -> NDArray[np.uint8]:
@@ -138,6 +130,6 @@ def fields_of_points(result: Segmentation, labels: NDArray[np.int32]) -> dict[st
     }
 
 
-def _coloured(result: Segmentation) -> list[tuple[Instance, Colour]]:
-    colours = palette.as_tuples(palette.instance_colours(instance.category for instance in result.instances))
-    return list(zip(result.instances, colours, strict=True))
+def _keys(result: Segmentation) -> list[tuple[int, int, Colour]]:
+    colours = palette.as_tuples(palette.instance_colours(each.category for each in result.instances))
+    return [(each.category, each.label, colour) for each, colour in zip(result.instances, colours, strict=True)]

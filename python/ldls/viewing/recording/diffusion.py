@@ -1,4 +1,4 @@
-"""How likelihoods spread through the point cloud, product by product, in a recording."""
+"""The spreading of likelihoods through the point cloud, product by product, in a recording."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ldls.explaining import rebuild
 from ldls.palette import BACKGROUND
 from ldls.segmentation import Segmentation
 from ldls.viewing.recording.contexts import Names, fields_of_points, label_colours
-from ldls.viewing.recording.entities import POINT_PX
+from ldls.viewing.recording.entities import log_points
 from ldls.viewing.recording.stream import Entity, rerun
 
 TIMELINE = "iteration"
@@ -25,13 +25,7 @@ OF_CONVERGED = 200
 
 
 def log_diffusion(root: Entity, names: Names, result: Segmentation, every: int) -> None:
-    """Log likelihoods after every so many products below `root`; `Recording.log_diffusion` has more.
-
-    Raises:
-        ParameterError: `every` is less than 1.
-        LimitError: A category id is greater than Rerun's ids.
-        ImportError: The extra `viz` is not installed.
-    """
+    """Log likelihoods after every so many products below `root`, as `Recording.log_diffusion` says."""
     if not every >= 1:
         raise ParameterError(f"every: got {every}, expected at least 1")
     rr = rerun()
@@ -41,8 +35,7 @@ def log_diffusion(root: Entity, names: Names, result: Segmentation, every: int) 
     names.log_of_points(root)
     points, stream = root / "points", root.stream.rerun
     stream.set_time(TIMELINE, sequence=0)
-    xyz = result.points[result.in_view, :3].astype(np.float32)
-    points.log(rr.Points3D(xyz, radii=rr.Radius.ui_points(POINT_PX), show_labels=False))
+    log_points(points, result.points[result.in_view])
     for iteration, z in _steps(result, every):
         stream.set_time(TIMELINE, sequence=iteration)
         fields = fields_of_points(result, z.argmax(axis=1).astype(np.int32))

@@ -37,12 +37,7 @@ def log_result(
     truth: Labeling | None,
     title: str,
 ) -> None:
-    """Log a segmentation below `root`, whose names are `names`; `Recording.log_result` has more.
-
-    Raises:
-        InputError: An image has no camera or another size than its masks, or there is not a true label for each point.
-        LimitError: A category id is greater than Rerun's ids.
-    """
+    """Log a segmentation below `root`, where `names` are given, as `Recording.log_result` says."""
     cameras = camera_names(result.views)
     for name in images:
         if name not in cameras:
@@ -51,9 +46,9 @@ def log_result(
     root.log(rerun().ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     names.log_of_points(root)
     finite, seen_by_any = finite_rows(result.points), result.in_view
-    _log_points(root / "points", result.points[finite], **fields_of_points(result, result.labels[finite]))
+    log_points(root / "points", result.points[finite], **fields_of_points(result, result.labels[finite]))
     direct = fields_of_points(result, result.direct_labels[seen_by_any])
-    _log_points(root / "points" / "direct", result.points[seen_by_any], **direct)
+    log_points(root / "points" / "direct", result.points[seen_by_any], **direct)
     _log_object_boxes(root / "boxes", result)
     if truth is not None:
         _log_truth(root / "truth", result.points, truth)
@@ -75,12 +70,7 @@ def log_result(
 
 
 def log_frame(root: Entity, frame: Frame) -> None:
-    """Log a frame without masks below `root`; `Recording.log_frame` has more.
-
-    Raises:
-        InputError: There is not a true label for each point.
-        LdlsError: An image cannot be read.
-    """
+    """Log a frame without masks below `root`, as `Recording.log_frame` says."""
     rr = rerun()
     radius = rr.Radius.ui_points(POINT_PX)
     root.log(rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -100,6 +90,13 @@ def log_frame(root: Entity, frame: Frame) -> None:
         log_pixels(place / "image" / "points", uv_px, colors=colours, radii=radius)
 
 
+def log_points(entity: Entity, points: Points, **fields: NDArray[Any]) -> None:
+    """Log points (n, >= 3), and their colours, class ids and the like as `rerun.Points3D` has them."""
+    rr = rerun()
+    xyz, radius = points[:, :3].astype(np.float32), rr.Radius.ui_points(POINT_PX)
+    entity.log(rr.Points3D(xyz, radii=radius, show_labels=False, **fields))
+
+
 def _log_truth(entity: Entity, points: Points, truth: Labeling) -> None:
     """Log points (N, >= 3) by their true class, and a box around each true instance."""
     if len(truth) != len(points):
@@ -107,7 +104,7 @@ def _log_truth(entity: Entity, points: Points, truth: Labeling) -> None:
     colours = log_truth_context(entity, truth)
     rows = finite_rows(points)
     classes = truth.classes[rows].astype(np.uint16)
-    _log_points(entity, points[rows], colors=colours[classes], class_ids=classes)
+    log_points(entity, points[rows], colors=colours[classes], class_ids=classes)
     rows = rows[(truth.instances[rows] > 0) & (truth.classes[rows] > 0)]
     pairs, owner = np.unique([truth.classes[rows], truth.instances[rows]], axis=1, return_inverse=True)
     xyz = points[rows, :3].astype(np.float64)
@@ -145,12 +142,6 @@ def _log_boxes(entity: Entity, boxes: Sequence[OrientedBox], **fields: Any) -> N
             **fields,
         )
     )
-
-
-def _log_points(entity: Entity, points: Points, **fields: NDArray[Any]) -> None:
-    rr = rerun()
-    xyz, radius = points[:, :3].astype(np.float32), rr.Radius.ui_points(POINT_PX)
-    entity.log(rr.Points3D(xyz, radii=radius, show_labels=False, **fields))
 
 
 def _log_statistics(entity: Entity, result: Segmentation) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 PORT = 9876
-"""Where viewers listen."""
+"""The port on which viewers listen."""
 ANSWER_S = 1.0
 
 
