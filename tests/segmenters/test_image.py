@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from ldls.errors import DtypeError, ShapeError
-from ldls.segmenters.image import check_image
+from ldls.segmenters.segmenter import check_image
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 
 from ldls import _ldls
-from ldls.batch.frame_work import FrameWork
+from ldls.batch.frame_work import FrameWork, Outcome
 from ldls.batch.local import run_local
-from ldls.batch.outcome import Outcome
 from ldls.batch.ray_engine import RayCluster, run_ray
 from ldls.errors import ParameterError
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ldls.batch.mask_files import MaskFiles
-from ldls.batch.outcome import Outcome
 from ldls.batch.plan import file_name
 from ldls.batch.settings import PICTURE, RunSettings, fill
 from ldls.datasets import CameraImage, Frame, Source
@@ -25,6 +24,19 @@ from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
 from ldls.view import View
 from ldls.viewing import overlay, save_picture
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A frame that is finished, well or not.
+
+    Attributes:
+        record: Its line of the journal: `frame`, and `files` with their sizes, `inputs` and `objects`, or `error`.
+        seconds: Time that each stage took.
+    """
+
+    record: Mapping[str, Any]
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
 
 class StageError(Exception):

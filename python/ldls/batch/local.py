@@ -13,8 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from queue import Empty, Queue
 
-from ldls.batch.frame_work import FrameWork, StageError, Work
-from ldls.batch.outcome import Outcome
+from ldls.batch.frame_work import FrameWork, Outcome, StageError, Work
 
 READERS = 2
 WRITERS = 2

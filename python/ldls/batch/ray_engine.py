@@ -19,9 +19,8 @@ from typing import Any
 
 from ldls import _ldls
 from ldls._optional import require
-from ldls.batch.frame_work import FrameWork
+from ldls.batch.frame_work import FrameWork, Outcome
 from ldls.batch.lock import LOCK_NAME
-from ldls.batch.outcome import Outcome
 from ldls.batch.ray_worker import RayWorker
 from ldls.errors import BatchError
 

@@ -6,9 +6,8 @@ import time
 from pathlib import Path
 
 from ldls import _ldls
-from ldls.batch.frame_work import FrameWork, Work
+from ldls.batch.frame_work import FrameWork, Outcome, Work
 from ldls.batch.lock import LOCK_NAME
-from ldls.batch.outcome import Outcome
 from ldls.errors import BatchError
 
 WAIT_S = 60.0

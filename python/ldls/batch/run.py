@@ -9,10 +9,9 @@ from os import PathLike
 from pathlib import Path
 
 from ldls.batch.engines import Engine, EngineOptions, open_engine
-from ldls.batch.frame_work import FrameWork
+from ldls.batch.frame_work import FrameWork, Outcome
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
-from ldls.batch.outcome import Outcome
 from ldls.batch.plan import check_names
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import Summary, count_objects, failures_of, write_failures

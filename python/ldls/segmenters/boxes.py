@@ -15,8 +15,7 @@ from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes
 from ldls.segmenters.crops import Crop, assemble
 from ldls.segmenters.grabcut import cut
-from ldls.segmenters.image import check_image
-from ldls.segmenters.segmenter import check_min_score
+from ldls.segmenters.segmenter import check_image, check_min_score
 
 
 class BoxSegmenter:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,15 +14,30 @@ from ldls._optional import require
 from ldls.errors import FileFormatError, ParameterError, ShapeError, UnsupportedFormatError
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes, coco_classes, contiguous_coco_classes, named_classes
-from ldls.segmenters.family import Family
-from ldls.segmenters.image import check_image
 from ldls.segmenters.mask_rcnn import MaskRcnn, ZooMaskRcnn, detection_outputs, zoo_masks
 from ldls.segmenters.onnx_file import OnnxFile, read_onnx
 from ldls.segmenters.onnx_graph import Signature, image_input
-from ldls.segmenters.segmenter import check_min_score
+from ldls.segmenters.segmenter import check_image, check_min_score
 from ldls.segmenters.yolo import YoloSeg, segmentation_outputs
 
 Names = Mapping[int, str]
+
+
+class Family(Protocol):
+    """Models whose inputs and outputs mean the same."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs that `masks` takes, in its order."""
+        ...
+
+    def tensor(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """(3, h, w) input for an image (H, W, 3), uint8 RGB."""
+        ...
+
+    def masks(self, outputs: list[NDArray[Any]], image_size: tuple[int, int], min_score: float) -> InstanceMasks:
+        """Instances of at least `min_score` in an image of (height, width) pixels, from the network's outputs."""
+        ...
 
 
 @dataclass(frozen=True)

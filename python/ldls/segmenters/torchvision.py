@@ -13,9 +13,8 @@ from ldls.errors import ParameterError
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import coco_classes
 from ldls.segmenters.crops import Crop, assemble
-from ldls.segmenters.image import check_image
 from ldls.segmenters.outputs import check_scores
-from ldls.segmenters.segmenter import check_min_score
+from ldls.segmenters.segmenter import check_image, check_min_score
 
 DEFAULT_MODEL = "maskrcnn_resnet50_fpn_v2"
 
