@@ -68,10 +68,9 @@ for turn_deg in (0.0, 1.0, 2.0):
     print(f"turned by {turn_deg:.0f} degrees: {100 * right.mean():.1f} % of the points in view are right")
 
 # From here on, everything works: ldls info, ldls run, ldls view, and Python.
-for number, frame in enumerate(source):
+for frame in source:
     (image,) = frame.images
-    (masks,) = source.read_masks(number)
-    result = ldls.segment(frame.points, masks, image.camera)
+    result = ldls.segment(frame.points, image.masks, image.camera)
     print(frame.name, result)
     save_pictures(out / f"seen-{frame.name}.png", result, image.read())
 print("now try: ldls info", out)

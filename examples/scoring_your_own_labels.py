@@ -30,7 +30,7 @@ def my_method(result: ldls.Segmentation) -> np.ndarray:
 
 
 def truth_of(frame: SceneFrame) -> Labeling:
-    """True labels; `ldls.evaluation.read_labeling` reads those of KITTI, SemanticKITTI, nuScenes and others."""
+    """True labels; `ldls.io.labels.read_labeling` reads those of KITTI, SemanticKITTI, nuScenes and others."""
     names = [ldls.categories.COCO_NAMES[thing.category] for thing in frame.objects]
     return Labeling.from_instance_labels(frame.instances, names)
 

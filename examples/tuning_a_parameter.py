@@ -21,7 +21,7 @@ CLASSES = ClassSet.kitti(("car", "person"))  # names of COCO, KITTI and other da
 
 
 def truth_of(frame: SceneFrame) -> Labeling:
-    """True labels of a simulated frame; yours may be read with `ldls.evaluation.read_labeling`."""
+    """True labels of a simulated frame; yours may be read with `ldls.io.labels.read_labeling`."""
     names = [ldls.categories.COCO_NAMES[thing.category] for thing in frame.objects]
     return Labeling.from_instance_labels(frame.instances, names)
 

@@ -5,7 +5,7 @@ from typer.testing import CliRunner
 
 import ldls
 from ldls.cli import app
-from ldls.evaluation import read_annotations
+from ldls.io.labels.annotations import read_annotations
 
 run = CliRunner().invoke
 FRAMES = ("000000", "000001", "000002", "000003")

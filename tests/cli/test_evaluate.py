@@ -6,7 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from ldls.cli import app
-from ldls.evaluation import Labeling, write_annotations, write_labeling
+from ldls.io.labels import write_annotations, write_labeling
+from ldls.labeling import Labeling
 
 run = CliRunner().invoke
 NAMES = ("background", "Car", "Pedestrian", "Van")

@@ -119,6 +119,29 @@ def test_truth_of_kitti_is_its_annotations_before_its_boxes(tmp_path):
     layouts.write_text(folder / "annotations/000000.txt", "1 Pedestrian\n" * 100)
     assert open_source(folder)[0].truth.counts()["Pedestrian"] == 100
     assert open_source(folder)[1].truth is None
+    with pytest.warns(LeftOutWarning, match="2 of 3 sweeps are left out: 2 no label_2"):
+        (frame,) = open_source(folder, truth="boxes")
+    assert frame.truth.counts()["Car"] > 40
+
+
+def test_with_stored_masks_kitti_needs_no_images(tmp_path):
+    folder = layouts.kitti_object(tmp_path)
+    pixels = np.zeros((1, *layouts.SIZE), bool)
+    masks = ldls.InstanceMasks.from_array(pixels, categories=[1], scores=[1])
+    (folder / "masks").mkdir()
+    for k in range(3):
+        ldls.save(masks, folder / f"masks/00000{k}.json")
+    image = open_source(folder, masks="masks")[0].images[0]
+    assert image.masks.image_size == image.camera.image_size == layouts.SIZE and image.read().shape[:2] == layouts.SIZE
+    shutil.rmtree(folder / "image_2")
+    image = open_source(folder, masks="masks")[0].images[0]
+    assert image.camera.image_size == layouts.SIZE
+    with pytest.raises(FileNotFoundError, match="image_2"):
+        image.read()
+    with pytest.raises(ldls.ParameterError, match="masks: got 'masks' for 2 cameras"):
+        open_source(folder, masks="masks", camera=(2, 3))
+    with pytest.raises(ldls.ParameterError, match="truth: got 'guess', expected true, false, annotations or boxes"):
+        open_source(folder, masks="masks", truth="guess")
 
 
 def test_nuscenes_contains_the_way_of_the_car_between_the_stamps(tmp_path):
@@ -151,10 +174,8 @@ def test_folder_has_distortion_stamps_and_masks(tmp_path):
     source = open_source(folder)
     assert source.names == ("a", "b") and source.stamps == (0.0, 0.1)
     assert source[0].images[0].camera.distortion.model == "plumb_bob"
-    (masks,) = source.read_masks(1)
-    assert masks.image_size == layouts.SIZE
-    with pytest.raises(FileNotFoundError):
-        source.read_masks(0)
+    assert source[1].images[0].masks.image_size == layouts.SIZE
+    assert source[0].images[0].masks is None
 
 
 def test_the_template_describes_a_folder(tmp_path):
@@ -215,8 +236,8 @@ def replaced(path, old, new):
                      ldls.CorruptFileError, "line 2: expected a time", id="raw with a broken stamp"),
         pytest.param("kitti-raw", without("image_02"), ldls.SourceError, "no folder image_02; found velodyne_points",
                      id="raw without images"),
-        pytest.param("kitti-odometry", with_text("times.txt", "0.0\n"), ldls.SourceError, "has 1 times",
-                     id="odometry with too few times"),
+        pytest.param("kitti-odometry", with_text("times.txt", "0.0\n"), ldls.SourceError, "has 1 stamps",
+                     id="odometry with too few stamps"),
         pytest.param("kitti-odometry", with_text("times.txt", "0.0\nnan\n0.2\n"), ldls.CorruptFileError,
                      "line 2: expected a time", id="odometry with a broken time"),
         pytest.param("kitti-odometry", with_text("calib.txt", f"P2: {layouts.row(layouts.P)}\n"),
@@ -283,7 +304,7 @@ def test_links_out_of_a_folder_are_refused_unless_they_are_allowed(tmp_path):
         pytest.param(layouts.kitti_object, {"kind": "kitti"}, ldls.ParameterError, "did you mean kitti-",
                      id="no such kind"),
         pytest.param(layouts.kitti_object, {"camara": 3}, ldls.ParameterError,
-                     "expected camera, split, truth; did you mean camera?", id="no such option"),
+                     "expected camera, split, masks, truth; did you mean camera?", id="no such option"),
         pytest.param(layouts.kitti_object, {"camera": 4}, ldls.ParameterError, "from 0 to 3", id="no such camera"),
         pytest.param(layouts.kitti_object, {"camera": (2, 2)}, ldls.ParameterError, "different", id="a camera twice"),
         pytest.param(lambda p: (layouts.kitti_raw(p), shutil.copytree(p / "2011_09_26/2011_09_26_drive_0001_sync",

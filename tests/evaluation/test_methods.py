@@ -9,7 +9,7 @@ from ldls.evaluation import methods
 
 def test_direct_projection_takes_the_label_of_the_nearest_pixel(small_scene):
     points, masks, camera = small_scene
-    labels = methods.direct_projection(points, masks, camera)
+    labels = ldls.segment(points, masks, camera).direct_labels
     rows, pixels = ldls.stages.project(points, camera, image_size=masks.image_size)
     expected = np.full(len(points), -1)
     for row, (u, v) in zip(rows, np.floor(pixels + 0.5).astype(int), strict=True):
@@ -37,8 +37,8 @@ def test_points_too_few_for_a_cluster_become_background(count):
 def test_every_method_labels_every_point(small_scene):
     pytest.importorskip("sklearn")
     points, masks, camera = small_scene
-    found = methods.compare(points, masks, camera)
     result = ldls.segment(points, masks, camera)
+    found = methods.compare(result)
     assert list(found) == ["direct projection", "project + DBSCAN", "diffusion, no outlier removal", "ldls"]
     np.testing.assert_array_equal(found[methods.FULL], result.labels)
     np.testing.assert_array_equal(found[methods.DIFFUSION], result.diffused_labels)

@@ -9,10 +9,11 @@ from typer.testing import CliRunner
 
 import ldls
 from ldls.cli import app
+from ldls.datasets import KittiObjectSource
+from ldls.errors import LeftOutWarning
 from ldls.evaluation import ClassSet, paper
-from ldls.evaluation.annotations import write_annotations
-from ldls.evaluation.kitti_frames import KittiFrames
 from ldls.evaluation.methods import CLUSTERING, DIFFUSION, DIRECT_PROJECTION, FULL
+from ldls.io.labels import write_annotations
 from ldls.labeling import Labeling
 
 pytest.importorskip("sklearn")
@@ -60,6 +61,10 @@ def runs_of(pixels):
     return np.diff(np.concatenate([[0], changes, [pixels.size]])).tolist()
 
 
+def frames_of(folder, truth="annotations"):
+    return KittiObjectSource(folder, masks="masks", truth=truth)
+
+
 def truth_of(points):
     near = points[:, 2] < 12
     instances = np.where(near, np.where(points[:, 0] < 0, 1, 2), 0).astype(np.int32)
@@ -70,27 +75,33 @@ def truth_of(points):
 def test_a_folder_yields_its_whole_frames(folder, small_scene):
     points, masks, _ = small_scene
     (folder / "velodyne/000009.bin").write_bytes(b"")
-    frames = KittiFrames(folder)
-    assert (len(frames), frames.names) == (2, ["000000", "000007"])
+    with pytest.warns(LeftOutWarning, match="1 of 3 sweeps are left out: 1 no calib and no masks and no annotations"):
+        frames = frames_of(folder)
+    assert (len(frames), frames.names) == (2, ("000000", "000007"))
     frame = frames[1]
     np.testing.assert_array_equal(frame.points[:, :3], points)
-    np.testing.assert_array_equal(frame.masks.to_array(), masks.to_array())
+    np.testing.assert_array_equal(frame.images[0].masks.to_array(), masks.to_array())
     assert frame.truth.counts() == {"background": 260, "Pedestrian": 120, "Car": 120}
 
 
 def test_a_folder_without_a_part_is_refused(folder):
     with pytest.raises(ldls.InputError, match="no folder label_2"):
-        KittiFrames(folder, boxes=True)
+        frames_of(folder, "boxes")
     shutil.rmtree(folder / "masks")
-    with pytest.raises(ldls.InputError, match="no folder masks, expected velodyne, calib, masks, annotations"):
-        KittiFrames(folder)
+    with pytest.raises(ldls.InputError, match="no folder masks; found annotations, calib, velodyne"):
+        frames_of(folder)
     (folder / "masks").mkdir()
     with pytest.raises(ldls.InputError, match="no frame has a file in each"):
-        KittiFrames(folder)
+        frames_of(folder)
+
+
+def test_a_frame_without_masks_or_truth_is_refused(folder):
+    with pytest.raises(ldls.InputError, match="frame 000000: has no truth; both are needed"):
+        next(paper.label(frames_of(folder, False)))
 
 
 def test_scores_are_those_of_the_labels(folder):
-    frames = KittiFrames(folder)
+    frames = frames_of(folder)
     labelled = list(paper.label(frames, iterations=(1, 200)))
     found = paper.score(labelled, classes=ClassSet.kitti(), ranges_m=(5, 20))
     for method, evaluation in found.methods.items():
@@ -110,7 +121,8 @@ def test_scores_are_those_of_the_labels(folder):
 
 
 def test_on_real_frames_each_step_of_the_method_gains(data_folder):
-    frames = KittiFrames(data_folder / "kitti/training", boxes=True)
+    with pytest.warns(LeftOutWarning, match="1 of 5 sweeps are left out: 1 no label_2"):
+        frames = frames_of(data_folder / "kitti/training", "boxes")
     found = paper.score(list(paper.label(frames, iterations=())), classes=ClassSet.kitti())
     for name in ("Car", "Pedestrian"):
         iou = {method: evaluation.semantic[name].iou for method, evaluation in found.methods.items()}

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.evaluation import read_kitti_objects
 from ldls.evaluation.realism import (
     LabelledCloud,
     labelled_by_boxes,
@@ -12,6 +11,7 @@ from ldls.evaluation.realism import (
     points_by_elevation,
     points_by_range,
 )
+from ldls.io.labels import read_kitti_objects
 from ldls.simulation import scene_frame
 from ldls.stages import project
 

@@ -170,7 +170,7 @@ def test_panoptic_files_have_a_limit(result, tmp_path):
 
 
 def test_nuscenes_files_are_what_the_evaluation_reads(result, tmp_path):
-    from ldls.evaluation import read_lidarseg, read_panoptic
+    from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
 
     for ending, read in (("_lidarseg.bin", read_lidarseg), ("_panoptic.npz", read_panoptic)):
         ldls.save(result, tmp_path / f"a{ending}")

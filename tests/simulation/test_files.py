@@ -8,7 +8,8 @@ from PIL import Image
 
 import ldls
 from ldls.errors import ParameterError
-from ldls.evaluation import ClassSet, read_annotations
+from ldls.evaluation import ClassSet
+from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import (
     SceneFrame,
     SegmenterErrors,

@@ -11,8 +11,8 @@ pytest.importorskip("embreex")
 import ldls
 from ldls.datasets import RosBag
 from ldls.errors import CalibrationError, ParameterError
-from ldls.evaluation import read_annotations
 from ldls.io.labelled_bag import LabelledBag
+from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import SegmenterErrors, robot_drive, write_robot_drive
 from ldls.simulation.lenses import LensModel, distorted, undistorted
 from ldls.simulation.robot_drive import ROBOT

@@ -36,18 +36,18 @@ def annotate(
 
     Example: ldls annotate kitti/training annotations
     """
-    from ldls.evaluation import read_kitti_objects, write_annotations
-    from ldls.evaluation.annotate import annotate as annotate_cloud
-    from ldls.evaluation.frame_inputs import FrameInputs
+    from ldls.cli.label_pairs import FrameFolders
+    from ldls.evaluation.annotation import annotate as annotate_cloud
+    from ldls.io.labels import read_kitti_objects, write_annotations
 
     labels = label_paths(training)
-    inputs = FrameInputs(points=training / "velodyne", calib=training / "calib", images=training / "image_2")
+    folders = FrameFolders(points=training / "velodyne", calib=training / "calib", images=training / "image_2")
     out.mkdir(parents=True, exist_ok=True)
     n_objects: Counter[str] = Counter()
     n_points: Counter[str] = Counter()
     n_ground = 0
     for path in progress(labels, len(labels), "annotating"):
-        points, camera = inputs.read_points(path.stem), inputs.read_camera(path.stem)
+        points, camera = folders.read_points(path.stem), folders.read_camera(path.stem)
         made = annotate_cloud(read_kitti_objects(path), points, camera, clean=clean)
         write_annotations(out / path.name, made.labeling)
         n_objects.update(made.objects())

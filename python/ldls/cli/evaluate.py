@@ -72,11 +72,10 @@ def evaluate(
 
     Example: ldls evaluate results label_2 --truth-format kitti-boxes --points velodyne --calib calib --out tables
     """
+    from ldls.cli.label_pairs import FrameFolders, read_pairs
     from ldls.evaluation import ClassSet
     from ldls.evaluation import evaluate as score
-    from ldls.evaluation.frame_inputs import FrameInputs
-    from ldls.evaluation.frames import read_pairs
-    from ldls.evaluation.pairing import pair_files
+    from ldls.io.labels.label_formats import pair_files
 
     scored = ClassSet.kitti(
         words(classes),
@@ -85,11 +84,11 @@ def evaluate(
         background=words(background),
     )
     formats = {"prediction_format": prediction_format, "truth_format": truth_format}
-    inputs = FrameInputs(points=points, calib=calib, images=images)
+    folders = FrameFolders(points=points, calib=calib, images=images)
     by_method = {}
     for method, path in {name or predictions.stem: predictions, **_named(beside or [])}.items():
         files, lacking = pair_files(path, truth, missing=missing.value, **formats)
-        pairs = progress(read_pairs(files, inputs=inputs, **formats), len(files), "scoring")
+        pairs = progress(read_pairs(files, folders=folders, **formats), len(files), "scoring")
         by_method[method] = score(pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
         if lacking:
             typer.echo(f"{method}: left out for want of their pair: {_frames(len(lacking))}")

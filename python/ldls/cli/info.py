@@ -80,7 +80,7 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
     from rich.markup import escape
     from rich.table import Table
 
-    from ldls.datasets.files import counts_of
+    from ldls.datasets.file_source import counts_of
     from ldls.datasets.inspection import classes_of
 
     table = Table(title=escape(str(source.path)), show_header=False)

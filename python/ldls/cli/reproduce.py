@@ -54,12 +54,12 @@ def reproduce(
 
     ldls reproduce kitti/training --truth boxes --out tables
     """
+    from ldls.datasets import KittiObjectSource
     from ldls.evaluation import ClassSet
-    from ldls.evaluation.kitti_frames import KittiFrames
     from ldls.evaluation.paper import label, score
     from ldls.params import Params
 
-    frames = KittiFrames(_folder(folder, suite), boxes=truth is Truth.BOXES)
+    frames = KittiObjectSource(_folder(folder, suite), masks="masks", truth=truth.value)
     labelled = progress(label(frames, params=Params(threads=threads)), len(frames), "labelling")
     found = score(list(labelled), classes=ClassSet.kitti(words(classes)))
     screen = console()
@@ -85,15 +85,15 @@ def _folder(folder: Path | None, suite: SuitePart | None) -> Path:
 
 
 def _tables(found: Experiment) -> dict[str, Table]:
-    from ldls.evaluation import curves, tables
+    from ldls.evaluation import tables
 
     return {
         "comparison": tables.semantic_table(found.methods),
         "instances": tables.instance_table(found.methods),
         "panoptic": tables.panoptic_table(found.methods),
         "ablation": tables.ablation_table(found.methods),
-        "range": curves.range_table(found.by_range),
-        "iterations": curves.iteration_table(found.by_iterations),
+        "range": tables.range_table(found.by_range),
+        "iterations": tables.iteration_table(found.by_iterations),
     }
 
 

@@ -6,35 +6,33 @@ import glob
 import math
 import re
 from dataclasses import replace
-from functools import partial
 from os import PathLike
 from pathlib import Path, PurePath
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.datasets.files import whole_frames
+from ldls.datasets.file_source import FileSource, check_truth, image_from_file
 from ldls.datasets.folder_description import FILE, CameraDescription, read_description, template
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.datasets.truth import of_points
 from ldls.errors import CorruptFileError, ParameterError, SourceError
-from ldls.evaluation import Labeling, read_labeling
 from ldls.io import read_camera, read_masks, read_points
 from ldls.io.files import read_lines, strictly_below
-from ldls.io.images import read_image, read_image_size
-from ldls.masks import InstanceMasks
+from ldls.io.images import read_image_size
+from ldls.io.labels.label_formats import read_labeling
+from ldls.labeling import Labeling
 
 __all__ = ["FolderSource", "template"]
 
 FRAME = "{frame}"
 
 
-class FolderSource:
+class FolderSource(FileSource):
     """Frames of a folder that an ldls.toml describes; `template()` has every key.
 
     Attributes:
         kind: "folder".
         path: Folder of ldls.toml.
-        names: What {frame} stands for, sorted.
+        names: Values of {frame}, sorted.
         stamps: Times of the sweeps in seconds; None for each without a file of stamps.
         left_out: What frames lack that have only some of their files, by name.
     """
@@ -47,8 +45,8 @@ class FolderSource:
 
         Args:
             path: The description, or the folder of ldls.toml.
-            allow_outside: Whether paths may be absolute or lead out of the folder.
-            truth: Whether frames have their truth, where the description names it.
+            allow_outside: Allow paths that are absolute or lead out of the folder.
+            truth: Give frames their truth, where the description names it.
 
         Raises:
             ParameterError: A key is unknown, missing, or of another type.
@@ -58,16 +56,12 @@ class FolderSource:
             FileFormatError: The description or a file of stamps is broken.
             FileNotFoundError: There is no description, or a file that it names is not there.
         """
-        file = _description_in(Path(path))
-        self.path = file.parent
-        self._file, self._allow_outside = file, allow_outside
-        self._described = read_description(file)
+        self._file = _description_in(Path(path))
+        self.path, self._allow_outside = self._file.parent, allow_outside
+        self._described = read_description(self._file)
         self._cameras = self._described.cameras
-        self._points = self._find(self._described.points)
-        self._images = {name: self._find(each.images) for name, each in self._cameras.items()}
-        images = {f"cameras.{name}": files for name, files in self._images.items()}
-        frames = whole_frames(self.path, {"points": self._points, **images})
-        self.names, self.left_out = frames.names, frames.left_out
+        images = {f"cameras.{name}": self._find(each.images) for name, each in self._cameras.items()}
+        super().__init__(self.path, {"points": self._find(self._described.points), **images}, self._cameras)
         self.stamps = self._read_stamps(self._described.stamps)
         self._image_stamps = {name: self._read_stamps(each.stamps) for name, each in self._cameras.items()}
         self._truth = truth
@@ -76,21 +70,12 @@ class FolderSource:
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Whether `path` is a folder with an ldls.toml, or a TOML file."""
+        """True for a folder with an ldls.toml, and for a TOML file."""
         return _description_in(path).suffix == ".toml" and _description_in(path).is_file()
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    @property
-    def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame."""
-        return tuple(self._cameras)
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
-        name = self.names[index]
-        return (self._file, self._points[name], *(files[name] for files in self._images.values()))
+        return (self._file, *super().files(index))
 
     def __getitem__(self, index: int) -> Frame:
         name = self.names[index]
@@ -103,27 +88,14 @@ class FolderSource:
             truth=self._read_truth(name, points),
         )
 
-    def read_masks(self, index: int) -> tuple[InstanceMasks, ...]:
-        """The stored masks of a frame, one for each camera.
-
-        Raises:
-            SourceError: The description names no masks of a camera.
-            MaskError: The masks are broken.
-            FileNotFoundError: A file is missing.
-        """
-        name = self.names[index]
-        missing = [camera for camera, each in self._cameras.items() if each.masks is None]
-        if missing:
-            raise SourceError(f'{self._file}: names no masks of {", ".join(missing)}; add masks = "..."')
-        return tuple(read_masks(self._one(each.masks or "", name)) for each in self._cameras.values())
-
     def _image(self, camera: str, index: int) -> CameraImage:
-        name = self.names[index]
-        path = self._images[camera][name]
-        made = self._camera(self._cameras[camera], name)
+        name, described = self.names[index], self._cameras[camera]
+        path = self._parts[f"cameras.{camera}"][name]
+        made = self._camera(described, name)
         made = made if made.image_size is not None else replace(made, image_size=read_image_size(path))
-        stamp = self._image_stamps[camera][index]
-        return CameraImage(name=camera, camera=made, read=partial(read_image, path), stamp=stamp, path=path)
+        stored = None if described.masks is None else self._one(described.masks, name)
+        masks = None if stored is None or not stored.exists() else read_masks(stored)
+        return image_from_file(camera, path, made, stamp=self._image_stamps[camera][index], masks=masks)
 
     def _camera(self, each: CameraDescription, name: str) -> Camera:
         if each.inline is not None:
@@ -138,7 +110,7 @@ class FolderSource:
         path = self._one(pattern, name)
         if not path.exists():
             return None
-        return of_points(read_labeling(path, format=self._described.truth_format), points, path)
+        return check_truth(read_labeling(path, format=self._described.truth_format), points, path)
 
     def _read_stamps(self, pattern: str | None) -> tuple[float | None, ...]:
         if pattern is None:
@@ -151,7 +123,7 @@ class FolderSource:
         return tuple(stamps[name] for name in self.names)
 
     def _find(self, pattern: str) -> dict[str, Path]:
-        """Files of a pattern by what {frame} stands for in their paths."""
+        """Files of a pattern by the value of {frame} in their paths."""
         if FRAME not in pattern:
             raise ParameterError(
                 f"{self._file}: {pattern!r} has no {FRAME}, expected a path such as 'lidar/{FRAME}.bin'"
@@ -160,8 +132,8 @@ class FolderSource:
         pattern = PurePath(pattern).as_posix()
         before, *after = (re.escape(part) for part in pattern.split(FRAME))
         shape = re.compile(before + "(?P<frame>[^/]+)" + "(?P=frame)".join(after))
-        found = glob.glob(glob.escape(pattern).replace(FRAME, "*"), root_dir=self.path)  # noqa: PTH207 - absolute ones
-        names = {matched["frame"]: path for path in found if (matched := shape.fullmatch(Path(path).as_posix()))}
+        paths = glob.glob(glob.escape(pattern).replace(FRAME, "*"), root_dir=self.path)  # noqa: PTH207 - absolute ones
+        names = {matched["frame"]: path for path in paths if (matched := shape.fullmatch(Path(path).as_posix()))}
         return {name: self._safe(path) for name, path in sorted(names.items())}
 
     def _one(self, pattern: str, name: str) -> Path:

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-
-if TYPE_CHECKING:
-    from ldls.labeling import Labeling
+from ldls.labeling import Labeling
+from ldls.masks import InstanceMasks
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -27,6 +26,7 @@ class CameraImage:
         read: Reads the (H, W, 3) uint8 RGB pixels; only whoever needs them pays for them.
         stamp: Time at which it was taken, in seconds; None where the source does not say.
         path: Its file, where it has one.
+        masks: Instance masks of the image, where the source has them.
     """
 
     name: str
@@ -34,6 +34,7 @@ class CameraImage:
     read: Callable[[], NDArray[np.uint8]]
     stamp: float | None = None
     path: Path | None = None
+    masks: InstanceMasks | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

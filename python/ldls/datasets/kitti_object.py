@@ -12,23 +12,34 @@ from pathlib import Path
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.datasets.files import IMAGE_SUFFIXES, POINT_SUFFIXES, choose, find_files, whole_frames
+from ldls.datasets.file_source import (
+    IMAGE_SUFFIXES,
+    POINT_SUFFIXES,
+    FileSource,
+    check_truth,
+    choose,
+    find_files,
+    image_from_file,
+)
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.datasets.kitti_cameras import camera_numbers, image_from_file
-from ldls.datasets.truth import of_points
-from ldls.evaluation import label_by_boxes, read_annotations
-from ldls.io import read_camera, read_points
-from ldls.io.kitti_objects import read_kitti_objects
+from ldls.datasets.kitti_common import camera_numbers
+from ldls.errors import ParameterError
+from ldls.io import read_camera, read_masks, read_points
+from ldls.io.images import read_image_size
+from ldls.io.labels.annotations import read_annotations
+from ldls.io.labels.kitti_objects import read_kitti_boxes
 from ldls.labeling import Labeling
 
 SPLITS = ("training", "testing")
+TRUTHS = {"annotations": "annotations", "boxes": "label_2"}
+"""Folder of each kind of truth, the one that is taken first first."""
 
 
-class KittiObjectSource:
+class KittiObjectSource(FileSource):
     """Frames of KITTI's object data.
 
     Truth is that of the point annotations, else of the boxes, which hold some ground beside their objects; points
-    out of the first camera's view are then ignored.
+    out of the first camera's view are then ignored. With stored masks the images may be missing.
 
     Attributes:
         kind: "kitti-object".
@@ -47,7 +58,8 @@ class KittiObjectSource:
         *,
         camera: int | Sequence[int] = 2,
         split: str | None = None,
-        truth: bool = True,
+        masks: str | None = None,
+        truth: bool | str = True,
     ) -> None:
         """Look for the frames.
 
@@ -55,61 +67,62 @@ class KittiObjectSource:
             path: Folder of the frames, or its parent.
             camera: Number of the camera, 0 to 3, or several.
             split: "training" or "testing", if `path` is the parent of both.
-            truth: Whether frames have their truth, where it is there.
+            masks: Folder of stored masks beside the others, as "masks", with a `.json` a frame; of one camera.
+            truth: Give frames their truth, where it is there; "annotations" or "boxes": take the frames that have it.
 
         Raises:
             SourceError: A folder is missing, or no frame is whole.
-            ParameterError: There is no such camera.
+            ParameterError: There is no such camera or truth, or there are masks and several cameras.
         """
-        self.path = _training(Path(path), split)
-        self.cameras = camera_numbers(camera)
-        self._points = find_files(self.path / "velodyne", POINT_SUFFIXES)
-        self._calib = find_files(self.path / "calib", (".txt",))
-        self._images = {n: find_files(self.path / f"image_{n}", IMAGE_SUFFIXES) for n in self.cameras}
-        images = {f"image_{n}": files for n, files in self._images.items()}
-        frames = whole_frames(self.path, {"velodyne": self._points, "calib": self._calib, **images})
-        self.names, self.left_out = frames.names, frames.left_out
+        path = _training(Path(path), split)
+        self._numbers = {f"image_{n}": n for n in camera_numbers(camera)}
+        self._masks, self._truth = masks, truth
+        parts = {
+            "velodyne": find_files(path / "velodyne", POINT_SUFFIXES),
+            "calib": find_files(path / "calib", (".txt",)),
+        }
+        there = [name for name in self._numbers if masks is None or (path / name).is_dir()]
+        self._images = {name: find_files(path / name, IMAGE_SUFFIXES) for name in there}
+        if masks is None:
+            parts |= self._images
+        elif len(self._numbers) == 1:
+            parts[masks] = find_files(path / masks, (".json",))
+        else:
+            raise ParameterError(f"masks: got {masks!r} for {len(self._numbers)} cameras, expected one camera")
+        if isinstance(truth, str):
+            if truth not in TRUTHS:
+                raise ParameterError(f"truth: got {truth!r}, expected true, false, {' or '.join(TRUTHS)}")
+            parts[TRUTHS[truth]] = find_files(path / TRUTHS[truth], (".txt",))
+        super().__init__(path, parts, self._numbers)
         self.stamps: tuple[float | None, ...] = (None,) * len(self.names)
-        self._truth = truth
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Whether `path` looks like KITTI's object data."""
+        """True for a path that looks like KITTI's object data."""
         return any(_is_frames(folder) for folder in (path, *(path / split for split in SPLITS)))
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    @property
-    def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame."""
-        return tuple(f"image_{number}" for number in self.cameras)
-
-    def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from."""
-        name = self.names[index]
-        return (self._points[name], self._calib[name], *(files[name] for files in self._images.values()))
 
     def __getitem__(self, index: int) -> Frame:
         name = self.names[index]
         points = read_points(self._points[name])
-        images = tuple(self._image(name, number) for number in self.cameras)
-        truth = self._read_truth(name, points, images[0].camera) if self._truth else None
-        return Frame(name=name, points=points, images=images, truth=truth)
+        images = tuple(self._image(camera, name) for camera in self.camera_names)
+        return Frame(name=name, points=points, images=images, truth=self._read_truth(name, points, images[0].camera))
 
-    def _image(self, name: str, number: int) -> CameraImage:
-        calib = self._calib[name]
-        return image_from_file(
-            f"image_{number}",
-            self._images[number][name],
-            lambda size: read_camera(calib, format="kitti", camera=number, image_size=size),
-        )
+    def _image(self, camera: str, name: str) -> CameraImage:
+        masks = None if self._masks is None else read_masks(self._parts[self._masks][name])
+        path = self._images.get(camera, {}).get(name, self.path / camera / f"{name}.png")
+        size = read_image_size(path) if masks is None else masks.image_size
+        calib = read_camera(self._parts["calib"][name], format="kitti", camera=self._numbers[camera], image_size=size)
+        return image_from_file(camera, path, calib, masks=masks)
 
     def _read_truth(self, name: str, points: Points, camera: Camera) -> Labeling | None:
-        annotations, boxes = (self.path / folder / f"{name}.txt" for folder in ("annotations", "label_2"))
-        if annotations.exists():
-            return of_points(read_annotations(annotations), points, annotations)
-        return label_by_boxes(read_kitti_objects(boxes), points, camera) if boxes.exists() else None
+        wanted = [self._truth] if isinstance(self._truth, str) else [*TRUTHS] if self._truth else []
+        for kind in wanted:
+            path = self.path / TRUTHS[kind] / f"{name}.txt"
+            if path.exists() and kind == "boxes":
+                return read_kitti_boxes(path, points=points, camera=camera)
+            if path.exists():
+                return check_truth(read_annotations(path), points, path)
+        return None
 
 
 def _is_frames(path: Path) -> bool:

@@ -7,26 +7,31 @@ data/NNNNNNNNNN.{bin,png} and timestamps.txt. For truth, annotations/NNNNNNNNNN.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
-from ldls.datasets.files import IMAGE_SUFFIXES, POINT_SUFFIXES, check_folders, choose, find_files, whole_frames
+from ldls.datasets.file_source import (
+    IMAGE_SUFFIXES,
+    POINT_SUFFIXES,
+    FileSource,
+    check_folders,
+    check_truth,
+    choose,
+    find_files,
+    image_from_file,
+)
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.datasets.kitti_cameras import camera_numbers
-from ldls.datasets.truth import of_points
-from ldls.errors import CorruptFileError, SourceError
-from ldls.evaluation import read_annotations
+from ldls.datasets.kitti_common import camera_numbers, read_stamps
+from ldls.errors import SourceError
 from ldls.io import read_camera, read_points
-from ldls.io.files import read_lines
-from ldls.io.images import read_image
+from ldls.io.labels.annotations import read_annotations
 
 LIDAR = "velodyne_points"
 
 
-class KittiRawSource:
+class KittiRawSource(FileSource):
     """The frames of a drive.
 
     A frame has a sweep and an image of every camera; KITTI's drives lack some. Sweeps are KITTI's, undone of the
@@ -57,7 +62,7 @@ class KittiRawSource:
             path: Folder of the drive, or of its day.
             camera: Number of the camera, 0 to 3, or several as a ring; 2 is the left colour camera.
             drive: Name of the drive's folder, if `path` is that of a day with several.
-            truth: Whether frames have their truth, where it is there.
+            truth: Give frames their truth, where it is there.
 
         Raises:
             SourceError: A folder is missing, no frame is whole, or there are fewer stamps than frames.
@@ -65,35 +70,21 @@ class KittiRawSource:
             FileNotFoundError: The calibration of the day is missing.
             ParameterError: There is no such camera.
         """
-        self.path = _drive(Path(path), drive)
-        folders = {f"image_{n:02d}": n for n in camera_numbers(camera)}
-        check_folders(self.path, [LIDAR, *folders])
-        self._cameras = {name: read_camera(self.path.parent, camera=n) for name, n in folders.items()}
-        self._points = find_files(self.path / LIDAR / "data", POINT_SUFFIXES)
-        self._images = {name: find_files(self.path / name / "data", IMAGE_SUFFIXES) for name in folders}
-        frames = whole_frames(self.path, {LIDAR: self._points, **self._images})
-        self.names, self.left_out = frames.names, frames.left_out
-        self.stamps = _stamps(self.path / LIDAR, self.names)
-        self._image_stamps = {name: _stamps(self.path / name, self.names) for name in folders}
+        path = _drive(Path(path), drive)
+        cameras = {f"image_{n:02d}": n for n in camera_numbers(camera)}
+        check_folders(path, [LIDAR, *cameras])
+        self._cameras = {name: read_camera(path.parent, camera=n) for name, n in cameras.items()}
+        points = find_files(path / LIDAR / "data", POINT_SUFFIXES)
+        images = {name: find_files(path / name / "data", IMAGE_SUFFIXES) for name in cameras}
+        super().__init__(path, {LIDAR: points, **images}, cameras)
+        self.stamps = _stamps(path / LIDAR, self.names)
+        self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}
         self._truth = truth
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Whether `path` looks like a drive, or a day with drives."""
+        """True for a path that looks like a drive, or a day with drives."""
         return (path / LIDAR).is_dir() or bool(_drives(path))
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    @property
-    def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame."""
-        return tuple(self._cameras)
-
-    def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from."""
-        name = self.names[index]
-        return (self._points[name], *(files[name] for files in self._images.values()))
 
     def __getitem__(self, index: int) -> Frame:
         name = self.names[index]
@@ -105,18 +96,12 @@ class KittiRawSource:
             points=points,
             stamp=self.stamps[index],
             images=tuple(self._image(camera, index) for camera in self._cameras),
-            truth=of_points(read_annotations(annotations), points, annotations) if known else None,
+            truth=check_truth(read_annotations(annotations), points, annotations) if known else None,
         )
 
     def _image(self, camera: str, index: int) -> CameraImage:
-        path = self._images[camera][self.names[index]]
-        return CameraImage(
-            name=camera,
-            camera=self._cameras[camera],
-            read=partial(read_image, path),
-            stamp=self._image_stamps[camera][index],
-            path=path,
-        )
+        path = self._parts[camera][self.names[index]]
+        return image_from_file(camera, path, self._cameras[camera], stamp=self._image_stamps[camera][index])
 
 
 def _drives(path: Path) -> list[str]:
@@ -133,29 +118,9 @@ def _drive(path: Path, wanted: str | None) -> Path:
 
 
 def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:
-    """Time of each frame in seconds; a line of timestamps.txt is that of the frame of its number, and may be blank."""
-    path = folder / "timestamps.txt"
-    if not path.exists():
-        return (None,) * len(names)
-    lines = read_lines(path)
-    rows = [_number(folder, name) for name in names]
-    if len(lines) <= max(rows):
-        raise SourceError(f"{path}: has {len(lines)} stamps, expected one for each frame up to {names[-1]}")
-    return tuple(_seconds(path, row + 1, lines[row]) for row in rows)
+    return read_stamps(folder / "timestamps.txt", names, _seconds, example="2011-09-26 13:02:25.951199337")
 
 
-def _number(folder: Path, name: str) -> int:
-    if not name.isdecimal():
-        raise SourceError(f"{folder}: frame {name!r} is no number, which its line of timestamps.txt would be")
-    return int(name)
-
-
-def _seconds(path: Path, line: int, text: str) -> float | None:
-    if not text.strip():
-        return None
-    try:
-        return int(np.datetime64(text.strip(), "ns").astype(np.int64)) / 1e9
-    except ValueError:
-        raise CorruptFileError(
-            f"{path}, line {line}: expected a time such as 2011-09-26 13:02:25.951199337, got {text!r}"
-        ) from None
+def _seconds(line: str) -> float | None:
+    """Seconds since 1970; None for a blank line, which KITTI has for what was not taken."""
+    return int(np.datetime64(line.strip(), "ns").astype(np.int64)) / 1e9 if line.strip() else None

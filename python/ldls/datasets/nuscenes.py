@@ -7,7 +7,6 @@ FOLDER/lidarseg with their tables.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -16,15 +15,13 @@ import numpy as np
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets import nuscenes_tables as tables
-from ldls.datasets.files import counts_of, warn_left_out
+from ldls.datasets.file_source import check_truth, counts_of, image_from_file, warn_left_out
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.nuscenes_tables import Reading
-from ldls.datasets.truth import of_points
 from ldls.errors import SourceError
-from ldls.evaluation import read_lidarseg, read_panoptic
 from ldls.io import read_points
 from ldls.io.files import below
-from ldls.io.images import read_image
+from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
 from ldls.labeling import Labeling
 
 LIDAR = "LIDAR_TOP"
@@ -49,6 +46,7 @@ class NuScenesSource:
 
     kind = "nuscenes"
     looks_for = "v1.0-*/sample_data.json"
+    camera_names = CAMERAS
 
     def __init__(
         self,
@@ -64,7 +62,7 @@ class NuScenesSource:
             path: Folder of the data set.
             scene: Name of a scene, as "scene-0061"; all of them without it.
             version: Name of the tables' folder, as "v1.0-mini", if there are several.
-            truth: Whether frames have their truth, where it is there.
+            truth: Give frames their truth, where it is there.
 
         Raises:
             SourceError: A table is missing, no frame is whole, or there is no such scene.
@@ -93,16 +91,11 @@ class NuScenesSource:
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Whether `path` looks like nuScenes."""
+        """True for a path that looks like nuScenes."""
         return any(path.glob("v1.0-*/sample_data.json"))
 
     def __len__(self) -> int:
         return len(self.names)
-
-    @property
-    def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame."""
-        return CAMERAS
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
@@ -121,7 +114,6 @@ class NuScenesSource:
         )
 
     def _image(self, channel: str, taken: Reading, sweep: Reading) -> CameraImage:
-        path = self._file(taken.filename)
         sensor, lidar = self._sensors[taken.sensor], self._sensors[sweep.sensor]
         T_global_lidar = self._poses[sweep.pose] @ lidar.T_ego_sensor
         T_global_camera = self._poses[taken.pose] @ sensor.T_ego_sensor
@@ -130,15 +122,13 @@ class NuScenesSource:
             T_camera_lidar=np.linalg.inv(T_global_camera) @ T_global_lidar,
             image_size=taken.size,
         )
-        return CameraImage(
-            name=channel, camera=camera, read=partial(read_image, path), stamp=taken.stamp_us / 1e6, path=path
-        )
+        return image_from_file(channel, self._file(taken.filename), camera, stamp=taken.stamp_us / 1e6)
 
     def _read_truth(self, sweep: str, points: Points) -> Labeling | None:
         for name, read in TRUTHS.items():
             if sweep in self._truths[name]:
                 path = self._file(self._truths[name][sweep])
-                return of_points(read(path), points, path)
+                return check_truth(read(path), points, path)
         return None
 
     def _file(self, name: str) -> Path:
@@ -157,5 +147,5 @@ def _missing(path: Path, readings: Mapping[str, Mapping[str, Reading]]) -> dict[
 
 
 def _listed(path: Path, folders: Iterable[str]) -> set[str]:
-    found = [below(path, folder, place=f"{path}, tables") for folder in folders]
-    return {str(child.relative_to(path)) for folder in found if folder.is_dir() for child in folder.iterdir()}
+    inside = [below(path, folder, place=f"{path}, tables") for folder in folders]
+    return {str(child.relative_to(path)) for folder in inside if folder.is_dir() for child in folder.iterdir()}

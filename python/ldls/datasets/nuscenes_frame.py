@@ -11,7 +11,6 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -21,11 +20,12 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
+from ldls.datasets.file_source import image_from_file
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.errors import CorruptFileError, LdlsError
 from ldls.io import read_points
 from ldls.io.files import below
-from ldls.io.images import read_image, read_image_size
+from ldls.io.images import read_image_size
 from ldls.labeling import BACKGROUND, Labeling
 
 FILE = "frame.json"
@@ -64,7 +64,7 @@ class NuScenesFrameSource:
 
         Args:
             path: The file, or its folder.
-            truth: Whether the frame has its truth.
+            truth: Give the frame its truth.
 
         Raises:
             CorruptFileError: It is not such a file.
@@ -82,19 +82,15 @@ class NuScenesFrameSource:
             self._images = tuple(self._image(name, each) for name, each in frame["cameras"].items())
             self.stamps: tuple[float | None, ...] = (float(frame["timestamp"]),)
         self.names: tuple[str, ...] = (self._points.name.split(".")[0],)
+        self.camera_names = tuple(image.name for image in self._images)
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Whether `path` is a frame.json, or holds one."""
+        """True for a frame.json, and for a folder that holds one."""
         return described_in(path).name == FILE and described_in(path).is_file()
 
     def __len__(self) -> int:
         return len(self.names)
-
-    @property
-    def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame."""
-        return tuple(image.name for image in self._images)
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
@@ -115,9 +111,7 @@ class NuScenesFrameSource:
             T_camera_lidar=each["lidar_to_camera"],
             image_size=read_image_size(path),
         )
-        return CameraImage(
-            name=name, camera=camera, read=partial(read_image, path), stamp=float(each["timestamp"]), path=path
-        )
+        return image_from_file(name, path, camera, stamp=float(each["timestamp"]))
 
     def _path(self, name: str) -> Path:
         return below(self.path, name, place=str(self._file))
@@ -156,7 +150,7 @@ def label_by_upright_boxes(boxes: Sequence[Mapping[str, Any]], points: Points) -
 
 
 def points_in_upright_box(points: Points, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(N,) which points lie in the box x y z of its middle, length, width, height and yaw, its faces included."""
+    """(N,) True for points in the box x y z of its middle, length, width, height and yaw, its faces included."""
     centre, (length, width, height), yaw = numbers[:3], numbers[3:6], numbers[6]
     # infinite coordinates become NaN, which lies in no box
     with np.errstate(invalid="ignore"):

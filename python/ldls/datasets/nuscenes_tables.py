@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion
-from ldls.datasets.files import choose, some
+from ldls.datasets.file_source import choose, some
 from ldls.errors import CalibrationError, CorruptFileError, SourceError
 from ldls.io.json_rows import read_json_rows
 
@@ -67,8 +67,8 @@ def find_tables(path: Path, version: str | None) -> Path:
     """
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such folder")
-    found = sorted(table.parent.name for table in path.glob("v1.0-*/sample_data.json"))
-    tables = path / choose(path, "version", found, version)
+    versions = sorted(table.parent.name for table in path.glob("v1.0-*/sample_data.json"))
+    tables = path / choose(path, "version", versions, version)
     missing = [name for name in TABLES if not (tables / f"{name}.json").is_file()]
     if missing:
         there = some(sorted(table.name for table in tables.glob("*.json")))
@@ -91,8 +91,8 @@ def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
         name = names.get(row["scene_token"])
         if name is not None and scene in (None, name):
             samples[name].append((row["timestamp"], row["token"]))
-    in_order = sorted((sorted(found), name) for name, found in samples.items())
-    return {token: f"{name}_{number:03d}" for found, name in in_order for number, (_, token) in enumerate(found)}
+    in_order = sorted((sorted(own), name) for name, own in samples.items())
+    return {token: f"{name}_{number:03d}" for own, name in in_order for number, (_, token) in enumerate(own)}
 
 
 def read_sensors(tables: Path, channels: tuple[str, ...]) -> dict[str, CalibratedSensor]:
@@ -123,17 +123,17 @@ def read_readings(
     Raises:
         CorruptFileError: The table is broken.
     """
-    found: dict[str, dict[str, Reading]] = {token: {} for token in samples}
+    readings: dict[str, dict[str, Reading]] = {token: {} for token in samples}
     sizes: dict[tuple[int, int], tuple[int, int]] = {}
     own = {token: token for token in sensors}
     keys = ("token", "sample_token", "is_key_frame", "calibrated_sensor_token", "ego_pose_token", "filename",
             "timestamp", "height", "width")  # fmt: skip
     for row in _rows(tables, "sample_data", keys):
         sensor = own.get(row["calibrated_sensor_token"])
-        if not row["is_key_frame"] or sensor is None or row["sample_token"] not in found:
+        if not row["is_key_frame"] or sensor is None or row["sample_token"] not in readings:
             continue
         size = (row["height"] or 0, row["width"] or 0)
-        found[row["sample_token"]][sensors[sensor].channel] = Reading(
+        readings[row["sample_token"]][sensors[sensor].channel] = Reading(
             token=row["token"],
             filename=row["filename"],
             stamp_us=row["timestamp"],
@@ -141,7 +141,7 @@ def read_readings(
             pose=row["ego_pose_token"],
             size=sizes.setdefault(size, size),
         )
-    return found
+    return readings
 
 
 def read_poses(tables: Path, tokens: set[str]) -> dict[str, NDArray[np.float64]]:

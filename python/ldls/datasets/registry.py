@@ -1,4 +1,4 @@
-"""Every kind of source, and which one a path is."""
+"""Every kind of source, and the one that a path is."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class SourceClass(Protocol):
 
     Attributes:
         kind: Its name in the registry.
-        looks_for: What a path must have to be one, for messages.
+        looks_for: Files and folders by which a path is one, for messages.
     """
 
     kind: str
@@ -35,7 +35,7 @@ class SourceClass(Protocol):
         ...
 
     def recognises(self, path: Path) -> bool:
-        """Whether a path looks like one; reads nothing but names."""
+        """True for a path that looks like one; reads nothing but names."""
         ...
 
 
@@ -55,7 +55,7 @@ def open_source(
     path: str | PathLike[str],
     *,
     kind: str | None = None,
-    truth: bool = True,
+    truth: bool | str = True,
     **options: Any,  # noqa: ANN401
 ) -> Source:
     """The source of frames at a path.
@@ -63,7 +63,7 @@ def open_source(
     Args:
         path: A folder, or a file such as a bag.
         kind: One of `SOURCES`; by default the only one that recognises the path.
-        truth: Whether frames have their truth, where the source has any; it takes time to read.
+        truth: Give frames their truth, where the source has any; it takes time to read. A text names its kind.
         options: Those of the kind's class, as `camera` or `scene`.
 
     Raises:
@@ -90,11 +90,11 @@ def guess_kind(path: Path) -> str:
     Raises:
         SourceError: None does, or several do; the message lists the kinds and what they look for.
     """
-    found = [kind for kind, source in SOURCES.items() if source.recognises(path)]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        what = "; ".join(f"{kind} ({SOURCES[kind].looks_for})" for kind in found)
+    fitting = [kind for kind, source in SOURCES.items() if source.recognises(path)]
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        what = "; ".join(f"{kind} ({SOURCES[kind].looks_for})" for kind in fitting)
         raise SourceError(f"{path}: may be {what}; say which by kind= or --dataset")
     what = "; ".join(f"{kind} ({source.looks_for})" for kind, source in SOURCES.items())
     raise SourceError(f"{path}: is no source of frames; looked for {what}")

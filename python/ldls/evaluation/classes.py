@@ -1,4 +1,4 @@
-"""Which classes are scored, and what becomes of all others."""
+"""The classes that are scored, and what becomes of all others."""
 
 from __future__ import annotations
 
@@ -11,19 +11,31 @@ from numpy.typing import NDArray
 
 from ldls.categories import COCO_NAMES
 from ldls.errors import InputError, ParameterError
-from ldls.evaluation.vocabularies import (
-    KITTI,
-    NUSCENES,
-    SEMANTIC_KITTI,
-    SQUEEZESEG,
-    VOID,
-    synonyms,
-)
+from ldls.io.labels.kitti_objects import KITTI
+from ldls.io.labels.nuscenes_labels import NUSCENES
+from ldls.io.labels.semantic_kitti import SEMANTIC_KITTI
+from ldls.io.labels.squeezeseg import SQUEEZESEG
 from ldls.labeling import BACKGROUND, Labeling
 
 SITTING = "Person_sitting"
 LEFT_OUT: tuple[str, ...] = ("Van", "Cyclist", "Misc", "DontCare")
 """KITTI's classes that look so much like a scored one that neither finding nor missing them is an error."""
+
+VOID: tuple[str, ...] = ("unlabeled", "outlier", "noise", "vehicle.ego")
+"""Names under which a data set says that it does not know, or that the sensor saw its own car."""
+
+SYNONYMS: tuple[tuple[str, ...], ...] = (
+    ("Car", "car", "moving-car", "vehicle.car"),
+    ("Pedestrian", "pedestrian", "person", "moving-person",
+     *(name for name in NUSCENES.values() if name.startswith("human.pedestrian."))),
+    ("Cyclist", "cyclist", "bicyclist", "moving-bicyclist"),
+    ("Truck", "truck", "moving-truck", "vehicle.truck"),
+    ("Tram", "train", "on-rails", "moving-on-rails"),
+    ("bicycle", "vehicle.bicycle"),
+    ("motorcycle", "vehicle.motorcycle"),
+    ("bus", "moving-bus", "vehicle.bus.bendy", "vehicle.bus.rigid"),
+)  # fmt: skip
+"""Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +83,7 @@ class ClassSet:
 
         Args:
             names: The scored classes; any name of those vocabularies, or one of your own.
-            merge_sitting: Whether Person_sitting counts as Pedestrian; left out otherwise, unless it is scored.
+            merge_sitting: Count Person_sitting as Pedestrian; it is left out otherwise, unless it is scored.
             leave_out: Classes whose points in truth do not count; `LEFT_OUT`, less those scored, by default. Points
                 that a data set calls unlabeled are left out whatever this says.
             background: Names of your own that truth may hold and that are background; those of the vocabularies are
@@ -89,7 +101,7 @@ class ClassSet:
             raise ParameterError(f"leave_out: {clash} are scored too; score a class or leave it out")
         aliases = {alias: name for name in names for alias in _merged(name, merge_sitting) if alias not in names}
         wanted = LEFT_OUT if leave_out is None else leave_out
-        left_out = {alias for name in wanted for alias in synonyms(name)}
+        left_out = {alias for name in wanted for alias in _synonyms(name)}
         left_out |= {*VOID} | (set() if merge_sitting else {SITTING})
         left_out -= {*names, *aliases}
         others = (known | {*background}) - left_out - {*names, *aliases}
@@ -129,7 +141,7 @@ class ClassSet:
         return self.names.index(scored) + 1 if scored in self.names else 0
 
     def knows(self, name: str) -> bool:
-        """Whether truth may hold `name`."""
+        """True for a name that truth may hold."""
         return name == BACKGROUND or self.index(name) > 0 or name in self.left_out or name in self.background
 
     def _check_known(self, truth: Labeling) -> None:
@@ -153,8 +165,13 @@ def _distinct_instances(labeling: Labeling, classes: NDArray[np.int32]) -> NDArr
 
 
 def _merged(name: str, merge_sitting: bool) -> tuple[str, ...]:
-    group = synonyms(name)
+    group = _synonyms(name)
     return (*group, SITTING) if merge_sitting and "Pedestrian" in group else group
+
+
+def _synonyms(name: str) -> tuple[str, ...]:
+    """All names that mean the class `name`, itself among them."""
+    return next((group for group in SYNONYMS if name in group), (name,))
 
 
 def _known_names() -> set[str]:

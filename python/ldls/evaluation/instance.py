@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,29 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts
-from ldls.evaluation.overlaps import Overlaps, overlaps
 from ldls.evaluation.semantic import check_vocabulary
 from ldls.labeling import Labeling
 
 PAPER_THRESHOLDS = (0.5, 0.7)
+
+
+@dataclass(frozen=True, eq=False)
+class Overlaps:
+    """Overlaps of T true with P predicted segments.
+
+    Attributes:
+        truth_ids: (T,) numbers of the true segments, ascending.
+        prediction_ids: (P,) numbers of the predicted segments, ascending.
+        truth_points: (T,) int64: points of each true segment.
+        prediction_points: (P,) int64: points of each predicted segment.
+        iou: (T, P) float64: points in both over points in either.
+    """
+
+    truth_ids: NDArray[np.int32]
+    prediction_ids: NDArray[np.int32]
+    truth_points: NDArray[np.int64]
+    prediction_points: NDArray[np.int64]
+    iou: NDArray[np.float64]
 
 
 class InstanceScores:
@@ -53,10 +72,10 @@ class InstanceScores:
         """Count the instances of a frame; both labelings mapped to these classes."""
         check_vocabulary(self.names, prediction, truth)
         for name in self.names:
-            found = instance_overlaps(prediction, truth, name)
-            matched = best_matches(found)
+            overlap = instance_overlaps(prediction, truth, name)
+            matched = best_matches(overlap)
             for threshold in self.thresholds:
-                self._counts[name, threshold] += _count(found, matched, threshold, self.minimum_points)
+                self._counts[name, threshold] += _count(overlap, matched, threshold, self.minimum_points)
 
     def merge(self, other: InstanceScores) -> None:
         """Add the instances that `other` counted."""
@@ -70,6 +89,22 @@ class InstanceScores:
         return self._counts[key]
 
 
+def overlaps(prediction: NDArray[np.int32], truth: NDArray[np.int32]) -> Overlaps:
+    """Overlaps of the segments of `prediction` and `truth`, each (n,), where -1 is no segment."""
+    truth_ids, truth_rows = np.unique(truth, return_inverse=True)
+    prediction_ids, prediction_rows = np.unique(prediction, return_inverse=True)
+    shape = len(truth_ids), len(prediction_ids)
+    cells = truth_rows.reshape(-1) * shape[1] + prediction_rows.reshape(-1)
+    # the table has the points without a segment as well, so that its sums are whole segments
+    both = np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape)
+    true, predicted = truth_ids >= 0, prediction_ids >= 0
+    truth_points = both.sum(axis=1)[true]
+    prediction_points = both.sum(axis=0)[predicted]
+    both = both[true][:, predicted]
+    iou = both / (truth_points[:, None] + prediction_points[None, :] - both)
+    return Overlaps(truth_ids[true], prediction_ids[predicted], truth_points, prediction_points, iou)
+
+
 def instance_overlaps(prediction: Labeling, truth: Labeling, name: str) -> Overlaps:
     """Overlaps of the instances of the class `name`, by the points that count for instances."""
     k = truth.names.index(name)
@@ -79,21 +114,21 @@ def instance_overlaps(prediction: Labeling, truth: Labeling, name: str) -> Overl
     return overlaps(_segments(prediction, k, rows), _segments(truth, k, rows))
 
 
-def best_matches(found: Overlaps) -> NDArray[np.int64]:
+def best_matches(overlap: Overlaps) -> NDArray[np.int64]:
     """(T,) index of the predicted instance matched to each true one, -1 for none; the sum of IoUs is largest."""
-    matched = np.full(len(found.truth_ids), -1, np.int64)
-    if found.iou.any():
-        rows, columns = require("scipy.optimize", "eval").linear_sum_assignment(found.iou, maximize=True)
-        touching = found.iou[rows, columns] > 0
+    matched = np.full(len(overlap.truth_ids), -1, np.int64)
+    if overlap.iou.any():
+        rows, columns = require("scipy.optimize", "eval").linear_sum_assignment(overlap.iou, maximize=True)
+        touching = overlap.iou[rows, columns] > 0
         matched[rows[touching]] = columns[touching]
     return matched
 
 
-def matched_iou(found: Overlaps, matched: NDArray[np.int64]) -> NDArray[np.float64]:
+def matched_iou(overlap: Overlaps, matched: NDArray[np.int64]) -> NDArray[np.float64]:
     """(T,) IoU of each true instance with its match; 0 for none."""
     iou = np.zeros(len(matched))
     rows = np.flatnonzero(matched >= 0)
-    iou[rows] = found.iou[rows, matched[rows]]
+    iou[rows] = overlap.iou[rows, matched[rows]]
     return iou
 
 
@@ -109,9 +144,9 @@ def _segments(labeling: Labeling, k: int, rows: NDArray[np.intp]) -> NDArray[np.
     return np.where((labeling.classes[rows] == k) & (instances > 0), instances, -1).astype(np.int32)
 
 
-def _count(found: Overlaps, matched: NDArray[np.int64], threshold: float, minimum_points: int) -> Counts:
-    true = matched_iou(found, matched) >= threshold
-    counts = found.truth_points >= minimum_points
+def _count(overlap: Overlaps, matched: NDArray[np.int64], threshold: float, minimum_points: int) -> Counts:
+    true = matched_iou(overlap, matched) >= threshold
+    counts = overlap.truth_points >= minimum_points
     tp = int((true & counts).sum())
     # a true match with an instance too small to count takes its prediction out of the false positives
-    return Counts(tp, len(found.prediction_ids) - int(true.sum()), int(counts.sum()) - tp)
+    return Counts(tp, len(overlap.prediction_ids) - int(true.sum()), int(counts.sum()) - tp)

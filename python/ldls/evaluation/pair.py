@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.cloud import Points
 from ldls.errors import InputError, ShapeError
 from ldls.evaluation.classes import ClassSet
 from ldls.labeling import Labeling
@@ -58,3 +59,9 @@ class Pair:
         elif max_range_m is not None:
             raise InputError(f"frame {self.name}: max_range_m needs the points' ranges_m, got none")
         return Pair(self.name, classes.map(self.prediction), truth, self.ranges_m)
+
+
+def ranges_of(points: Points) -> NDArray[np.float64]:
+    """(N,) distances of the points from the lidar, in metres."""
+    distances: NDArray[np.float64] = np.linalg.norm(points[:, :3].astype(np.float64), axis=1)
+    return distances

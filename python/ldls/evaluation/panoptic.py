@@ -15,8 +15,7 @@ import numpy as np
 
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts, mean
-from ldls.evaluation.instance import check_minimum
-from ldls.evaluation.overlaps import overlaps
+from ldls.evaluation.instance import check_minimum, overlaps
 from ldls.evaluation.semantic import check_vocabulary
 from ldls.labeling import Labeling
 
@@ -29,7 +28,7 @@ class PanopticQuality:
 
     Attributes:
         counts: Segments found, invented and missed.
-        iou_sum: Sum of the IoUs of the segments found.
+        iou_sum: Sum of the IoUs of the segments overlap.
     """
 
     counts: Counts = field(default_factory=Counts)
@@ -97,12 +96,12 @@ class PanopticScores:
 def _quality(prediction: Labeling, truth: Labeling, k: int, minimum_points: int) -> PanopticQuality:
     theirs, ours = truth.classes == k, prediction.classes == k
     rows = np.flatnonzero((theirs | ours) & ~(truth.ignored | prediction.ignored))
-    found = overlaps(
+    overlap = overlaps(
         np.where(ours[rows], prediction.instances[rows], np.int32(-1)),
         np.where(theirs[rows], truth.instances[rows], np.int32(-1)),
     )
-    match = found.iou > MATCH_ABOVE
-    missed = ~match.any(axis=1) & (found.truth_points >= minimum_points)
-    invented = ~match.any(axis=0) & (found.prediction_points >= minimum_points)
+    match = overlap.iou > MATCH_ABOVE
+    missed = ~match.any(axis=1) & (overlap.truth_points >= minimum_points)
+    invented = ~match.any(axis=0) & (overlap.prediction_points >= minimum_points)
     counts = Counts(int(match.sum()), int(invented.sum()), int(missed.sum()))
-    return PanopticQuality(counts, float(found.iou[match].sum()))
+    return PanopticQuality(counts, float(overlap.iou[match].sum()))

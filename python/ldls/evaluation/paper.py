@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls._ldls import default_threads
+from ldls.datasets import Frame, Source
 from ldls.errors import InputError
 from ldls.evaluation.classes import ClassSet
-from ldls.evaluation.evaluate import Evaluation, evaluate
-from ldls.evaluation.frame_inputs import ranges_of
-from ldls.evaluation.kitti_frames import LabelledFrame
-from ldls.evaluation.methods import FULL, OUT_OF_VIEW, compare
-from ldls.evaluation.object_scores import ObjectScore, object_scores
-from ldls.evaluation.pair import Pair
+from ldls.evaluation.evaluation import Evaluation, evaluate
+from ldls.evaluation.methods import FULL, compare
+from ldls.evaluation.object_score import ObjectScore, object_scores
+from ldls.evaluation.pair import Pair, ranges_of
 from ldls.label_diffusion import segment
 from ldls.labeling import Labeling
 from ldls.params import Params
@@ -29,13 +27,13 @@ RANGES_M: tuple[float, ...] = (10, 15, 20, 25, 30, 40, 50, 60, 70)
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """What the methods score on the same frames.
+    """Scores of the methods on the same frames.
 
     Attributes:
         methods: Scores of each method over all points in view.
         by_range: Scores of the full method over the points up to each range in metres.
         by_iterations: Scores of the full method after each number of iterations.
-        objects: How well the full method found each true object.
+        objects: Score of the full method for each true object.
     """
 
     methods: Mapping[str, Evaluation]
@@ -46,7 +44,7 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class LabelledPairs:
-    """What the methods say of one frame, beside its truth, over the points in view.
+    """Labels of one frame by each method, beside its truth, of the points in view.
 
     Attributes:
         methods: By method.
@@ -57,22 +55,18 @@ class LabelledPairs:
     iterations: Mapping[int, Pair]
 
 
-class Frames(Protocol):
-    """Labelled frames by number."""
-
-    def __len__(self) -> int: ...
-    def __getitem__(self, at: int, /) -> LabelledFrame: ...
-
-
 def label(
-    frames: Frames, *, params: Params | None = None, iterations: Sequence[int] = ITERATIONS
+    frames: Source, *, params: Params | None = None, iterations: Sequence[int] = ITERATIONS
 ) -> Iterator[LabelledPairs]:
     """The labels of every method for each frame, in order, one frame a thread.
 
     Args:
-        frames: Frames with masks and truth.
+        frames: Frames whose first image has masks, and that have truth.
         params: Parameters of the diffusion; their threads are frames at a time.
-        iterations: Numbers of iterations after which the full method is asked too.
+        iterations: Numbers of iterations after which the labels of the full method are taken too.
+
+    Raises:
+        InputError: A frame has no masks or no truth.
     """
     params = params or Params()
     one_thread = replace(params, threads=1)
@@ -84,8 +78,8 @@ def score(labelled: Sequence[LabelledPairs], *, classes: ClassSet, ranges_m: Seq
     """The scores of every method over all frames.
 
     Args:
-        labelled: What `label` yields.
-        classes: What is scored.
+        labelled: The pairs that `label` yields.
+        classes: The scored classes.
         ranges_m: Maximum ranges for which the full method is scored.
 
     Raises:
@@ -100,29 +94,31 @@ def score(labelled: Sequence[LabelledPairs], *, classes: ClassSet, ranges_m: Seq
         methods={name: evaluate(pairs, classes=classes) for name, pairs in methods.items()},
         by_range={limit: evaluate(full, classes=classes, max_range_m=limit) for limit in ranges_m},
         by_iterations={count: evaluate(pairs, classes=classes) for count, pairs in after.items()},
-        objects=tuple(found for pair in full for found in object_scores(pair, classes=classes)),
+        objects=tuple(one for pair in full for one in object_scores(pair, classes=classes)),
     )
 
 
-def _label(frame: LabelledFrame, params: Params, iterations: Sequence[int]) -> LabelledPairs:
-    found = compare(frame.points, frame.masks, frame.camera, params=params)
-    in_view = np.flatnonzero(next(iter(found.values())) != OUT_OF_VIEW)
-    truth = _rows(frame.truth, in_view)
-    names = [mask.name for mask in frame.masks]
-    ranges_m = ranges_of(frame.points[in_view])
+def _label(frame: Frame, params: Params, iterations: Sequence[int]) -> LabelledPairs:
+    image = frame.images[0]
+    masks, camera = image.masks, image.camera
+    if masks is None or frame.truth is None:
+        raise InputError(f"frame {frame.name}: has no {'masks' if masks is None else 'truth'}; both are needed")
+    full = segment(frame.points, masks, camera, params=params)
+    truth = _rows(frame.truth, full.in_view)
+    names = [mask.name for mask in masks]
+    ranges_m = ranges_of(frame.points[full.in_view])
 
     def pair(labels: NDArray[np.int32]) -> Pair:
-        return Pair(frame.name, Labeling.from_instance_labels(labels[in_view], names), truth, ranges_m)
+        return Pair(frame.name, Labeling.from_instance_labels(labels[full.in_view], names), truth, ranges_m)
 
     def after(count: int) -> NDArray[np.int32]:
-        counted = replace(params, iterations=count)
-        return segment(frame.points, frame.masks, frame.camera, params=counted).labels
+        return segment(frame.points, masks, camera, params=replace(params, iterations=count)).labels
 
     return LabelledPairs(
-        methods={name: pair(labels) for name, labels in found.items()},
+        methods={name: pair(labels) for name, labels in compare(full).items()},
         iterations={count: pair(after(count)) for count in iterations},
     )
 
 
-def _rows(labeling: Labeling, rows: NDArray[np.intp]) -> Labeling:
+def _rows(labeling: Labeling, rows: NDArray[np.int64]) -> Labeling:
     return Labeling(labeling.classes[rows], labeling.instances[rows], labeling.ignored[rows], labeling.names)

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
-from ldls.evaluation.kitti_boxes import in_box_frame, in_camera_frame, points_in_box
-from ldls.io.kitti_objects import KittiObject
+from ldls.io.labels.kitti_objects import KittiObject, in_camera_frame
 from ldls.masks import InstanceMasks
 from ldls.stages import direct_labels, project
 
@@ -84,6 +83,6 @@ def labelled_by_boxes(
     seen = in_camera_frame(points, camera)
     instances, categories = np.zeros(len(points), np.int32), np.zeros(len(points), np.int32)
     for number, found in enumerate((one for one in objects if one.type in CATEGORIES), start=1):
-        inside = points_in_box(seen, found) & (in_box_frame(seen, found)[:, 1] >= GROUND_M)
+        inside = found.contains(seen) & (found.in_box_frame(seen)[:, 1] >= GROUND_M)
         instances[inside], categories[inside] = number, CATEGORIES[found.type]
     return LabelledCloud(points, instances, categories, masks, camera)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ldls.errors import ParameterError
-from ldls.evaluation.evaluate import Evaluation
+from ldls.evaluation.evaluation import Evaluation
 from ldls.io.files import whole_file
 
 if TYPE_CHECKING:
@@ -101,12 +101,12 @@ def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Precision, recall and IoU of each class by method, over all points (Table I of the paper)."""
     names = _classes(evaluations)
     rows: list[tuple[Cell, ...]] = []
-    for method, found in evaluations.items():
+    for method, evaluation in evaluations.items():
         for name in names:
-            c = found.semantic[name]
+            c = evaluation.semantic[name]
             rows.append((method, name, c.tp + c.fn, *map(percent, (c.precision, c.recall, c.iou))))
         if len(names) > 1:
-            rows.append((method, "mean", None, None, None, percent(found.semantic.mean_iou)))
+            rows.append((method, "mean", None, None, None, percent(evaluation.semantic.mean_iou)))
     columns = ("method", "class", "true points", "precision", "recall", "IoU")
     return Table("Points by class", columns, tuple(rows), PERCENT)
 
@@ -114,10 +114,10 @@ def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
 def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Instances found, invented and missed at each threshold of IoU, by method and class (Table II)."""
     rows: list[tuple[Cell, ...]] = []
-    for method, found in evaluations.items():
-        for name in found.names:
-            for threshold in found.instance.thresholds:
-                c = found.instance[name, threshold]
+    for method, evaluation in evaluations.items():
+        for name in evaluation.names:
+            for threshold in evaluation.instance.thresholds:
+                c = evaluation.instance[name, threshold]
                 scores = percent(c.precision), percent(c.recall)
                 rows.append((method, name, f"{threshold:.2f}", c.tp, c.fp, c.fn, *scores))
     columns = ("method", "class", "IoU from", "TP", "FP", "FN", "precision", "recall")
@@ -127,9 +127,9 @@ def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
 def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Panoptic, segmentation and recognition quality by method and class."""
     rows: list[tuple[Cell, ...]] = []
-    for method, found in evaluations.items():
-        for name in found.names:
-            q = found.panoptic[name]
+    for method, evaluation in evaluations.items():
+        for name in evaluation.names:
+            q = evaluation.panoptic[name]
             scores = percent(q.pq), percent(q.sq), percent(q.rq)
             rows.append((method, name, *scores, q.counts.tp, q.counts.fp, q.counts.fn))
     columns = ("method", "class", "PQ", "SQ", "RQ", "TP", "FP", "FN")
@@ -141,26 +141,50 @@ def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
     names = _classes(evaluations)
     rows: list[tuple[Cell, ...]] = []
     first: float | None = None
-    for variant, found in evaluations.items():
-        mean = percent(found.semantic.mean_iou)
+    for variant, evaluation in evaluations.items():
+        mean = percent(evaluation.semantic.mean_iou)
         first = mean if not rows else first
         gain = None if mean is None or first is None else mean - first
-        rows.append((variant, *(percent(found.semantic[name].iou) for name in names), mean, gain))
+        rows.append((variant, *(percent(evaluation.semantic[name].iou) for name in names), mean, gain))
     columns = ("variant", *(f"{name} IoU" for name in names), "mean IoU", "gain")
     return Table("Ablation", columns, tuple(rows), f"{PERCENT} Gain: points of mean IoU over the first row.")
 
 
-def frame_table(found: Evaluation) -> Table:
+def frame_table(evaluation: Evaluation) -> Table:
     """Points, those that count, and IoU of each class, by frame."""
+    names = evaluation.names
     rows = [
-        (f.name, f.n_points, f.n_counted, *(percent(f.classes[name].iou) for name in found.names)) for f in found.frames
+        (f.name, f.n_points, f.n_counted, *(percent(f.classes[name].iou) for name in names)) for f in evaluation.frames
     ]
-    columns = ("frame", "points", "counted", *(f"{name} IoU" for name in found.names))
+    columns = ("frame", "points", "counted", *(f"{name} IoU" for name in names))
     return Table("Frames", columns, tuple(rows), PERCENT)
 
 
+def range_table(by_range: Mapping[float, Evaluation]) -> Table:
+    """Precision, recall and IoU of each class over the points up to each maximum range (the paper's range figures)."""
+    rows = []
+    for limit_m, evaluation in by_range.items():
+        for name in evaluation.names:
+            counts = evaluation.semantic[name]
+            scores = (percent(score) for score in (counts.precision, counts.recall, counts.iou))
+            rows.append((f"{limit_m:g}", name, counts.tp + counts.fn, *scores))
+    columns = ("maximum range, m", "class", "true points", "precision", "recall", "IoU")
+    return Table("Points by maximum range", columns, tuple(rows), PERCENT)
+
+
+def iteration_table(by_iterations: Mapping[int, Evaluation]) -> Table:
+    """IoU of each class and their mean after each number of iterations."""
+    names = next(iter(by_iterations.values())).names if by_iterations else ()
+    rows: list[tuple[Cell, ...]] = []
+    for count, evaluation in by_iterations.items():
+        scores = (percent(evaluation.semantic[name].iou) for name in names)
+        rows.append((count, *scores, percent(evaluation.semantic.mean_iou)))
+    columns = ("iterations", *(f"{name} IoU" for name in names), "mean IoU")
+    return Table("Points by number of iterations", columns, tuple(rows), PERCENT)
+
+
 def _classes(evaluations: Mapping[str, Evaluation]) -> tuple[str, ...]:
-    sets = {found.names for found in evaluations.values()}
+    sets = {evaluation.names for evaluation in evaluations.values()}
     if len(sets) != 1:
         raise ParameterError(f"evaluations: expected one or more of the same classes, got {sorted(sets)}")
     return sets.pop()

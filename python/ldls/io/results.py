@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ldls.errors import InputError, UnsupportedFormatError
-from ldls.io import nuscenes_labels, result_npz, semantic_kitti, tables
+from ldls.io import result_npz, tables
+from ldls.io.labels import nuscenes_labels, semantic_kitti
 from ldls.io.masks.formats import write_masks
 from ldls.io.options import check_options
 from ldls.io.points import las, pcd, ply

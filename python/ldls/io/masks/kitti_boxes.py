@@ -8,7 +8,7 @@ from os import PathLike
 
 from ldls.categories import COCO_NAMES
 from ldls.errors import MaskError, within
-from ldls.io.kitti_objects import KittiObject, read_kitti_objects
+from ldls.io.labels.kitti_objects import KittiObject, read_kitti_objects
 from ldls.masks import InstanceMasks
 
 KITTI_CATEGORIES: dict[str, int] = {

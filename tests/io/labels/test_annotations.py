@@ -3,7 +3,7 @@ import pytest
 
 from evaluation.samples import labeling
 from ldls.errors import CorruptFileError
-from ldls.evaluation import read_annotations, write_annotations
+from ldls.io.labels.annotations import read_annotations, write_annotations
 
 
 def test_round_trip(tmp_path):

@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ldls.cli.label_pairs import FrameFolders, read_pairs
 from ldls.errors import InputError, ShapeError
-from ldls.evaluation.frame_inputs import FrameInputs
-from ldls.evaluation.frames import read_pairs
-from ldls.evaluation.pairing import FrameFiles, pair_files
+from ldls.io.labels.label_formats import LabelFiles, pair_files
 
 CALIB = """P0: 1 0 0 0 0 1 0 0 0 0 1 0
 P2: 100 0 50 0 0 100 40 0 0 0 1 0
@@ -30,7 +29,7 @@ def boxes(tmp_path):
 def read(folder, **inputs):
     formats = {"prediction_format": "annotations", "truth_format": "kitti-boxes"}
     frames, _ = pair_files(folder / "mine", folder / "label_2", **formats)
-    (pair,) = read_pairs(frames, inputs=FrameInputs(**{k: folder / v for k, v in inputs.items()}), **formats)
+    (pair,) = read_pairs(frames, folders=FrameFolders(**{k: folder / v for k, v in inputs.items()}), **formats)
     return pair
 
 
@@ -60,7 +59,7 @@ def test_squeezeseg_brings_its_ranges(tmp_path):
     image[0, 0, 4:] = 12.5, 1
     np.save(tmp_path / "truth.npy", image)
     np.save(tmp_path / "mine.npy", image[:, :, 5].astype(np.uint8))
-    (pair,) = read_pairs([FrameFiles("a", tmp_path / "mine.npy", tmp_path / "truth.npy")])
+    (pair,) = read_pairs([LabelFiles("a", tmp_path / "mine.npy", tmp_path / "truth.npy")])
     assert pair.ranges_m[:2].tolist() == [12.5, 0]
-    (pair,) = read_pairs([FrameFiles("a", tmp_path / "mine.npy", tmp_path / "mine.npy")])
+    (pair,) = read_pairs([LabelFiles("a", tmp_path / "mine.npy", tmp_path / "mine.npy")])
     assert pair.ranges_m is None

@@ -13,7 +13,7 @@ from ldls.io.arrays import read_npz, write_npz
 from ldls.labeling import Labeling
 
 
-def read_results(path: str | PathLike[str]) -> Labeling:
+def read_labeling_npz(path: str | PathLike[str]) -> Labeling:
     """Labels of an `.npz` file.
 
     It holds a segmentation's arrays, or `classes`, `names` and, if there are any, `instances` and `ignored`.

@@ -6,14 +6,16 @@ Source: https://github.com/nutonomy/nuscenes-devkit/blob/master/docs/instruction
 from __future__ import annotations
 
 from itertools import count
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.errors import LimitError
-from ldls.io.arrays import write_npz
+from ldls.errors import CorruptFileError, InputError, LimitError
+from ldls.io.arrays import read_npz, write_npz
 from ldls.io.files import whole_file
+from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
 
 INSTANCES_A_CLASS = 1000
@@ -29,6 +31,7 @@ CLASS_NAMES: tuple[str, ...] = (
     "static.other", "static.vegetation", "vehicle.ego",
 )  # fmt: skip
 """The 32 general classes by their numbers."""
+NUSCENES: dict[int, str] = dict(enumerate(CLASS_NAMES))
 
 OTHER_OBJECT = "static.other"
 COCO_CLASSES: dict[str, str] = {
@@ -43,10 +46,41 @@ COCO_CLASSES: dict[str, str] = {
 """Class of a COCO category; anything else is `OTHER_OBJECT`. Background and points out of view are 0, noise."""
 
 
+def read_lidarseg(path: str | PathLike[str]) -> Labeling:
+    """Labels of a `_lidarseg.bin` file, one a point; there are no instances.
+
+    Raises:
+        CorruptFileError: A point has a class above 31; the message names it.
+        FileNotFoundError: There is no such file.
+    """
+    codes = np.frombuffer(Path(path).read_bytes(), np.uint8)
+    try:
+        return Labeling.from_codes(codes, NUSCENES)
+    except InputError as error:
+        raise CorruptFileError(f"{path}: {error}; is it a point cloud?") from None
+
+
+def read_panoptic(path: str | PathLike[str]) -> Labeling:
+    """Labels of a `_panoptic.npz` file, one a point.
+
+    Raises:
+        CorruptFileError: It is not a whole `.npz` file with one array `data` of such labels.
+        FileNotFoundError: There is no such file.
+    """
+    arrays = read_npz(path)
+    labels = arrays.get("data")
+    if labels is None or labels.ndim != 1 or labels.dtype.kind not in "iu":
+        raise CorruptFileError(f"{path}: found arrays {sorted(arrays)}, expected 'data' with a uint16 a point")
+    try:
+        return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=labels % INSTANCES_A_CLASS)
+    except InputError as error:
+        raise CorruptFileError(f"{path}: {error}") from None
+
+
 def write_lidarseg(path: Path, result: Segmentation) -> None:
     """Write the class of each point in the order of the cloud, one byte a point."""
     with whole_file(path) as file:
-        file.write(_by_label(_classes(result))[result.labels].astype(np.uint8).tobytes())
+        file.write(result.per_point(_classes(result)).astype(np.uint8).tobytes())
 
 
 def write_panoptic(path: Path, result: Segmentation) -> None:
@@ -57,23 +91,18 @@ def write_panoptic(path: Path, result: Segmentation) -> None:
     """
     classes = _classes(result)
     counters = {one: count(1) for one in classes.tolist()}
-    numbers = np.array([next(counters[one]) for one in classes.tolist()], np.int64)
-    if numbers.max(initial=0) >= INSTANCES_A_CLASS:
+    numbers = np.array([0, *(next(counters[one]) for one in classes[1:].tolist())], np.int64)
+    if numbers.max() >= INSTANCES_A_CLASS:
         crowded = CLASS_NAMES[classes[numbers.argmax()]]
         raise LimitError(
             f"{path}: {numbers.max()} instances of {crowded}, expected at most {INSTANCES_A_CLASS - 1}; "
             "save .npz, .label or .ply instead"
         )
-    codes = _by_label(classes * INSTANCES_A_CLASS + numbers)[result.labels]
-    write_npz(path, {"data": codes.astype(np.uint16)})
+    write_npz(path, {"data": result.per_point(classes * INSTANCES_A_CLASS + numbers).astype(np.uint16)})
 
 
 def _classes(result: Segmentation) -> NDArray[np.int64]:
+    """(M + 1,) class of the background, then of each instance."""
     names = [COCO_CLASSES.get(instance.name, instance.name) for instance in result.instances]
     known = [name if name in CLASS_NAMES else OTHER_OBJECT for name in names]
-    return np.array([CLASS_NAMES.index(name) for name in known], np.int64)
-
-
-def _by_label(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    # label -1, out of view, picks the last entry
-    return np.concatenate([[0], values, [0]])
+    return np.array([0, *(CLASS_NAMES.index(name) for name in known)], np.int64)

@@ -11,17 +11,12 @@ from ldls.errors import (
     UnsafeFileError,
     UnsupportedFormatError,
 )
-from ldls.evaluation import (
-    read_labeling,
-    read_lidarseg,
-    read_panoptic,
-    read_results,
-    read_semantic_kitti,
-    read_squeezeseg,
-    read_squeezeseg_ranges,
-    write_labeling,
-)
-from ldls.evaluation.formats import FORMATS, guess_format
+from ldls.io.labels import FORMATS, read_labeling, write_labeling
+from ldls.io.labels.label_formats import guess_format
+from ldls.io.labels.labeling_npz import read_labeling_npz
+from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
+from ldls.io.labels.semantic_kitti import read_semantic_kitti
+from ldls.io.labels.squeezeseg import read_squeezeseg, read_squeezeseg_ranges
 from ldls.labeling import Labeling
 
 
@@ -71,14 +66,18 @@ def changed(value):
         pytest.param(changed(1.5), "labels are not whole numbers", id="fraction"),
         pytest.param(changed(np.nan), "labels are not whole numbers", id="nan"),
         pytest.param(np.full((64, 512), "x"), "expected numbers", id="text"),
-        pytest.param(None, "not a whole .npy file", id="cut"),
     ],
 )
 def test_squeezeseg_faults(tmp_path, content, message):
-    np.save(tmp_path / "a.npy", range_image() if content is None else content)
-    if content is None:
-        (tmp_path / "a.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:1000])
+    np.save(tmp_path / "a.npy", content)
     with pytest.raises(CorruptFileError, match=message):
+        read_squeezeseg(tmp_path / "a.npy")
+
+
+def test_squeezeseg_files_that_are_cut_are_refused(tmp_path):
+    np.save(tmp_path / "a.npy", range_image())
+    (tmp_path / "a.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:1000])
+    with pytest.raises(TruncatedFileError, match="a.npy: .* needs 1572992 bytes, got 1000"):
         read_squeezeseg(tmp_path / "a.npy")
 
 
@@ -146,7 +145,7 @@ def test_segmentations_are_read_as_they_were_written(small_scene, tmp_path):
     points, masks, camera = small_scene
     result = ldls.segment(np.vstack([points, [[0, 0, -5]]]).astype(np.float32), masks, camera)
     ldls.save(result, tmp_path / "a.npz")
-    found = read_results(tmp_path / "a.npz")
+    found = read_labeling_npz(tmp_path / "a.npz")
     expected = {0: "background", 1: "person", 3: "car"}
     assert class_names(found) == [expected[c] for c in result.categories.tolist()]
     np.testing.assert_array_equal(found.instances, np.maximum(result.labels, 0))
@@ -168,12 +167,12 @@ def test_two_masks_of_a_class_are_two_instances():
 def test_arrays_make_the_round_trip(tmp_path):
     source = labeling([0, 1, 2], [0, 4, 1], ignored=[0])
     write_labeling(tmp_path / "a.npz", source)
-    found = read_results(tmp_path / "a.npz")
+    found = read_labeling_npz(tmp_path / "a.npz")
     assert found.names == source.names
     for name in ("classes", "instances", "ignored"):
         np.testing.assert_array_equal(getattr(found, name), getattr(source, name))
     np.savez(tmp_path / "b.npz", classes=[0, 1], names=["background", "gnome"])
-    assert class_names(read_results(tmp_path / "b.npz")) == ["background", "gnome"]
+    assert class_names(read_labeling_npz(tmp_path / "b.npz")) == ["background", "gnome"]
 
 
 @pytest.mark.parametrize(
@@ -189,7 +188,7 @@ def test_arrays_make_the_round_trip(tmp_path):
 def test_arrays_that_do_not_fit(tmp_path, arrays, error, message):
     np.savez(tmp_path / "a.npz", **arrays)
     with pytest.raises(error, match=message):
-        read_results(tmp_path / "a.npz")
+        read_labeling_npz(tmp_path / "a.npz")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 import pytest
 
 from ldls.errors import InputError, ParameterError
-from ldls.evaluation.pairing import label_files, pair_files
+from ldls.io.labels.label_formats import label_files, pair_files
 
 
 def touch(folder, *names):

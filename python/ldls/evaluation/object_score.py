@@ -16,7 +16,7 @@ from ldls.evaluation.pair import Pair
 
 @dataclass(frozen=True)
 class ObjectScore:
-    """How well one true instance was found.
+    """How well one true instance was overlap.
 
     Attributes:
         frame: Name of the frame.
@@ -48,10 +48,10 @@ def object_scores(pair: Pair, *, classes: ClassSet) -> tuple[ObjectScore, ...]:
 
 
 def _objects(pair: Pair, name: str, ranges_m: NDArray[np.floating]) -> Iterator[ObjectScore]:
-    found = instance_overlaps(pair.prediction, pair.truth, name)
-    iou = matched_iou(found, best_matches(found))
+    overlap = instance_overlaps(pair.prediction, pair.truth, name)
+    iou = matched_iou(overlap, best_matches(overlap))
     k = pair.truth.names.index(name)
     counted = (pair.truth.classes == k) & ~(pair.truth.ignored | pair.prediction.ignored)
-    for instance, n_points, score in zip(found.truth_ids.tolist(), found.truth_points.tolist(), iou, strict=True):
+    for instance, n_points, score in zip(overlap.truth_ids.tolist(), overlap.truth_points.tolist(), iou, strict=True):
         range_m = float(ranges_m[counted & (pair.truth.instances == instance)].mean(dtype=np.float64))
         yield ObjectScore(pair.name, name, instance, n_points, range_m, float(score))

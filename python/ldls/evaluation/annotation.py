@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import as_points
-from ldls.evaluation.kitti_boxes import in_box_frame, in_camera_frame, label_by_boxes
-from ldls.io.kitti_objects import KittiObject
+from ldls.io.labels.kitti_objects import KittiObject, in_camera_frame, label_by_boxes
 from ldls.labeling import Labeling
 
 GROUND_THICKNESS_M = 0.15
@@ -53,24 +52,24 @@ def annotate(objects: Sequence[KittiObject], points: ArrayLike, camera: Camera, 
         objects: Rows of a label_2 file.
         points: (N, >= 3) in metres in the lidar frame.
         camera: The frame's camera.
-        clean: Whether points within `GROUND_THICKNESS_M` of the ground under an object leave it.
+        clean: Take from an object the points within `GROUND_THICKNESS_M` of the ground under it.
     """
     labeling = label_by_boxes(objects, points, camera)
     if not clean:
         return Annotation(labeling, 0)
     placed = in_camera_frame(as_points(points), camera)
     ground = np.zeros(len(labeling), bool)
-    for row, found in enumerate(objects, start=1):
+    for row, object_ in enumerate(objects, start=1):
         members = np.flatnonzero(labeling.instances == row)
         if len(members):
-            along, up, across = in_box_frame(placed[members], found).T
-            height, slope_along, slope_across = ground_plane(placed, found)
+            along, up, across = object_.in_box_frame(placed[members]).T
+            height, slope_along, slope_across = ground_plane(placed, object_)
             ground[members] = up - (height + slope_along * along + slope_across * across) <= GROUND_THICKNESS_M
     classes, instances = (np.where(ground, 0, values) for values in (labeling.classes, labeling.instances))
     return Annotation(replace(labeling, classes=classes, instances=instances), int(ground.sum()))
 
 
-def ground_plane(points_camera: NDArray[np.float64], found: KittiObject) -> NDArray[np.float64]:
+def ground_plane(points_camera: NDArray[np.float64], box: KittiObject) -> NDArray[np.float64]:
     """(3,) height of the ground above the middle of a box's bottom, in metres, and its slopes along and across the box.
 
     A plane is fitted to the returns around the box, and again to those that it does not leave above it: roads are
@@ -78,9 +77,9 @@ def ground_plane(points_camera: NDArray[np.float64], found: KittiObject) -> NDAr
 
     Args:
         points_camera: (N, 3) points in the rectified camera frame.
-        found: The object with the box.
+        box: The object with the box.
     """
-    along, up, across = _around(points_camera, found).T
+    along, up, across = _around(points_camera, box).T
     plane = np.zeros(3)
     kept = np.ones(len(up), bool)
     for _ in range(ROUNDS if len(up) else 0):
@@ -92,12 +91,12 @@ def ground_plane(points_camera: NDArray[np.float64], found: KittiObject) -> NDAr
     return plane
 
 
-def _around(points_camera: NDArray[np.float64], found: KittiObject) -> NDArray[np.float64]:
+def _around(points_camera: NDArray[np.float64], box: KittiObject) -> NDArray[np.float64]:
     """(n, 3) points beside a box at about the height of its bottom: along, up and across it."""
-    _, width, length = found.dimensions
+    _, width, length = box.dimensions
     # what no box can reach is most of the cloud, and cheap to leave out
-    away = np.abs(points_camera - found.location)
-    near = in_box_frame(points_camera[(away <= length + width + SURROUNDINGS_M).all(axis=1)], found)
+    away = np.abs(points_camera - box.location)
+    near = box.in_box_frame(points_camera[(away <= length + width + SURROUNDINGS_M).all(axis=1)])
     along, up, across = near.T
     beside = np.maximum(np.abs(along) - length / 2, np.abs(across) - width / 2)
     around: NDArray[np.float64] = near[(beside > 0) & (beside <= SURROUNDINGS_M) & (np.abs(up) <= BOX_ERROR_M)]

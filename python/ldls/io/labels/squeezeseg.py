@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.errors import CorruptFileError, InputError, UnsafeFileError
-from ldls.evaluation.vocabularies import SQUEEZESEG
-from ldls.labeling import Labeling
+from ldls.errors import CorruptFileError, InputError
+from ldls.io.arrays import read_npy
+from ldls.labeling import BACKGROUND, Labeling
 
+SQUEEZESEG: dict[int, str] = {0: BACKGROUND, 1: "car", 2: "pedestrian", 3: "cyclist"}
+"""Classes by their numbers."""
 IMAGE = (64, 512)
 N_CHANNELS = 6
 RANGE, LABEL = 4, 5
@@ -24,7 +26,8 @@ def read_squeezeseg(path: str | PathLike[str]) -> Labeling:
     The file is a range image, or the (64, 512) labels alone, as a network predicts them.
 
     Raises:
-        CorruptFileError: It is not a whole file of such an array, or a label is none of 0 to 3.
+        CorruptFileError: It is no file of such an array, or a label is none of 0 to 3.
+        TruncatedFileError: It ends before its array does.
         UnsafeFileError: It holds Python objects.
         FileNotFoundError: There is no such file.
     """
@@ -46,21 +49,16 @@ def read_squeezeseg_ranges(path: str | PathLike[str]) -> NDArray[np.float64] | N
     """(32768,) distances of the pixels from the lidar in metres; None where the file holds labels alone.
 
     Raises:
-        CorruptFileError: It is not a whole file of such an array.
+        FileFormatError: It is not a whole file of such an array.
     """
     image = _load(Path(path))
     return None if image.ndim == 2 else image[:, :, RANGE].reshape(-1).astype(np.float64)
 
 
 def _load(path: Path) -> NDArray[Any]:
-    try:
-        array = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        if "allow_pickle" in str(error):
-            raise UnsafeFileError(f"{path}: object arrays are not loaded") from None
-        raise CorruptFileError(f"{path}: not a whole .npy file ({error})") from None
-    if not isinstance(array, np.ndarray) or array.shape not in ((*IMAGE, N_CHANNELS), IMAGE):
-        raise CorruptFileError(f"{path}: expected 64 x 512 x 6, or 64 x 512 labels, got {np.shape(array)}")
+    array = read_npy(path)
+    if array.shape not in ((*IMAGE, N_CHANNELS), IMAGE):
+        raise CorruptFileError(f"{path}: expected 64 x 512 x 6, or 64 x 512 labels, got {array.shape}")
     if array.dtype.kind not in "fiu":
         raise CorruptFileError(f"{path}: expected numbers, got {array.dtype}")
     return array

@@ -5,7 +5,7 @@ import pytest
 
 import ldls
 from ldls.errors import CorruptFileError, TruncatedFileError
-from ldls.evaluation import KittiObject, label_by_boxes, points_in_box, read_kitti_boxes, read_kitti_objects
+from ldls.io.labels.kitti_objects import KittiObject, label_by_boxes, read_kitti_boxes, read_kitti_objects
 
 ROW = "Car 0.25 1 -1.57 599.41 156.40 629.75 189.25 1.5 1.6 4.0 1.0 1.5 20.0 -1.56"
 BOX = KittiObject(
@@ -66,7 +66,7 @@ def test_broken_rows_are_named(tmp_path, row, error, message):
     ],
 )
 def test_points_in_a_box(point, turn, inside):
-    assert points_in_box(np.array([point]), replace(BOX, rotation_y=turn)).tolist() == [inside]
+    assert replace(BOX, rotation_y=turn).contains(np.array([point])).tolist() == [inside]
 
 
 def test_boxes_regions_and_view_label_points():

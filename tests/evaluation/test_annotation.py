@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.evaluation import KittiObject, annotate, read_kitti_objects
-from ldls.evaluation.annotate import GROUND_THICKNESS_M, ground_plane
+from ldls.evaluation import annotate
+from ldls.evaluation.annotation import GROUND_THICKNESS_M, ground_plane
+from ldls.io.labels import KittiObject, read_kitti_objects
 
 BOX = KittiObject(
     type="Car", truncated=0, occluded=0, alpha=0, bbox=(0, 0, 1, 1),

@@ -1,0 +1,145 @@
+"""Sources whose frames are files of one name, and what others share with them."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+from ldls.camera import Camera
+from ldls.cloud import Points
+from ldls.datasets.frame import CameraImage
+from ldls.errors import InputError, LeftOutWarning, SourceError
+from ldls.io import read_image
+from ldls.labeling import Labeling
+from ldls.masks import InstanceMasks
+
+POINT_SUFFIXES = (".bin", ".npy")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+LISTED = 8
+"""How many names an error lists."""
+
+
+class FileSource:
+    """A source whose frames are files of one name: a sweep, an image of each camera, and others.
+
+    Attributes:
+        path: Folder of the source.
+        names: Names of the frames of which every file is there, sorted.
+        left_out: What the others lack, by their names.
+        camera_names: Name of the camera of each image of a frame.
+    """
+
+    def __init__(self, path: Path, parts: Mapping[str, Mapping[str, Path]], camera_names: Iterable[str]) -> None:
+        """Keep the frames that have a file of each part; warns of sweeps that lack one.
+
+        Args:
+            path: Folder of the source.
+            parts: Files by frame of each part, as "velodyne" and "image_2"; the first are the sweeps.
+            camera_names: Name of the camera of each image of a frame.
+
+        Raises:
+            SourceError: No frame is whole.
+        """
+        self.path, self.camera_names = path, tuple(camera_names)
+        self._parts = parts
+        lacks = {name: [part for part in parts if name not in parts[part]] for name in set().union(*parts.values())}
+        self.names = tuple(sorted(name for name, missing in lacks.items() if not missing))
+        if not self.names:
+            counts = ", ".join(f"{part} {len(files)}" for part, files in parts.items())
+            raise SourceError(f"{path}: no frame has a file in each of these, found {counts}; names must agree")
+        self.left_out = {name: f"no {' and no '.join(lacks[name])}" for name in sorted(lacks) if lacks[name]}
+        self._points = next(iter(parts.values()))
+        warn_left_out(path, [why for name, why in self.left_out.items() if name in self._points], len(self._points))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from."""
+        return tuple(files[self.names[index]] for files in self._parts.values())
+
+
+def find_files(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
+    """Files of `folder` with one of the suffixes, by their names without it; hidden ones left out.
+
+    Raises:
+        SourceError: There is no such folder; the message says what is there.
+    """
+    check_folders(folder.parent, [folder.name])
+    files = (path for path in folder.iterdir() if path.suffix in suffixes and not path.name.startswith("."))
+    return {path.name.removesuffix(path.suffix): path for path in sorted(files)}
+
+
+def warn_left_out(path: Path, reasons: Iterable[str], n_sweeps: int) -> None:
+    """Warn of sweeps that are left out, if there are any, by what they lack."""
+    counted = Counter(reasons)
+    if counted:
+        message = f"{path}: {counted.total()} of {n_sweeps} sweeps are left out: {counts_of(counted)}"
+        warnings.warn(message, LeftOutWarning, stacklevel=4)
+
+
+def counts_of(reasons: Iterable[str]) -> str:
+    """How often each reason occurs, the most frequent first."""
+    return ", ".join(f"{count:,} {reason}" for reason, count in Counter(reasons).most_common())
+
+
+def check_folders(path: Path, names: Iterable[str]) -> None:
+    """Refuse a source that lacks a folder.
+
+    Raises:
+        SourceError: One is missing; the message says what is there.
+        FileNotFoundError: There is no such source.
+    """
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: there is no such folder")
+    missing = [name for name in names if not (path / name).is_dir()]
+    if missing:
+        raise SourceError(f"{path}: has no folder {', '.join(missing)}; found {listing(path)}")
+
+
+def choose(path: Path, what: str, there: Sequence[str], wanted: str | None) -> str:
+    """The one of `there` that is wanted, or the only one there is.
+
+    Raises:
+        SourceError: It is not there, or there are several and none is wanted.
+    """
+    if wanted is None and len(there) == 1:
+        return there[0]
+    if wanted is not None and wanted in there:
+        return wanted
+    listed = some(there) or "none"
+    if wanted is None:
+        raise SourceError(f"{path}: holds {len(there)} {what}s ({listed}); say which by {what}=")
+    raise SourceError(f"{path}: has no {what} {wanted!r}; found {listed}")
+
+
+def listing(path: Path) -> str:
+    """The content of a folder in a few words."""
+    return some(sorted(child.name for child in path.iterdir())) or "nothing"
+
+
+def some(names: Sequence[str]) -> str:
+    """The first of `names`, and how many more there are."""
+    listed = ", ".join(names[:LISTED])
+    return listed if len(names) <= LISTED else f"{listed} and {len(names) - LISTED} more"
+
+
+def image_from_file(
+    name: str, path: Path, camera: Camera, *, stamp: float | None = None, masks: InstanceMasks | None = None
+) -> CameraImage:
+    """An image of a frame whose pixels are those of a file."""
+    return CameraImage(name=name, camera=camera, read=partial(read_image, path), stamp=stamp, path=path, masks=masks)
+
+
+def check_truth(truth: Labeling, points: Points, path: Path) -> Labeling:
+    """`truth`, read from `path`, if it has a label for each point.
+
+    Raises:
+        InputError: It has fewer or more.
+    """
+    if len(truth) != len(points):
+        raise InputError(f"{path}: labels: {len(truth):,}, points: {len(points):,}; expected one label a point")
+    return truth

@@ -1,0 +1,170 @@
+"""KITTI object labels: a line of 15 fields for each object, and a 16th, the score, in results.
+
+Their 3D boxes are truth for points too: noisy, for a box holds ground and air as well as its object.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls.camera import Camera
+from ldls.cloud import as_points
+from ldls.errors import CorruptFileError, TruncatedFileError
+from ldls.io.files import read_lines
+from ldls.labeling import BACKGROUND, Labeling
+from ldls.stages import project
+
+KITTI: tuple[str, ...] = (
+    "Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc", "DontCare",
+)  # fmt: skip
+"""Classes of KITTI's object labels."""
+N_FIELDS = 15
+IMAGE_SIZE = (375, 1242)
+"""Height and width of most of KITTI's images, where that of the frame is not known."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class KittiObject:
+    """One row of a label_2 file; unknown fields, such as those of DontCare rows, hold -1, -10 or -1000.
+
+    Attributes:
+        type: Class; KITTI's or, in files of anyone's own, another.
+        truncated: Share of the object outside the image, 0 to 1.
+        occluded: 0 visible, 1 partly, 2 largely occluded, 3 unknown.
+        alpha: Angle of observation in radians.
+        bbox: Left, top, right, bottom in pixels.
+        dimensions: Height, width, length in metres.
+        location: x y z of the middle of the bottom, in metres in the rectified camera frame.
+        rotation_y: Turn about the camera's y axis (down) in radians; at 0 the length lies along x.
+        score: Score of a detection, where there is one.
+    """
+
+    type: str
+    truncated: float
+    occluded: int
+    alpha: float
+    bbox: tuple[float, float, float, float]
+    dimensions: tuple[float, float, float]
+    location: tuple[float, float, float]
+    rotation_y: float
+    score: float | None = None
+
+    @property
+    def is_region(self) -> bool:
+        """True for a DontCare rectangle of the image, which is no object."""
+        return self.type == "DontCare"
+
+    def in_box_frame(self, points_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N, 3) points of the camera frame along the length, up from the bottom, and across the width, in metres."""
+        x, y, z = (points_camera - self.location).T
+        cos, sin = np.cos(self.rotation_y), np.sin(self.rotation_y)
+        with np.errstate(invalid="ignore"):
+            return np.stack([cos * x - sin * z, -y, sin * x + cos * z], axis=1)
+
+    def contains(self, points_camera: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(N,) True for points (N, 3) of the camera frame in the box, its faces included."""
+        height, width, length = self.dimensions
+        along, up, across = self.in_box_frame(points_camera).T
+        inside: NDArray[np.bool_] = (
+            (np.abs(along) <= length / 2) & (np.abs(across) <= width / 2) & (up >= 0) & (up <= height)
+        )
+        return inside
+
+
+def read_kitti_objects(path: str | PathLike[str]) -> tuple[KittiObject, ...]:
+    """The objects of a label_2 file, in its order; a file without a line has none.
+
+    Raises:
+        TruncatedFileError: A line has too few fields.
+        CorruptFileError: A line has too many fields, or no number where one belongs.
+        FileNotFoundError: There is no such file.
+    """
+    path = Path(path)
+    lines = enumerate(read_lines(path), start=1)
+    return tuple(_object(f"{path}, line {number}", line.split()) for number, line in lines if line.strip())
+
+
+def read_kitti_boxes(path: str | PathLike[str], *, points: ArrayLike, camera: Camera) -> Labeling:
+    """Labels of `points` by the label_2 file of their frame; see `label_by_boxes`.
+
+    Raises:
+        FileFormatError: The file is broken; see `read_kitti_objects`.
+        InputError: The points cannot be used.
+    """
+    return label_by_boxes(read_kitti_objects(path), points, camera)
+
+
+def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Camera) -> Labeling:
+    """Class of the box that holds each point; its instance is the number of the row, from 1.
+
+    Of several boxes the smallest wins: who stands at a car is smaller than the car's box. Points outside all boxes
+    whose pixel lies in a DontCare rectangle are DontCare, which `ClassSet.kitti` leaves out by default. Points out of
+    the camera's view are ignored. A row without a box, its dimensions -1, holds no point.
+
+    Args:
+        objects: Rows of a label_2 file.
+        points: (N, >= 3) in metres in the lidar frame.
+        camera: The frame's camera; without an image size, that of most of KITTI's images.
+    """
+    cloud = as_points(points)
+    in_view, pixels = project(cloud, camera, image_size=camera.image_size or IMAGE_SIZE, keep_origin=True)
+    names = tuple(dict.fromkeys([BACKGROUND, *KITTI, *(row.type for row in objects)]))
+    classes, instances = np.zeros((2, len(cloud)), np.int32)
+    for region in (row for row in objects if row.is_region):
+        left, top, right, bottom = region.bbox
+        u, v = pixels.T
+        classes[in_view[(u >= left) & (u <= right) & (v >= top) & (v <= bottom)]] = names.index(region.type)
+    seen = in_camera_frame(cloud[in_view], camera)
+    boxes = [(number, row) for number, row in enumerate(objects, start=1) if not row.is_region]
+    for number, row in sorted(boxes, key=lambda box: -np.prod(box[1].dimensions)):
+        inside = in_view[row.contains(seen)]
+        classes[inside], instances[inside] = names.index(row.type), number
+    ignored = np.ones(len(cloud), bool)
+    ignored[in_view] = False
+    return Labeling(classes, instances, ignored, names)
+
+
+def in_camera_frame(points: ArrayLike, camera: Camera) -> NDArray[np.float64]:
+    """(N, 3) `points` of the lidar frame in the rectified camera frame, in metres: x right, y down, z forward."""
+    xyz = np.asarray(points)[:, :3].astype(np.float64)
+    transform = camera.T_camera_lidar
+    # infinite coordinates become NaN, which lies in no box
+    with np.errstate(invalid="ignore"):
+        placed: NDArray[np.float64] = xyz @ transform[:3, :3].T + transform[:3, 3]
+    return placed
+
+
+def _object(place: str, words: list[str]) -> KittiObject:
+    if len(words) < N_FIELDS:
+        raise TruncatedFileError(f"{place}: expected 15 fields, or 16 with a score, got {len(words)}")
+    if len(words) > N_FIELDS + 1:
+        raise CorruptFileError(f"{place}: expected 15 fields, or 16 with a score, got {len(words)}")
+    v = [_number(place, word) for word in words[1:]]
+    return KittiObject(
+        type=words[0],
+        truncated=v[0],
+        occluded=int(v[1]),
+        alpha=v[2],
+        bbox=(v[3], v[4], v[5], v[6]),
+        dimensions=(v[7], v[8], v[9]),
+        location=(v[10], v[11], v[12]),
+        rotation_y=v[13],
+        score=v[14] if len(v) == N_FIELDS else None,
+    )
+
+
+def _number(place: str, word: str) -> float:
+    try:
+        number = float(word)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise CorruptFileError(f"{place}: expected a finite number, got {word!r}")
+    return number

@@ -1,0 +1,189 @@
+"""Every format that labels can be read from, and the files of labels in folders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+from numpy.typing import ArrayLike
+
+from ldls.camera import Camera
+from ldls.errors import InputError, ParameterError, UnsupportedFormatError
+from ldls.io.labels.annotations import read_annotations
+from ldls.io.labels.kitti_objects import read_kitti_boxes
+from ldls.io.labels.labeling_npz import read_labeling_npz
+from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
+from ldls.io.labels.semantic_kitti import read_semantic_kitti
+from ldls.io.labels.squeezeseg import read_squeezeseg
+from ldls.labeling import Labeling
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of labels.
+
+    Attributes:
+        ending: How its files' names end; what stands before is the name of the frame.
+        read: Reader of a file.
+        needs_points: True where the reader needs the frame's points and camera.
+    """
+
+    ending: str
+    read: Callable[..., Labeling]
+    needs_points: bool = False
+
+
+FORMATS: dict[str, Format] = {
+    "nuscenes-lidarseg": Format("_lidarseg.bin", read_lidarseg),
+    "nuscenes-panoptic": Format("_panoptic.npz", read_panoptic),
+    "ldls": Format(".npz", read_labeling_npz),
+    "semantic-kitti": Format(".label", read_semantic_kitti),
+    "squeezeseg": Format(".npy", read_squeezeseg),
+    "annotations": Format(".txt", read_annotations),
+    "kitti-boxes": Format(".txt", read_kitti_boxes, needs_points=True),
+}
+"""Formats by name; longer endings come before the shorter ones that they end in."""
+
+SAY_WHICH = "say which by format=, or by --truth-format and --prediction-format"
+LISTED = 10
+"""How many frames an error lists."""
+
+
+def read_labeling(
+    path: str | PathLike[str],
+    *,
+    format: str | None = None,
+    points: ArrayLike | None = None,
+    camera: Camera | None = None,
+) -> Labeling:
+    """Return the labels of a file.
+
+    Args:
+        path: The file.
+        format: One of `FORMATS`; by default the one of the file's ending, if there is but one.
+        points: (N, >= 3) the frame's points, which KITTI boxes need.
+        camera: The frame's camera, which KITTI boxes need.
+
+    Raises:
+        UnsupportedFormatError: The ending tells no format, or more than one.
+        ParameterError: There is no such format.
+        InputError: Points or camera are needed and missing.
+        FileFormatError: The file is broken.
+        FileNotFoundError: There is no such file.
+    """
+    name = guess_format(path) if format is None else _known(format)
+    chosen = FORMATS[name]
+    if not chosen.needs_points:
+        return chosen.read(path)
+    if points is None or camera is None:
+        missing = "points" if points is None else "camera"
+        raise InputError(f"{missing}: {path} holds boxes ({name}), whose points are found by points and camera")
+    return chosen.read(path, points=points, camera=camera)
+
+
+def guess_format(path: str | PathLike[str]) -> str:
+    """Name of the format of a file, by its ending.
+
+    Raises:
+        UnsupportedFormatError: No format has this ending, or several have.
+    """
+    name = Path(path).name
+    ending = next((each.ending for each in FORMATS.values() if name.endswith(each.ending)), None)
+    fitting = [key for key, each in FORMATS.items() if each.ending == ending]
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        raise UnsupportedFormatError(f"{path}: may be {' or '.join(fitting)}; {SAY_WHICH}")
+    known = ", ".join(f"{key} (*{each.ending})" for key, each in FORMATS.items())
+    raise UnsupportedFormatError(f"{path}: no format of labels has this name; expected {known}; {SAY_WHICH}")
+
+
+@dataclass(frozen=True)
+class LabelFiles:
+    """The files of one frame.
+
+    Attributes:
+        name: Name of the frame: that of the files without the ending.
+        prediction: File of a method's labels.
+        truth: File of the true labels.
+    """
+
+    name: str
+    prediction: Path
+    truth: Path
+
+
+def pair_files(
+    predictions: str | PathLike[str],
+    truth: str | PathLike[str],
+    *,
+    prediction_format: str | None = None,
+    truth_format: str | None = None,
+    missing: Literal["error", "skip"] = "error",
+) -> tuple[tuple[LabelFiles, ...], tuple[str, ...]]:
+    """The frames that both sides have, by name, and the names of those that only one side has.
+
+    Two files are one frame, whatever their names. In a folder that holds a frame in several formats, the one that comes
+    first in `FORMATS` is taken.
+
+    Raises:
+        InputError: A frame lacks its pair and `missing` is "error", or a side has no file of labels.
+        ParameterError: There is no such format, or no such `missing`.
+        FileNotFoundError: A path does not exist.
+    """
+    if missing not in ("error", "skip"):
+        raise ParameterError(f"missing: got {missing!r}, expected 'error' or 'skip'")
+    ours = label_files(predictions, prediction_format)
+    theirs = label_files(truth, truth_format)
+    if Path(predictions).is_file() and Path(truth).is_file():
+        theirs = dict(zip(ours, theirs.values(), strict=True))
+    lacking = sorted(ours.keys() ^ theirs.keys())
+    both = sorted(ours.keys() & theirs.keys())
+    if lacking and (missing == "error" or not both):
+        sides = (predictions, "no truth", ours.keys() - theirs), (truth, "no prediction", theirs.keys() - ours)
+        listed = "; ".join(f"{_listed(sorted(names))} of {side} have {what}" for side, what, names in sides if names)
+        raise InputError(f"frames without their pair: {listed}; add them, or skip them (--missing skip)")
+    return tuple(LabelFiles(name, ours[name], theirs[name]) for name in both), tuple(lacking)
+
+
+def label_files(path: str | PathLike[str], format: str | None = None) -> dict[str, Path]:
+    """Files of labels by the name of their frame: those of a folder, or `path` itself.
+
+    Raises:
+        InputError: The folder holds none.
+        ParameterError: There is no such format.
+        FileNotFoundError: There is no such path.
+    """
+    path = Path(path)
+    wanted = list(FORMATS) if format is None else [_known(format)]
+    endings = list(dict.fromkeys(FORMATS[name].ending for name in wanted))
+    if path.is_file():
+        return {_frame_name(path, endings) or path.stem: path}
+    files: dict[str, Path] = {}
+    entries = [entry for entry in sorted(path.iterdir()) if entry.is_file() and not entry.name.startswith(".")]
+    for ending in endings:
+        for entry in entries:
+            name = _frame_name(entry, endings)
+            if name and entry.name == name + ending:
+                files.setdefault(name, entry)
+    if not files:
+        raise InputError(f"{path}: holds no labels, expected files that end in {', '.join(endings)}")
+    return files
+
+
+def _known(format: str) -> str:
+    if format not in FORMATS:
+        raise ParameterError(f"format: got {format!r}, expected one of {', '.join(FORMATS)}")
+    return format
+
+
+def _frame_name(path: Path, endings: list[str]) -> str | None:
+    return next((path.name.removesuffix(ending) for ending in endings if path.name.endswith(ending)), None)
+
+
+def _listed(names: list[str]) -> str:
+    shown = ", ".join(names[:LISTED])
+    return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"

@@ -1,0 +1,56 @@
+"""SemanticKITTI `.label` files: uint32 a point, semantic class in the lower half, instance in the upper."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from ldls.errors import CorruptFileError, InputError, TruncatedFileError
+from ldls.io.files import whole_file
+from ldls.labeling import Labeling
+from ldls.segmentation import Segmentation
+
+SEMANTIC_KITTI: dict[int, str] = {
+    0: "unlabeled", 1: "outlier", 10: "car", 11: "bicycle", 13: "bus", 15: "motorcycle", 16: "on-rails", 18: "truck",
+    20: "other-vehicle", 30: "person", 31: "bicyclist", 32: "motorcyclist", 40: "road", 44: "parking", 48: "sidewalk",
+    49: "other-ground", 50: "building", 51: "fence", 52: "other-structure", 60: "lane-marking", 70: "vegetation",
+    71: "trunk", 72: "terrain", 80: "pole", 81: "traffic-sign", 99: "other-object", 252: "moving-car",
+    253: "moving-bicyclist", 254: "moving-person", 255: "moving-motorcyclist", 256: "moving-on-rails",
+    257: "moving-bus", 258: "moving-truck", 259: "moving-other-vehicle",
+}  # fmt: skip
+"""Classes by their numbers."""
+
+OTHER_OBJECT = 99
+CLASSES = {1: 30, 2: 11, 3: 10, 4: 15, 6: 13, 7: 16, 8: 18, 13: 81, 64: 70}
+"""SemanticKITTI class of a COCO category: person, bicycle, car, motorcycle, bus, on-rails, truck, traffic sign and
+vegetation; anything else is `OTHER_OBJECT`. Background and points out of view are 0, unlabeled."""
+LABEL_BYTES = 4
+
+
+def read_semantic_kitti(path: str | PathLike[str]) -> Labeling:
+    """Labels of a file, one a point in the order of the scan.
+
+    Raises:
+        TruncatedFileError: The size is no whole number of labels.
+        CorruptFileError: A label has a class that SemanticKITTI does not; the message names the point.
+        FileNotFoundError: There is no such file.
+    """
+    path = Path(path)
+    content = path.read_bytes()
+    if len(content) % LABEL_BYTES:
+        raise TruncatedFileError(f"{path}: {len(content)} bytes is not a multiple of 4 (uint32 a point)")
+    values = np.frombuffer(content, "<u4")
+    try:
+        return Labeling.from_codes(values & 0xFFFF, SEMANTIC_KITTI, instances=values >> 16)
+    except InputError as error:
+        raise CorruptFileError(f"{path}: {error}") from None
+
+
+def write(path: Path, result: Segmentation) -> None:
+    """Write the labels of `result`, one a point in the order of the cloud."""
+    classes = [CLASSES.get(instance.category, OTHER_OBJECT) for instance in result.instances]
+    codes = np.array([0, *classes], np.uint32) | np.arange(len(classes) + 1, dtype=np.uint32) << 16
+    with whole_file(path) as file:
+        file.write(result.per_point(codes).astype("<u4").tobytes())
