@@ -69,9 +69,9 @@ def instance_colours(categories: Iterable[int]) -> NDArray[np.uint8]:
     return np.array(colours, np.uint8).reshape(-1, 3)
 
 
-def label_colours(categories: Iterable[int], *, out_of_view: Colour = BACKGROUND) -> NDArray[np.uint8]:
-    """(M + 2, 3) uint8 by label: the background, the M instances, and last, where label -1 finds it, out of view."""
-    return np.vstack([[BACKGROUND], instance_colours(categories), [out_of_view]]).astype(np.uint8)
+def label_colours(categories: Iterable[int]) -> NDArray[np.uint8]:
+    """(M + 1, 3) uint8 by label: the background, and the M instances."""
+    return np.vstack([[BACKGROUND], instance_colours(categories)]).astype(np.uint8)
 
 
 def as_tuples(colours: NDArray[np.uint8]) -> list[Colour]:

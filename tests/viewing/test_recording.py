@@ -20,8 +20,8 @@ from rerun.error_utils import RerunWarning
 import ldls
 from conftest import pinhole
 from ldls import stages
-from ldls.evaluation import Labeling
 from ldls.explaining import rebuild
+from ldls.labeling import Labeling
 from ldls.palette import BACKGROUND, category_colour, instance_colours
 from ldls.viewing import recording
 from ldls.viewing.depth import depth_colours

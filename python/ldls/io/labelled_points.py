@@ -24,7 +24,7 @@ def instances(result: Segmentation) -> NDArray[np.uint32]:
 
 def colors(result: Segmentation) -> NDArray[np.uint8]:
     """(N, 3) uint8: red, green and blue of each point, grey for background and out of view."""
-    colours: NDArray[np.uint8] = label_colours(instance.category for instance in result.instances)[result.labels]
+    colours: NDArray[np.uint8] = result.per_point(label_colours(instance.category for instance in result.instances))
     return colours
 
 

@@ -113,8 +113,8 @@ def log_truth_context(entity: Entity, truth: Labeling) -> NDArray[np.uint8]:
 
 
 def label_colours(result: Segmentation) -> NDArray[np.uint8]:
-    """(M + 2, 3) colours by label: background, the instances, and last, where label -1 finds it, out of view."""
-    return palette.label_colours((i.category for i in result.instances), out_of_view=OUT_OF_VIEW_COLOUR)
+    """(M + 1, 3) colours by label."""
+    return palette.label_colours(instance.category for instance in result.instances)
 
 
 def fields_of_points(result: Segmentation, labels: NDArray[np.int32]) -> dict[str, NDArray[Any]]:
@@ -122,11 +122,13 @@ def fields_of_points(result: Segmentation, labels: NDArray[np.int32]) -> dict[st
 
     Class ids are categories, keypoint ids labels, save that of points out of view.
     """
-    categories = np.array([0, *(instance.category for instance in result.instances), 0], np.uint16)
+    out_of_view, inside = labels < 0, np.maximum(labels, 0)
+    colours = label_colours(result)[inside]
+    colours[out_of_view] = OUT_OF_VIEW_COLOUR
     return {
-        "colors": label_colours(result)[labels],
-        "class_ids": categories[labels],
-        "keypoint_ids": np.where(labels < 0, OUT_OF_VIEW_ID, labels).astype(np.uint16),
+        "colors": colours,
+        "class_ids": np.array([0, *(instance.category for instance in result.instances)], np.uint16)[inside],
+        "keypoint_ids": np.where(out_of_view, OUT_OF_VIEW_ID, labels).astype(np.uint16),
     }
 
 

@@ -39,7 +39,7 @@ def log_diffusion(root: Entity, names: Names, result: Segmentation, every: int) 
     for iteration, z in _steps(result, every):
         stream.set_time(TIMELINE, sequence=iteration)
         fields = fields_of_points(result, z.argmax(axis=1).astype(np.int32))
-        points.log(rr.Points3D.from_fields(**fields | {"colors": _blended(z, label_colours(result)[:-1])}))
+        points.log(rr.Points3D.from_fields(**fields | {"colors": _blended(z, label_colours(result))}))
     stream.disable_timeline(TIMELINE)
 
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ldls.datasets import Frame
 from ldls.errors import ParameterError
-from ldls.evaluation import Labeling
 from ldls.io.files import whole_file
+from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
 from ldls.view import camera_names
 from ldls.viewing.recording import viewer
