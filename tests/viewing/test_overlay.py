@@ -7,7 +7,7 @@ import pytest
 
 import ldls
 from ldls.palette import BACKGROUND, instance_colours
-from ldls.viewing import masks_overlay, overlay
+from ldls.viewing import comparison, masks_overlay, overlay
 from ldls.viewing.drawing import MARK
 from ldls.viewing.overlay import overlay_of
 from ldls.viewing.shown import Shown, images_of
@@ -95,6 +95,16 @@ def test_a_ring_has_a_picture_a_camera_with_its_name(small_scene) -> None:
     picture = overlay(result, [photo(), None, photo()], width_px=400)
     assert picture.size == (2 * 400 + 6, 2 * (300 + 30))
     assert overlay(result).width == 1800
+
+
+def test_cameras_without_names_are_numbered(small_scene) -> None:
+    points, masks, camera = small_scene
+    for picture in (overlay, comparison):
+        unnamed, numbered = (
+            np.asarray(picture(ldls.segment(points, [ldls.View(masks, camera, name) for name in names])))
+            for names in (("", ""), ("camera 0", "camera 1"))
+        )
+        np.testing.assert_array_equal(unnamed, numbered)
 
 
 @pytest.mark.parametrize(

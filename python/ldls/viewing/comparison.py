@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.segmentation import Segmentation
+from ldls.view import camera_names
 from ldls.viewing.birds_eye import birds_eye_of
 from ldls.viewing.drawing import grid, half
 from ldls.viewing.ground import ground_of
@@ -54,7 +55,7 @@ def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]]) -> Ima
     tiles = [
         overlay_of(shown, seen, image, each_px) for seen, image in zip(views, images, strict=True) for shown in pair
     ]
-    cameras = [name for seen in views[1:] for name in (seen.view.name, seen.view.name)]
+    cameras = [name for name in camera_names(views)[1:] for _ in pair]
     return grid(tiles, [*captions(pair[0].result), *cameras], columns=1 if stacked else 2)
 
 

@@ -12,7 +12,7 @@ from ldls.errors import ParameterError
 from ldls.masks import InstanceMasks
 from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
-from ldls.view import SeenView
+from ldls.view import SeenView, camera_names
 from ldls.viewing.drawing import MARK, disc, grid, half, stamp
 from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of
 from ldls.viewing.tags import Tag, draw_tags
@@ -51,7 +51,7 @@ def overlay(
         return overlay_of(shown, result.views[0], each[0], width_px or WIDTH_PX)
     pairs = zip(result.views, each, strict=True)
     tiles = [overlay_of(shown, seen, image, width_px or half(WIDTH_PX)) for seen, image in pairs]
-    return grid(tiles, [seen.view.name for seen in result.views], columns=2)
+    return grid(tiles, camera_names(result.views), columns=2)
 
 
 def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) -> Image.Image:

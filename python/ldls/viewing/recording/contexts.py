@@ -65,21 +65,15 @@ class Names:
         """
         return np.array([0, *(self._named[key][0] for key in _keys(result))], np.uint16)
 
-    def log_of_points(self, entity: Entity) -> None:
-        """Log the context of points: categories as classes, the instances of each as its keypoints."""
-        self._log(entity, self._of_points)
-
-    def log_of_masks(self, entity: Entity) -> None:
-        """Log the context of mask images: instances as classes; 0 is clear, so that the image shows."""
-        self._log(entity, self._of_masks)
-
-    def _log(self, entity: Entity, context: Callable[[], Any]) -> None:
+    def log(self, entity: Entity, context: Callable[[], Any]) -> None:
+        """Log `of_points` or `of_masks` at an entity, unless it has all these names already."""
         # names are only ever added: as many are the same
         if self._logged.get(entity.path) != len(self._named):
             entity.stream.log_context(entity, context())
             self._logged[entity.path] = len(self._named)
 
-    def _of_points(self) -> Any:  # noqa: ANN401
+    def of_points(self) -> Any:  # noqa: ANN401
+        """The context of points: categories as classes, the instances of each as its keypoints."""
         rr = rerun()
         nothing = [rr.AnnotationInfo(0, "background", BACKGROUND)]
         nothing += [rr.AnnotationInfo(OUT_OF_VIEW_ID, "out of view", OUT_OF_VIEW_COLOUR)]
@@ -95,7 +89,8 @@ class Names:
             classes.append(rr.ClassDescription(info=info, keypoint_annotations=list(own.values())))
         return rr.AnnotationContext(classes)
 
-    def _of_masks(self) -> Any:  # noqa: ANN401
+    def of_masks(self) -> Any:  # noqa: ANN401
+        """The context of mask images: instances as classes; 0 is clear, so that the image shows."""
         rr = rerun()
         named = self._named.items()
         infos = [rr.AnnotationInfo(n, f"{name} {label}", colour) for (_, label, colour), (n, name) in named]

@@ -32,7 +32,7 @@ def log_diffusion(root: Entity, names: Names, result: Segmentation, every: int) 
     require("scipy.sparse", "viz")
     names.add(result)
     root.log(rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    names.log_of_points(root)
+    names.log(root, names.of_points)
     points, stream = root / "points", root.stream.rerun
     stream.set_time(TIMELINE, sequence=0)
     log_points(points, result.points[result.in_view])

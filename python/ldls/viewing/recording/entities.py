@@ -44,7 +44,7 @@ def log_result(
             raise InputError(f"images: there is no camera {name!r}, expected {', '.join(cameras)}")
     names.add(result)
     root.log(rerun().ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    names.log_of_points(root)
+    names.log(root, names.of_points)
     finite, seen_by_any = finite_rows(result.points), result.in_view
     log_points(root / "points", result.points[finite], **fields_of_points(result, result.labels[finite]))
     direct = fields_of_points(result, result.direct_labels[seen_by_any])
@@ -59,7 +59,7 @@ def log_result(
         if camera in images:
             log_image(place / "image", images[camera], size)
         masks = place / "image" / "masks"
-        names.log_of_masks(masks)
+        names.log(masks, names.of_masks)
         log_masks(masks, seen, names.mask_ids(result))
         labels = result.labels[seen.in_view]
         radii = rerun().Radius.ui_points(np.where(labels > 0, POINT_PX, BACKGROUND_POINT_PX))
