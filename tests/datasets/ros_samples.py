@@ -5,10 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ldls.io.ros.bags import Topic
-from ldls.io.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, POINTS, TRANSFORMS, Header
+from ldls.io.ros.messages import (
+    CAMERA_INFO,
+    COMPRESSED_IMAGE,
+    IMAGE,
+    POINTS,
+    TRANSFORMS,
+    Header,
+    Topic,
+    make,
+    make_header,
+)
 from ldls.io.ros.point_cloud2 import encode
-from ldls.io.ros.types import make, make_header
 from ldls.io.ros.writer import BagWriter
 
 START_NS = 1_000_000_000_000

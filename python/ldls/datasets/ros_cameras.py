@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.camera.camera_info import MESSAGE_FIELDS
-from ldls.io.ros.messages import InfoMessage
+from ldls.io.ros.messages import Message
 
 ROTATION = ("R", "r")
 
 
-def camera_of(info: InfoMessage, T_camera_lidar: NDArray[np.float64], rectified: bool) -> Camera:
+def camera_of(info: Message, T_camera_lidar: NDArray[np.float64], rectified: bool) -> Camera:
     """The camera that a CameraInfo message describes, by K and D of raw images and by P of rectified ones.
 
     Transforms of ROS lead to the frame in which P projects points (`image_geometry` does so), which R leads to from the

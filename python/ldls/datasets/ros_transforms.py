@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion
 from ldls.errors import CalibrationError
-from ldls.io.ros.messages import RigidMessage, TransformsMessage, nanoseconds
+from ldls.io.ros.messages import Message, nanoseconds
 
 Matrix = NDArray[np.float64]
 
@@ -40,15 +40,13 @@ class TransformTree:
     Moving transforms are read only when static ones do not connect what is asked for.
     """
 
-    def __init__(
-        self, static: Iterable[TransformsMessage], moving: Callable[[], Iterable[TransformsMessage]] | None = None
-    ) -> None:
+    def __init__(self, static: Iterable[Message], moving: Callable[[], Iterable[Message]] | None = None) -> None:
         """A tree of the messages of /tf_static, and a function that reads those of /tf."""
         self._edges: dict[str, _Edge] = {}
         self._moving = moving
         self._add(static)
 
-    def _add(self, messages: Iterable[TransformsMessage]) -> None:
+    def _add(self, messages: Iterable[Message]) -> None:
         for message in messages:
             for one in message.transforms:
                 child, parent = _plain(one.child_frame_id), _plain(one.header.frame_id)
@@ -103,7 +101,7 @@ def _plain(frame_id: str) -> str:
     return frame_id.removeprefix("/")
 
 
-def _matrix(message: RigidMessage, name: str) -> Matrix:
+def _matrix(message: Message, name: str) -> Matrix:
     """(4, 4) from translation in metres and unit quaternion."""
     q, t = message.rotation, message.translation
     rotation = from_quaternion(f"transforms: from {name}", np.array([q.w, q.x, q.y, q.z], np.float64))

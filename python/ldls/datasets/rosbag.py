@@ -20,7 +20,7 @@ from ldls.datasets.ros_topics import RosTopics, choose_topics
 from ldls.datasets.ros_transforms import TransformTree
 from ldls.datasets.transform_files import read_transform
 from ldls.errors import CalibrationError, FileFormatError, InputError, ParameterError
-from ldls.io.ros.bags import SUFFIXES, decode, open_bag, storage_files
+from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
 from ldls.io.ros.images import decode_compressed, decode_image
 from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, read_header, seconds
 from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud
@@ -257,7 +257,7 @@ class RosBag:
         kinds = (TRANSFORMS, OLD_TRANSFORMS)
         topics = [t.name for t in self._bag.topics.values() if t.type in kinds and t.name.endswith(name)]
         for message in self._bag.messages(topics):
-            yield decode(self._bag, message.topic, message.raw)
+            yield self._bag.decode(message.topic, message.raw)
 
     def _pixels(self, entry: _Entry, image_size: tuple[int, int] | None) -> NDArray[np.uint8]:
         compressed = self._bag.topics[entry.topic].type == COMPRESSED_IMAGE
@@ -273,7 +273,7 @@ class RosBag:
     def _message(self, entry: _Entry) -> Any:  # noqa: ANN401
         with self._reading:  # readers of bags seek in one file
             content = self._bag.read(entry.topic, entry.received_ns, entry.rank)
-        return decode(self._bag, entry.topic, content)
+        return self._bag.decode(entry.topic, content)
 
     def _place(self, entry: _Entry, error: object) -> str:
         return f"{self.path}: {entry.topic} at {seconds(entry.header.stamp_ns)}: {error}"

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ldls.errors import LimitError, UnsupportedFormatError
 from ldls.io.labelled_points import colors
-from ldls.io.ros.bags import Topic, open_bag
-from ldls.io.ros.messages import POINTS, Header
+from ldls.io.ros.bags import open_bag
+from ldls.io.ros.messages import POINTS, Header, Topic
 from ldls.io.ros.point_cloud2 import encode
 from ldls.io.ros.writer import BagWriter
 from ldls.segmentation import Segmentation

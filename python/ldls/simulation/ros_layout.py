@@ -21,10 +21,19 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.io.files import whole_file
-from ldls.io.ros.bags import Topic
-from ldls.io.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, NANOSECONDS, POINTS, TRANSFORMS, Header
+from ldls.io.ros.messages import (
+    CAMERA_INFO,
+    COMPRESSED_IMAGE,
+    IMAGE,
+    NANOSECONDS,
+    POINTS,
+    TRANSFORMS,
+    Header,
+    Topic,
+    make,
+    make_header,
+)
 from ldls.io.ros.point_cloud2 import encode
-from ldls.io.ros.types import make, make_header
 from ldls.io.ros.writer import BagWriter
 from ldls.simulation.boxes import annotation_name
 from ldls.simulation.errors import SegmenterErrors

@@ -12,7 +12,7 @@ pytest.importorskip("rosbags")
 from datasets.ros_samples import image, picture
 from ldls.errors import CorruptFileError, UnsupportedFormatError
 from ldls.io.ros.images import decode_compressed, decode_image
-from ldls.io.ros.types import standard_types
+from ldls.io.ros.messages import standard_types
 
 TYPES = standard_types(ros2=True)
 RGB = picture(size=(9, 11))

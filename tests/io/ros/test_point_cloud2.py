@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 pytest.importorskip("rosbags")
 
 from ldls.errors import CorruptFileError, FileFormatError, InputError, UnsupportedFormatError
-from ldls.io.ros.messages import Header, read_header
+from ldls.io.ros.messages import Header, read_header, serialize, standard_types
 from ldls.io.ros.point_cloud2 import DATATYPES, POINTS, decode, encode
-from ldls.io.ros.types import serialize, standard_types
 
 NUMBERS = {kind: number for number, kind in DATATYPES.items()}
 XYZ = (("x", "f4"), ("y", "f4"), ("z", "f4"))

@@ -6,11 +6,14 @@ import struct
 import threading
 import warnings
 import weakref
-from collections.abc import Iterable, Iterator
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from itertools import islice
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from ldls._optional import require
 from ldls.errors import (
@@ -20,89 +23,82 @@ from ldls.errors import (
     TruncatedFileError,
     UnsupportedFormatError,
 )
-from ldls.io.ros.messages import seconds
-from ldls.io.ros.salvage import Salvage, salvage
-from ldls.io.ros.salvage_db3 import check_size
-from ldls.io.ros.types import standard_types
+from ldls.io.ros.messages import Message, RawMessage, Topic, Types, seconds, standard_types
+from ldls.io.ros.salvage import Salvage, check_database_size, salvage
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 BROKEN = (
     AssertionError, EOFError, IndexError, KeyError, OverflowError, RuntimeError, TypeError, ValueError, struct.error,
 )  # fmt: skip
-"""What readers of storage files raise over bytes that make no sense."""
+"""Errors of readers of storage files over bytes that make no sense."""
+Read = Callable[[Collection[str], int | None, int | None], Iterator[RawMessage]]
+"""Reads the messages of some topics that were received from one time on and before another, in that order."""
 
 
-@dataclass(frozen=True)
-class Topic:
-    """A topic of a bag.
-
-    Attributes:
-        name: Its name, as "/camera/image_raw".
-        type: Type of its messages, as "sensor_msgs/msg/Image".
-        count: How many there are.
-        latched: Whether late subscribers are given the last message, as with /tf_static.
-    """
-
-    name: str
-    type: str
-    count: int
-    latched: bool = False
-
-
-@dataclass(frozen=True)
-class RawMessage:
-    """A message as it lies in a bag.
-
-    Attributes:
-        topic: Name of its topic.
-        received_ns: When it was recorded, in nanoseconds.
-        raw: The serialised message.
-    """
-
-    topic: str
-    received_ns: int
-    raw: bytes
-
-
-class Bag(Protocol):
+class Bag:
     """A bag open for reading.
 
     Attributes:
-        path: Where it lies.
-        ros2: Whether its messages are serialised as ROS 2 does.
-        types: The typestore of `rosbags` that knows its messages.
+        path: Its file or folder.
+        ros2: True if its messages are serialised as ROS 2 does.
+        types: The typestore that knows its messages.
         topics: Its topics by name.
     """
 
-    path: Path
-    ros2: bool
-    types: Any
-    topics: dict[str, Topic]
+    def __init__(
+        self,
+        path: Path,
+        types: Types,
+        topics: dict[str, Topic],
+        read: Read,
+        close: Callable[[], None] = lambda: None,
+        *,
+        ros2: bool,
+    ) -> None:
+        self.path, self.types, self.topics, self.ros2 = path, types, topics, ros2
+        self._read = read
+        # bags that nobody closes are closed with their last user
+        self._close = weakref.finalize(self, close)
+        self._lock = threading.Lock()
 
-    def messages(self, topics: Iterable[str]) -> Iterator[RawMessage]:
-        """The messages of some topics in the order of their reception."""
-        ...
+    def messages(
+        self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[RawMessage]:
+        """The messages of some topics in the order of their reception, all or those in [start_ns, stop_ns).
+
+        Raises:
+            CorruptFileError: The bag is damaged.
+        """
+        with _plain_errors(self.path):
+            yield from self._read(topics, start_ns, stop_ns)
 
     def read(self, topic: str, received_ns: int, rank: int = 0) -> bytes:
-        """The message that is number `rank` among those of a topic received at that moment."""
-        ...
+        """The message that is number `rank` among those of a topic received at that moment.
+
+        Raises:
+            CorruptFileError: The bag is damaged.
+        """
+        with self._lock:  # readers of bags seek in one file
+            for number, message in enumerate(self.messages([topic], received_ns, received_ns + 1)):
+                if number == rank:
+                    return message.raw
+        raise CorruptFileError(f"{self.path}: {topic}: no message {rank} at {seconds(received_ns)}, but it was there")
+
+    def decode(self, topic: str, raw: bytes) -> Message:
+        """The message whose bytes are `raw`.
+
+        Raises:
+            CorruptFileError: The bytes are none of the topic's type.
+        """
+        kind = self.topics[topic].type
+        try:
+            return self.types.deserialize_cdr(raw, kind) if self.ros2 else self.types.deserialize_ros1(raw, kind)
+        except (require("rosbags.serde", "ros").SerdeError, *BROKEN) as error:
+            raise CorruptFileError(f"{self.path}: {topic}: not a whole {kind} ({error})") from None
 
     def close(self) -> None:
         """Close the files."""
-        ...
-
-
-def decode(bag: Bag, topic: str, raw: bytes) -> Any:  # noqa: ANN401
-    """The message whose bytes are `raw`.
-
-    Raises:
-        CorruptFileError: The bytes are none of the topic's type.
-    """
-    kind = bag.topics[topic].type
-    try:
-        return bag.types.deserialize_cdr(raw, kind) if bag.ros2 else bag.types.deserialize_ros1(raw, kind)
-    except (require("rosbags.serde", "ros").SerdeError, *BROKEN) as error:
-        raise CorruptFileError(f"{bag.path}: {topic}: not a whole {kind} ({error})") from None
+        self._close()
 
 
 def open_bag(path: Path, *, recover: bool = False) -> Bag:
@@ -110,7 +106,7 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
 
     Args:
         path: The bag.
-        recover: Whether a truncated bag, or one whose recording was never closed, yields its whole messages and a
+        recover: If true, a truncated bag, or one whose recording was never closed, yields its whole messages and a
             warning instead of an error.
 
     Raises:
@@ -129,23 +125,20 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
     try:
         for file in files:
             if file.suffix == ".db3":
-                check_size(file)
-        return _IndexedBag(path)
+                check_database_size(file)
+        return _indexed(path)
     except FileFormatError as error:
-        found = salvage(files)
-        if found.damage is None and not found.messages:
+        salvaged = salvage(files)
+        if salvaged.damage is None and not salvaged.messages:
             raise
-        damage = f"{path}: {found.damage}" if found.damage else str(error)
-        return _salvaged(path, found, damage, recover)
-
-
-def _salvaged(path: Path, found: Salvage, damage: str, recover: bool) -> Bag:
-    last = f"the last at {seconds(found.messages[-1].received_ns)}" if found.messages else "so nothing can be saved"
-    message = f"{damage}; {len(found.messages)} whole messages before it, {last}"
-    if not recover:
-        raise TruncatedFileError(f"{message}; pass recover=True to read them")
-    warnings.warn(message, RecoveredFileWarning, stacklevel=4)
-    return _SalvagedBag(path, found)
+        damage = f"{path}: {salvaged.damage}" if salvaged.damage else str(error)
+        whole = salvaged.messages
+        last = f"the last at {seconds(whole[-1].received_ns)}" if whole else "so nothing can be saved"
+        message = f"{damage}; {len(whole)} whole messages before it, {last}"
+        if not recover:
+            raise TruncatedFileError(f"{message}; pass recover=True to read them") from error
+        warnings.warn(message, RecoveredFileWarning, stacklevel=3)
+        return _recovered(path, salvaged, ros2=files[0].suffix != ".bag")
 
 
 def storage_files(path: Path) -> list[Path]:
@@ -155,78 +148,25 @@ def storage_files(path: Path) -> list[Path]:
     return sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
 
 
-class _IndexedBag:
+def _indexed(path: Path) -> Bag:
     """A whole bag, read through its index."""
+    with _plain_errors(path):
+        reader = require("rosbags.highlevel", "ros").AnyReader(
+            [path], default_typestore=standard_types(ros2=path.suffix != ".bag")
+        )
+        reader.open()
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        with _plain_errors(path):
-            reader = require("rosbags.highlevel", "ros").AnyReader(
-                [path], default_typestore=standard_types(ros2=path.suffix != ".bag")
-            )
-            reader.open()
-        self._reader = reader
-        # bags that nobody closes are closed with their last user
-        self._close = weakref.finalize(self, reader.close)
-        self._lock = threading.Lock()
-        self.ros2 = bool(reader.is2)
-        self.types = reader.typestore
-        self.topics = {name: _topic(name, info) for name, info in reader.topics.items()}
-
-    def messages(self, topics: Iterable[str]) -> Iterator[RawMessage]:
-        wanted = set(topics)
-        connections = [c for c in self._reader.connections if c.topic in wanted]
-        if not connections:
-            return
-        with _plain_errors(self.path):
-            for connection, received_ns, raw in self._reader.messages(connections):
+    def read(topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[RawMessage]:
+        connections = [c for c in reader.connections if c.topic in topics]
+        if connections:  # the reader takes none for all
+            for connection, received_ns, raw in reader.messages(connections, start_ns, stop_ns):
                 yield RawMessage(connection.topic, received_ns, bytes(raw))
 
-    def read(self, topic: str, received_ns: int, rank: int = 0) -> bytes:
-        connections = [c for c in self._reader.connections if c.topic == topic]
-        with self._lock, _plain_errors(self.path):
-            found = self._reader.messages(connections, start=received_ns, stop=received_ns + 1)
-            for number, (_, _, raw) in enumerate(found):
-                if number == rank:
-                    return bytes(raw)
-        raise CorruptFileError(f"{self.path}: {topic}: no message {rank} at {seconds(received_ns)}, but it was there")
-
-    def close(self) -> None:
-        self._close()
-
-
-class _SalvagedBag:
-    """The whole messages of a damaged bag, read from where a scan found them."""
-
-    def __init__(self, path: Path, found: Salvage) -> None:
-        self.path = path
-        self.ros2 = found.ros2
-        self.types = standard_types(ros2=found.ros2)
-        self._messages = sorted(found.messages, key=lambda message: message.received_ns)
-        counts: dict[str, int] = {}
-        for message in self._messages:
-            counts[message.topic] = counts.get(message.topic, 0) + 1
-        self.topics = {
-            name: Topic(name, kind, counts.get(name, 0), latched=name == "/tf_static")
-            for name, kind in sorted(found.types.items())
-        }
-
-    def messages(self, topics: Iterable[str]) -> Iterator[RawMessage]:
-        wanted = set(topics)
-        for message in self._messages:
-            if message.topic in wanted:
-                yield RawMessage(message.topic, message.received_ns, message.read())
-
-    def read(self, topic: str, received_ns: int, rank: int = 0) -> bytes:
-        found = [m for m in self._messages if m.received_ns == received_ns and m.topic == topic]
-        return found[rank].read()
-
-    def close(self) -> None:
-        """Nothing is open between reads."""
-
-
-def _topic(name: str, info: Any) -> Topic:  # noqa: ANN401
-    return Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
+    topics = {
+        name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
+        for name, info in reader.topics.items()
+    }
+    return Bag(path, reader.typestore, topics, read, reader.close, ros2=bool(reader.is2))
 
 
 def _is_latched(ext: Any) -> bool:  # noqa: ANN401
@@ -235,9 +175,28 @@ def _is_latched(ext: Any) -> bool:  # noqa: ANN401
     return any(profile.durability.name == "TRANSIENT_LOCAL" for profile in ext.offered_qos_profiles)
 
 
+def _recovered(path: Path, salvaged: Salvage, *, ros2: bool) -> Bag:
+    """The whole messages of a damaged bag; nothing is open between reads."""
+
+    def read(topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[RawMessage]:
+        first = 0 if start_ns is None else bisect_left(salvaged.messages, start_ns, key=attrgetter("received_ns"))
+        for message in islice(salvaged.messages, first, None):
+            if stop_ns is not None and message.received_ns >= stop_ns:
+                return
+            if message.topic in topics:
+                yield RawMessage(message.topic, message.received_ns, message.read())
+
+    counts = Counter(message.topic for message in salvaged.messages)
+    topics = {
+        name: Topic(name, kind, counts[name], latched=name == "/tf_static")
+        for name, kind in sorted(salvaged.types.items())
+    }
+    return Bag(path, standard_types(ros2=ros2), topics, read, ros2=ros2)
+
+
 @contextmanager
 def _plain_errors(path: Path) -> Iterator[None]:
-    """What readers say of damaged bags, as one kind of error."""
+    """One kind of error for damaged bags, whatever their reader raises."""
     readers = require("rosbags.highlevel", "ros")
     storages = (require("rosbags.rosbag1", "ros").ReaderError, require("rosbags.rosbag2", "ros").ReaderError)
     typesys = require("rosbags.typesys", "ros").TypesysError

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from ldls.errors import CorruptFileError, LimitError, UnsupportedFormatError
-from ldls.io.ros.messages import CompressedImageMessage, ImageMessage
+from ldls.io.ros.messages import Message
 
 Pixels = NDArray[np.uint8]
 
@@ -22,7 +22,7 @@ BAYER = {"bayer_rggb": "RGGB", "bayer_bggr": "BGGR", "bayer_gbrg": "GBRG", "baye
 """Colours of the upper left four pixels, by rows."""
 
 
-def decode_image(message: ImageMessage) -> Pixels:
+def decode_image(message: Message) -> Pixels:
     """(H, W, 3) uint8 RGB pixels; of 16 bits the upper 8, of a Bayer pattern the bilinear colours.
 
     Raises:
@@ -41,7 +41,7 @@ def decode_image(message: ImageMessage) -> Pixels:
     raise UnsupportedFormatError(f"image: encoding {encoding!r} is not read, expected one of {known}")
 
 
-def _samples(message: ImageMessage, channels: int, sample_bytes: int) -> Pixels:
+def _samples(message: Message, channels: int, sample_bytes: int) -> Pixels:
     """(H, W, channels) samples of 8 bits; rows are `step` bytes apart."""
     height, width, step = message.height, message.width, message.step
     row_bytes = width * channels * sample_bytes
@@ -81,7 +81,7 @@ def _spread(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return summed
 
 
-def decode_compressed(message: CompressedImageMessage) -> Pixels:
+def decode_compressed(message: Message) -> Pixels:
     """(H, W, 3) uint8 RGB pixels of a JPEG or PNG.
 
     Raises:

@@ -1,15 +1,15 @@
-"""The ROS messages that are read and written, as far as they are used, and where their fields differ."""
+"""The ROS messages that are read and written, and the typestores that know them.
+
+A message is an object of `rosbags`, with the attributes that its definition names.
+"""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ldls._optional import require
 from ldls.errors import CorruptFileError
 
 POINTS = "sensor_msgs/msg/PointCloud2"
@@ -18,13 +18,51 @@ COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 OLD_TRANSFORMS = "tf/msg/tfMessage"
-"""What early ROS 1 calls the same message."""
+"""Name of the same message in early ROS 1."""
+TRANSFORM_LIST = "geometry_msgs/TransformStamped[] transforms"
 NANOSECONDS = 1_000_000_000
+
+Message = Any
+"""A deserialised message; `rosbags` comes without types for mypy."""
+Types = Any
+"""A typestore of `rosbags`."""
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag.
+
+    Attributes:
+        name: Its name, as "/camera/image_raw".
+        type: Type of its messages, as "sensor_msgs/msg/Image".
+        count: Number of its messages.
+        latched: True if late subscribers are given the last message, as with /tf_static.
+    """
+
+    name: str
+    type: str
+    count: int
+    latched: bool = False
+
+
+@dataclass(frozen=True)
+class RawMessage:
+    """A message as it lies in a bag.
+
+    Attributes:
+        topic: Name of its topic.
+        received_ns: Time of its recording, in nanoseconds.
+        raw: The serialised message.
+    """
+
+    topic: str
+    received_ns: int
+    raw: bytes
 
 
 @dataclass(frozen=True)
 class Header:
-    """When and in which frame something was measured.
+    """Time and frame of a measurement.
 
     Attributes:
         stamp_ns: Time of measurement, in nanoseconds.
@@ -35,119 +73,9 @@ class Header:
     frame_id: str
 
 
-class TimeMessage(Protocol):
-    """builtin_interfaces/Time."""
-
-    sec: int
-    nanosec: int
-
-
-class HeaderMessage(Protocol):
-    """std_msgs/Header."""
-
-    stamp: TimeMessage
-    frame_id: str
-
-
-class FieldMessage(Protocol):
-    """sensor_msgs/PointField."""
-
-    name: str
-    offset: int
-    datatype: int
-    count: int
-
-
-class PointsMessage(Protocol):
-    """sensor_msgs/PointCloud2."""
-
-    header: HeaderMessage
-    height: int
-    width: int
-    fields: Sequence[FieldMessage]
-    is_bigendian: bool
-    point_step: int
-    row_step: int
-    data: NDArray[np.uint8]
-    is_dense: bool
-
-
-class ImageMessage(Protocol):
-    """sensor_msgs/Image."""
-
-    height: int
-    width: int
-    encoding: str
-    is_bigendian: int
-    step: int
-    data: NDArray[np.uint8]
-
-
-class CompressedImageMessage(Protocol):
-    """sensor_msgs/CompressedImage."""
-
-    format: str
-    data: NDArray[np.uint8]
-
-
-class RegionMessage(Protocol):
-    """sensor_msgs/RegionOfInterest."""
-
-    x_offset: int
-    y_offset: int
-    height: int
-    width: int
-
-
-class InfoMessage(Protocol):
-    """sensor_msgs/CameraInfo; its matrices are D, K, R and P in ROS 1 and d, k, r and p in ROS 2."""
-
-    height: int
-    width: int
-    distortion_model: str
-    binning_x: int
-    binning_y: int
-    roi: RegionMessage
-
-
-class VectorMessage(Protocol):
-    """geometry_msgs/Vector3."""
-
-    x: float
-    y: float
-    z: float
-
-
-class QuaternionMessage(VectorMessage, Protocol):
-    """geometry_msgs/Quaternion."""
-
-    w: float
-
-
-class RigidMessage(Protocol):
-    """geometry_msgs/Transform."""
-
-    translation: VectorMessage
-    rotation: QuaternionMessage
-
-
-class StampedTransformMessage(Protocol):
-    """geometry_msgs/TransformStamped."""
-
-    header: HeaderMessage
-    child_frame_id: str
-    transform: RigidMessage
-
-
-class TransformsMessage(Protocol):
-    """tf2_msgs/TFMessage."""
-
-    transforms: Sequence[StampedTransformMessage]
-
-
-def nanoseconds(stamp: TimeMessage) -> int:
-    """A stamp as one number."""
-    return stamp.sec * NANOSECONDS + stamp.nanosec
+def nanoseconds(stamp: Message) -> int:
+    """The stamp (builtin_interfaces/Time) as one number."""
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
 
 
 def seconds(stamp_ns: int) -> str:
@@ -164,7 +92,7 @@ def read_header(raw: bytes | memoryview, *, ros2: bool) -> Header:
     Raises:
         CorruptFileError: The message is too short.
     """
-    order = "<" if not ros2 or raw[1:2] in (b"", b"\x01") or bytes(raw[1:2])[0] & 1 else ">"
+    order = "<" if not ros2 or (raw[1:2] or b"\x01")[0] & 1 else ">"
     try:
         sec, nanosec, length = struct.unpack_from(f"{order}III", raw, 4)
     except struct.error:
@@ -173,3 +101,35 @@ def read_header(raw: bytes | memoryview, *, ros2: bool) -> Header:
         raise CorruptFileError(f"message of {len(raw)} bytes, its frame_id alone has {length}")
     frame_id = bytes(raw[16 : 16 + length]).rstrip(b"\0").decode("utf-8", "replace")
     return Header(sec * NANOSECONDS + nanosec, frame_id)
+
+
+def standard_types(*, ros2: bool) -> Types:
+    """The typestore of `rosbags` with the messages that come with ROS.
+
+    Raises:
+        ImportError: The extra `ros` is not installed.
+    """
+    typesys = require("rosbags.typesys", "ros")
+    types = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE if ros2 else typesys.Stores.ROS1_NOETIC)
+    for name in (TRANSFORMS, OLD_TRANSFORMS):
+        if name not in types.fielddefs:
+            types.register(typesys.get_types_from_msg(TRANSFORM_LIST, name))
+    return types
+
+
+def make(types: Types, kind: str, /, **fields: object) -> Message:
+    """A message of the type `kind`, as "sensor_msgs/msg/Image", from its fields."""
+    return types.types[kind](**fields)
+
+
+def make_header(types: Types, header: Header) -> Message:
+    """A std_msgs/Header."""
+    sec, nanosec = divmod(header.stamp_ns, NANOSECONDS)
+    stamp = make(types, "builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
+    sequence = {"seq": 0} if "seq" in types.types["std_msgs/msg/Header"].__dataclass_fields__ else {}
+    return make(types, "std_msgs/msg/Header", stamp=stamp, frame_id=header.frame_id, **sequence)
+
+
+def serialize(types: Types, message: Message, kind: str, *, ros2: bool) -> bytes:
+    """The bytes of a message in a bag."""
+    return bytes(types.serialize_cdr(message, kind) if ros2 else types.serialize_ros1(message, kind))

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, FileFormatError, InputError, UnsupportedFormatError
-from ldls.io.ros.messages import POINTS, FieldMessage, Header, PointsMessage, nanoseconds
-from ldls.io.ros.types import make, make_header
+from ldls.io.ros.messages import POINTS, Header, Message, Types, make, make_header, nanoseconds
 
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """sensor_msgs/PointField: the number of each type."""
@@ -65,7 +64,7 @@ class PointCloud:
                 )
 
 
-def decode(message: PointsMessage) -> PointCloud:
+def decode(message: Message) -> PointCloud:
     """The points of a message: `height` rows of `width` points, `row_step` and `point_step` bytes apart.
 
     Raises:
@@ -91,7 +90,7 @@ def decode(message: PointsMessage) -> PointCloud:
     return PointCloud(header, rows.astype(layout.newbyteorder("=")).reshape(-1))
 
 
-def _layout(message: PointsMessage) -> np.dtype[np.void]:
+def _layout(message: Message) -> np.dtype[np.void]:
     order = ">" if message.is_bigendian else "<"
     names = [field.name for field in message.fields]
     if len(set(names)) != len(names):
@@ -107,7 +106,7 @@ def _layout(message: PointsMessage) -> np.dtype[np.void]:
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": message.point_step})
 
 
-def _format(field: FieldMessage, order: str) -> Any:  # noqa: ANN401
+def _format(field: Message, order: str) -> str | tuple[str, tuple[int]]:
     if field.datatype not in DATATYPES:
         raise UnsupportedFormatError(f"points: field {field.name!r} has type {field.datatype}, expected 1 to 8")
     kind = order + DATATYPES[field.datatype]
@@ -115,7 +114,7 @@ def _format(field: FieldMessage, order: str) -> Any:  # noqa: ANN401
     return kind if field.count <= 1 else (kind, (field.count,))
 
 
-def encode(types: Any, columns: Mapping[str, NDArray[Any]], header: Header) -> PointsMessage:  # noqa: ANN401
+def encode(types: Types, columns: Mapping[str, NDArray[Any]], header: Header) -> Message:
     """A message with a field for each column (N,), one after the other without gaps, little-endian.
 
     Raises:
@@ -138,7 +137,7 @@ def encode(types: Any, columns: Mapping[str, NDArray[Any]], header: Header) -> P
     packed = np.empty(count, [(name, "<" + column.dtype.str[1:]) for name, column in columns.items()])
     for name, column in columns.items():
         packed[name] = column
-    message: PointsMessage = make(
+    return make(
         types,
         POINTS,
         header=make_header(types, header),
@@ -151,4 +150,3 @@ def encode(types: Any, columns: Mapping[str, NDArray[Any]], header: Header) -> P
         data=packed.view(np.uint8).reshape(-1) if count else np.zeros(0, np.uint8),
         is_dense=all(column.dtype.kind != "f" or bool(np.isfinite(column).all()) for column in columns.values()),
     )
-    return message

@@ -1,24 +1,38 @@
-"""What is whole in a damaged bag, found by reading it from its beginning."""
+"""The whole messages of a bag that is cut off.
+
+`rosbags` finds messages by the index at the end of a bag, and SQLite opens no file that is shorter than it says; so
+records and rows are read here one after the other, as far as they are whole.
+
+Formats: http://wiki.ros.org/Bags/Format/2.0, https://mcap.dev/spec, https://sqlite.org/fileformat2.html.
+"""
 
 from __future__ import annotations
 
+import mmap
 import struct
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
+from functools import cache, partial
+from io import BytesIO
 from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
 
 from ldls._optional import require
+from ldls.errors import TruncatedFileError
+
+Buffer = bytes | mmap.mmap
+WHOLE_PAGES = "ldls-whole-pages"
+TOPICS = "SELECT id, name, type FROM topics WHERE typeof(name) = 'text' AND typeof(type) = 'text'"
+MESSAGES = """
+    SELECT id, topic_id, timestamp, data FROM messages
+    WHERE typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY id
+"""
+"""Rows of a database; pages full of zeros hold NULL, and data are read so that those cut short count as damaged."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """A whole message.
-
-    Attributes:
-        topic: Name of its topic.
-        received_ns: When it was recorded, in nanoseconds.
-        read: Reads its bytes.
-    """
+class WholeMessage(NamedTuple):
+    """A message: its topic, its time of reception in nanoseconds, and a function that reads its bytes."""
 
     topic: str
     received_ns: int
@@ -27,47 +41,35 @@ class Found:
 
 @dataclass
 class Salvage:
-    """What was found in the storage files of a bag.
+    """The whole messages of the storage files of a bag.
 
     Attributes:
-        ros2: Whether the messages are serialised as ROS 2 does.
         types: Type of the messages of each topic.
-        messages: The whole messages in the order of the files.
-        damage: Where and how the first damaged file ends; None if none is damaged.
+        messages: The messages in the order of their reception.
+        damage: End of the first damaged file, in words; None if none is damaged.
     """
 
-    ros2: bool = True
     types: dict[str, str] = field(default_factory=dict)
-    messages: list[Found] = field(default_factory=list)
+    messages: list[WholeMessage] = field(default_factory=list)
     damage: str | None = None
 
 
 def salvage(files: Sequence[Path]) -> Salvage:
-    """The whole messages of storage files, read one after the other."""
-    from ldls.io.ros import salvage_db3, salvage_mcap, salvage_rosbag1
-
-    scanners = {".bag": salvage_rosbag1.scan, ".db3": salvage_db3.scan, ".mcap": salvage_mcap.scan}
-    found = Salvage(ros2=all(file.suffix != ".bag" for file in files))
-    for file in files:
+    """The whole messages of storage files."""
+    salvaged = Salvage()
+    for path in files:
         try:
-            damage = scanners[file.suffix](file, found)
-        except (KeyError, IndexError, ValueError, struct.error) as error:
+            damage = SCANS[path.suffix](path, salvaged).run()
+        except (require("rosbags.rosbag1", "ros").ReaderError, ValueError, struct.error) as error:
             damage = f"holds a record that makes no sense ({error})"
-        if damage and found.damage is None:
-            found.damage = f"{file.name}: {damage}" if len(files) > 1 else damage
-    return found
+        if damage and salvaged.damage is None:
+            salvaged.damage = f"{path.name}: {damage}" if len(files) > 1 else damage
+    salvaged.messages.sort(key=lambda message: message.received_ns)
+    return salvaged
 
 
-@dataclass(frozen=True)
-class Span:
-    """Bytes of a file, perhaps compressed.
-
-    Attributes:
-        path: The file.
-        start: Where they begin.
-        size: How many there are in the file.
-        compression: "" or "none", "bz2", "lz4" or "zstd".
-    """
+class _Chunk(NamedTuple):
+    """Records in a file, perhaps compressed."""
 
     path: Path
     start: int
@@ -75,7 +77,7 @@ class Span:
     compression: str = ""
 
     def read(self) -> bytes:
-        """The bytes, decompressed.
+        """The records, decompressed.
 
         Raises:
             ValueError: They cannot be decompressed.
@@ -83,29 +85,202 @@ class Span:
         with self.path.open("rb") as file:
             file.seek(self.start)
             content = file.read(self.size)
-        return decompressed(content, self.compression)
+        if self.compression in ("", "none"):
+            return content
+        try:
+            module = {"bz2": "bz2", "lz4": "lz4.frame", "zstd": "rosbags.rosbag2.reader"}[self.compression]
+            library = require(module, "ros")
+            return bytes(getattr(library, "zstd", library).decompress(content))
+        except Exception as error:  # each library has errors of its own
+            raise ValueError(f"chunk at byte {self.start}: no whole {self.compression!r} data, {error}") from None
 
     def read_part(self, start: int, size: int) -> bytes:
         """`size` bytes from `start` on, both counted after decompression."""
         if self.compression in ("", "none"):
-            return Span(self.path, self.start + start, size).read()
+            return self._replace(start=self.start + start, size=size).read()
         return self.read()[start : start + size]
 
 
-def decompressed(content: bytes, compression: str) -> bytes:
-    """The bytes that were compressed.
+class _Scan:
+    """A pass over a file of records, of which chunks hold further records."""
+
+    name: ClassVar[str]
+    magic: ClassVar[bytes]
+
+    def __init__(self, path: Path, salvaged: Salvage) -> None:
+        self.path, self.salvaged = path, salvaged
+        self.topics: dict[int, str] = {}
+        self.schemas: dict[int, str] = {}
+        self.indexed = False
+
+    def run(self) -> str | None:
+        """Take in the whole messages; the end of the file in words, None if it is whole."""
+        with self.path.open("rb") as file:
+            if file.read(len(self.magic)) != self.magic:
+                return f"does not begin with {self.magic!r}, so it is no {self.name}"
+            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+                return self.take(content, len(self.magic), _Chunk(self.path, 0, len(content)))
+
+    def take(self, content: Buffer, start: int, place: _Chunk) -> str | None:
+        """Take in the whole messages from `start` on of `content`, which lies at `place`."""
+        raise NotImplementedError
+
+    def add(self, channel: int, received_ns: int, read: Callable[[], bytes]) -> None:
+        """Take in a whole message."""
+        if channel in self.topics:
+            self.salvaged.messages.append(WholeMessage(self.topics[channel], received_ns, read))
+
+
+class _Rosbag1(_Scan):
+    """A ROS 1 bag: a record is a header of `name=value` fields and data, each after its length."""
+
+    name, magic = "ROS 1 bag", b"#ROSBAG V2.0\n"
+
+    def take(self, content: Buffer, start: int, place: _Chunk) -> str | None:
+        while start + 4 <= len(content):
+            (header_size,) = struct.unpack_from("<I", content, start)
+            data = start + 8 + header_size
+            if data > len(content) or header_size == 0:
+                break
+            header = _fields(content[start : data - 4])
+            (size,) = struct.unpack_from("<I", content, data - 4)
+            start = data + size
+            self.take_record(header, content, place, data, size)
+            if start > len(content):
+                return f"ends at byte {len(content)} within a record that goes on to {start}"
+        if start != len(content):
+            return f"ends at byte {len(content)} within the record at {start}"
+        return None if self.indexed else "has no index, as its recording was not closed"
+
+    def take_record(self, header: Any, content: Buffer, place: _Chunk, start: int, size: int) -> None:  # noqa: ANN401
+        kind, left = header.get_uint8("op"), len(content) - start
+        if kind == 5 and place.start == 0:  # a chunk, which holds no chunks
+            chunk = _Chunk(self.path, start, min(size, left), header.get_string("compression"))
+            self.take(chunk.read(), 0, chunk)
+        elif kind == 3:  # the header of the bag
+            self.indexed = header.get_uint64("index_pos") != 0
+        elif kind == 7 and size <= left:  # a connection
+            topic = self.topics[header.get_uint32("conn")] = header.get_string("topic")
+            kind = _fields(content[start - 4 : start + size]).get_string("type")
+            self.salvaged.types[topic] = kind.replace("/", "/msg/")
+        elif kind == 2 and size <= left:  # a message
+            self.add(header.get_uint32("conn"), header.get_time("time"), partial(place.read_part, start, size))
+
+
+def _fields(content: bytes) -> Any:  # noqa: ANN401
+    """The fields of a ROS 1 record, from their length on."""
+    return require("rosbags.rosbag1.reader", "ros").Header.read(BytesIO(content))
+
+
+class _Mcap(_Scan):
+    """An MCAP file: a record is its kind, a length of 64 bits and data."""
+
+    name, magic = "MCAP file", b"\x89MCAP0\r\n"
+
+    def take(self, content: Buffer, start: int, place: _Chunk) -> str | None:
+        while start + 9 <= len(content):
+            kind, size = struct.unpack_from("<BQ", content, start)
+            data, start = start + 9, start + 9 + size
+            if kind == 2:  # the footer
+                return None
+            self.take_record(kind, content, place, data, size)
+            if start > len(content):
+                return f"ends at byte {len(content)} within a record that goes on to {start}"
+        return f"ends at byte {len(content)} without a footer"
+
+    def take_record(self, kind: int, content: Buffer, place: _Chunk, start: int, size: int) -> None:
+        end = min(start + size, len(content))
+        if kind == 6 and place.start == 0:  # a chunk: times, size, checksum, compression, compressed size, records
+            compression, records = _text(content, start + 28)
+            chunk = _Chunk(self.path, records + 8, end - records - 8, compression)
+            self.take(chunk.read(), 0, chunk)
+        elif end < start + size:
+            return
+        elif kind == 3:  # a schema
+            (number,) = struct.unpack_from("<H", content, start)
+            self.schemas[number], _ = _text(content, start + 2)
+        elif kind == 4:  # a channel
+            number, schema = struct.unpack_from("<HH", content, start)
+            topic, _ = _text(content, start + 4)
+            self.topics[number], self.salvaged.types[topic] = topic, self.schemas.get(schema, "")
+        elif kind == 5:  # a message: channel, number, time of reception, time of sending, then its data
+            channel, _, received_ns, _ = struct.unpack_from("<HIQQ", content, start)
+            self.add(channel, received_ns, partial(place.read_part, start + 22, size - 22))
+
+
+def _text(content: Buffer, start: int) -> tuple[str, int]:
+    """The text whose length is at `start`, and where it ends."""
+    end = start + 4 + int.from_bytes(content[start : start + 4], "little")
+    return content[start + 4 : end].decode(), end
+
+
+def check_database_size(path: Path) -> None:
+    """Refuse an SQLite file that is shorter than its header says; SQLite finds out only at the pages that are missing.
 
     Raises:
-        ValueError: They are not whole, or the compression is unknown.
+        TruncatedFileError: It is shorter.
     """
-    if compression in ("", "none"):
-        return content
-    modules = {"bz2": "bz2", "lz4": "lz4.frame", "zstd": "rosbags.rosbag2.reader"}
-    if compression not in modules:
-        raise ValueError(f"compression {compression!r} is unknown")
-    module = require(modules[compression], "ros")
-    library = module.zstd if compression == "zstd" else module
-    try:
-        return bytes(library.decompress(content))
-    except Exception as error:  # each library has errors of its own
-        raise ValueError(f"{compression} data are damaged ({error})") from None
+    with path.open("rb") as file:
+        header = file.read(100)
+    changes, pages, valid_for = (int.from_bytes(header[start : start + 4]) for start in (24, 28, 92))
+    size, expected = path.stat().st_size, pages * _page_size(header[16:18])
+    # the number of pages holds if the last writer kept it up to date
+    if changes == valid_for and size < expected:
+        raise TruncatedFileError(f"{path}: ends at byte {size}, expected {expected}")
+
+
+def _page_size(field: bytes) -> int:
+    size = int.from_bytes(field)
+    return 65536 if size == 1 else size
+
+
+class _Database(_Scan):
+    """An SQLite file, of which rows are read as long as they hold."""
+
+    name, magic = "SQLite file", b"SQLite format 3\0"
+
+    def take(self, content: Buffer, start: int, place: _Chunk) -> str | None:
+        try:
+            with closing(self.connect()) as connection:
+                for number, topic, kind in connection.execute(TOPICS):
+                    self.topics[number], self.salvaged.types[topic] = topic, kind
+                for number, topic_number, received_ns, _ in connection.execute(MESSAGES):
+                    self.add(topic_number, received_ns, partial(self.read, number))
+        except require("apsw", "ros").Error as error:
+            return f"SQLite finds it damaged ({error})"
+        return None
+
+    def read(self, number: int) -> bytes:
+        """The message of a row."""
+        with closing(self.connect()) as connection:
+            ((raw,),) = connection.execute("SELECT data FROM messages WHERE id = ?", (number,))
+        return bytes(raw)
+
+    def connect(self) -> Any:  # noqa: ANN401
+        """The file, opened for reading although it may be shorter than its header says."""
+        apsw = require("apsw", "ros")
+        _whole_pages()
+        flags = apsw.SQLITE_OPEN_READONLY | apsw.SQLITE_OPEN_URI
+        connection = apsw.Connection(f"{self.path.resolve().as_uri()}?immutable=1", flags=flags, vfs=WHOLE_PAGES)
+        connection.execute("PRAGMA writable_schema = ON")
+        return connection
+
+
+@cache
+def _whole_pages() -> Any:  # noqa: ANN401
+    """Files without their last page where it is cut: SQLite would take what is missing for zeros."""
+    apsw = require("apsw", "ros")
+
+    class File(apsw.VFSFile):  # type: ignore[misc, name-defined]
+        def xFileSize(self) -> int:
+            size: int = super().xFileSize()
+            return size - size % _page_size(self.xRead(2, 16))
+
+    class Files(apsw.VFS):  # type: ignore[misc, name-defined]
+        def xOpen(self, name: str, flags: list[int]) -> File:
+            return File("", name, flags)
+
+    return Files(WHOLE_PAGES, "")
+
+
+SCANS = {".bag": _Rosbag1, ".db3": _Database, ".mcap": _Mcap}

@@ -12,8 +12,7 @@ from typing import Any, Self
 
 from ldls._optional import require
 from ldls.errors import InputError, ParameterError, UnsupportedFormatError
-from ldls.io.ros.bags import Topic
-from ldls.io.ros.types import serialize, standard_types
+from ldls.io.ros.messages import Message, Topic, Types, serialize, standard_types
 
 STORAGES = {"rosbag2": "SQLITE3", "mcap": "MCAP"}
 KINDS = ("rosbag1", *STORAGES)
@@ -77,7 +76,7 @@ class BagWriter:
         finally:
             shutil.rmtree(self._folder, ignore_errors=True)
 
-    def add_topic(self, topic: Topic, types: Any = None) -> None:  # noqa: ANN401
+    def add_topic(self, topic: Topic, types: Types | None = None) -> None:
         """Make ready for messages of a topic; `types` knows its type where it is none of ROS's own.
 
         Raises:
@@ -97,7 +96,7 @@ class BagWriter:
             connection = add(topic.name, topic.type, typestore=known, latching=int(topic.latched))
         self._connections[topic.name] = (connection, topic.type)
 
-    def write(self, topic: str, message: object, received_ns: int) -> None:
+    def write(self, topic: str, message: Message, received_ns: int) -> None:
         """Write a message as if received at that time."""
         kind = self._connections[topic][1]
         self.write_raw(topic, serialize(self.types, message, kind, ros2=self.ros2), received_ns)
