@@ -1,11 +1,14 @@
 import os
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import ldls
+from ldls.cli import app
 
 KITTI_FRAMES = ("000000", "000001", "000002", "000003", "000571")
 
@@ -58,6 +61,19 @@ def kitti_frame(request, data_folder):
 @pytest.fixture(scope="session")
 def frame_571(data_folder):
     return load_frame(data_folder, "000571")
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory):
+    """The folder that `ldls demo` fills, and how that ended; nobody changes it."""
+    folder = tmp_path_factory.mktemp("demo")
+    return folder, CliRunner().invoke(app, ["demo", "--out", str(folder)])
+
+
+@pytest.fixture
+def own_demo(demo, tmp_path):
+    """A copy of it, to be changed, in ldls-demo below the test's folder."""
+    return shutil.copytree(demo[0], tmp_path / "ldls-demo")
 
 
 @pytest.fixture

@@ -5,9 +5,6 @@ import re
 import numpy as np
 import pages
 import pytest
-from typer.testing import CliRunner
-
-from ldls.cli import app
 
 EVERY_BLOCK = [
     pytest.param(page.name, block, id=f"{page.relative_to(pages.ROOT)}, block {number}")
@@ -29,13 +26,6 @@ def run(tmp_path, monkeypatch):
         return names
 
     return blocks_of
-
-
-@pytest.fixture
-def demo_files(tmp_path, monkeypatch):
-    """What `ldls demo` leaves, in the current folder."""
-    monkeypatch.chdir(tmp_path)
-    assert CliRunner().invoke(app, ["demo", "--out", "ldls-demo"]).exit_code == 0
 
 
 @pytest.mark.parametrize(("page", "block"), EVERY_BLOCK)
@@ -68,13 +58,13 @@ def test_rings(run, capsys):
     assert "left" in capsys.readouterr().out
 
 
-def test_quick_start(demo_files, run, tmp_path, capsys):
+def test_quick_start(own_demo, run, tmp_path, capsys):
     names = run("docs/quick-start.md")
     assert "12 of 12 objects found" in capsys.readouterr().out
     assert (tmp_path / "street.ply").stat().st_size > 12 * len(names["points"])
 
 
-def test_own_sensors(demo_files, run, tmp_path):
+def test_own_sensors(own_demo, run, tmp_path):
     folder = tmp_path / "mine"
     for source, target in (("points.bin", "lidar/a.bin"), ("image.png", "front/a.png"), ("masks.npz", "masks/a.npz")):
         (folder / target).parent.mkdir(parents=True)
@@ -128,7 +118,7 @@ def test_ci_runs_the_test_command_of_the_readme():
     assert command in (pages.ROOT / ".ci/run").read_text()
 
 
-def test_viewing(run, demo_files, tmp_path, monkeypatch):
+def test_viewing(run, own_demo, tmp_path, monkeypatch):
     (tmp_path / "ldls-demo").rename(tmp_path / "street")
     monkeypatch.setattr("PIL.Image.Image.show", lambda picture: None)
     run("docs/viewing.md")
@@ -137,7 +127,7 @@ def test_viewing(run, demo_files, tmp_path, monkeypatch):
     }  # fmt: skip
 
 
-def test_rerun(run, demo_files, tmp_path):
+def test_rerun(run, own_demo, tmp_path):
     rerun = pytest.importorskip("rerun")
     from ldls.viewing import recording
 

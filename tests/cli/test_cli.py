@@ -17,12 +17,6 @@ from ldls.io.results import WRITERS
 run = CliRunner().invoke
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("demo")
-    return folder, run(app, ["demo", "--out", str(folder)])
-
-
 def arguments(folder, out, **changes):
     files = {
         "points": folder / "input/points.bin",

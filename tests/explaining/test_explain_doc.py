@@ -4,7 +4,6 @@ import re
 import shlex
 from pathlib import Path
 
-import pytest
 from typer.testing import CliRunner
 
 from ldls.cli import app
@@ -12,21 +11,13 @@ from ldls.cli import app
 DOC = (Path(__file__).parents[2] / "docs/explain.md").read_text()
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("doc")
-    outcome = CliRunner().invoke(app, ["demo", "--out", str(folder / "ldls-demo")])
-    assert outcome.exit_code == 0, outcome.output
-    return folder
-
-
 def words(text):
     """Only the words: other machines may round numbers in another way."""
     return re.findall(r"[A-Za-z]+", text)
 
 
-def test_commands_print_what_is_shown(demo, monkeypatch):
-    monkeypatch.chdir(demo)
+def test_commands_print_what_is_shown(own_demo, monkeypatch):
+    monkeypatch.chdir(own_demo.parent)
     blocks = re.findall(r"```(sh|text)\n(.*?)```", DOC, re.DOTALL)
     commands = [line for kind, text in blocks if kind == "sh" for line in text.splitlines()]
     assert len(commands) == 8
@@ -45,8 +36,8 @@ def test_commands_print_what_is_shown(demo, monkeypatch):
             output = outcome.output
 
 
-def test_the_examples_run(demo, monkeypatch, capsys):
-    monkeypatch.chdir(demo)
+def test_the_examples_run(own_demo, monkeypatch, capsys):
+    monkeypatch.chdir(own_demo.parent)
     names = {}
     for example in re.findall(r"```python\n(.*?)```", DOC, re.DOTALL):
         exec(example, names)
