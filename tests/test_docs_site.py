@@ -64,12 +64,29 @@ def test_every_picture_is_shown():
     assert {name_of(path) for path in pages.PICTURES.rglob("*") if path.is_file()} == shown
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Makes the pictures of a page; those that several pages have in the same way are made once."""
+    folders = {}
+
+    def made_of(page):
+        done = ""
+        for recipe in pages.recipes(page):
+            before, done = done, done + recipe.commands
+            if done not in folders:
+                folders[done] = folders.get(before) or tmp_path_factory.mktemp("pictures")
+                pictures.make(recipe, folders[done])
+            for picture, file in recipe.files.items():
+                yield picture, folders[done] / file
+
+    return made_of
+
+
 @pytest.mark.parametrize("page", [*each([ROOT / "README.md", ROOT / "docs/index.md", ROOT / "docs/own-sensors.md"])])
-def test_pictures_are_made_anew(page, tmp_path):
-    for recipe in pages.recipes(page):
-        for picture, file in pictures.make(recipe, tmp_path).items():
-            with Image.open(file) as made, Image.open(ROOT / picture) as kept:
-                assert made.size == kept.size
+def test_pictures_are_made_anew(page, made):
+    for picture, file in made(page):
+        with Image.open(file) as new, Image.open(ROOT / picture) as kept:
+            assert new.size == kept.size
 
 
 # commands

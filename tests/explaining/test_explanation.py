@@ -19,6 +19,11 @@ def ring(request):
     return points, views, ldls.segment(points, as_views(views), params=PARAMS)
 
 
+@pytest.fixture(scope="module")
+def system(ring):
+    return plain_system(*ring)
+
+
 def some_points(result):
     """Points of all kinds: that keep an instance, lose it, are background, and are seen by two cameras."""
     kinds = (result.labels > 0, result.labels < result.diffused_labels, result.diffused_labels == 0)
@@ -104,9 +109,9 @@ def plain_components(edges, members):
     return sorted(found, key=lambda component: (-len(component), min(component)))
 
 
-def test_everything_equals_plain_loops(ring):
-    points, views, result = ring
-    edges, seeds, rows = plain_system(points, views, result)
+def test_everything_equals_plain_loops(ring, system):
+    points, _, result = ring
+    edges, seeds, rows = system
     z = plain_likelihoods(edges, seeds, rows, len(result.instances) + 1)
     islands = plain_components(edges, list(edges))
     for point in some_points(result):
@@ -132,9 +137,9 @@ def test_everything_equals_plain_loops(ring):
         assert (found.island.points, found.island.islands) == (len(island), len(islands))
 
 
-def test_components_equal_plain_loops(ring):
-    points, views, result = ring
-    edges, _, _ = plain_system(points, views, result)
+def test_components_equal_plain_loops(ring, system):
+    _, _, result = ring
+    edges, _, _ = system
     removed = 0
     for point in some_points(result):
         found = ldls.explain(result, point).components
@@ -358,13 +363,13 @@ def test_provenance_is_where_the_pixels_are_that_decide(ring):
     found, system = ldls.explain(result, point), rebuild(result)
     # the seeds of one point after another alone
     row = int(np.searchsorted(result.in_view, point))
-    parts = []
     A, b = system.A.toarray().astype(float), system.b.toarray().astype(float)[:, found.diffused_label]
-    power, total = np.eye(len(A)), np.zeros_like(A)
+    # the point's row of the powers of A, and of their sum
+    power, total = np.eye(len(A))[row], np.zeros(len(A))
     for _ in range(PARAMS.iterations):
         total += power
         power = power @ A
-    parts = total[row] * b
+    parts = total * b
     assert found.provenance.own_share == pytest.approx(parts[row] / parts.sum(), rel=1e-9)
     distances = np.linalg.norm(points[result.in_view] - points[point], axis=1)
     half = found.provenance.half_within_m

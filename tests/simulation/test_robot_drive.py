@@ -1,5 +1,6 @@
 """The simulated robot: its lens, its bag, and its sweeps through the source to labels and back."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -24,19 +25,26 @@ RATIONAL = ldls.Distortion("rational_polynomial", (0.1, -0.05, 1e-3, 2e-3, 0.01,
 MODEL = ROBOT.cameras[0].model
 
 
-@pytest.fixture(scope="module", params=KINDS)
-def drive_folder(request, tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp(request.param)
-    kind = request.param
-    errors = SegmenterErrors.none()
-    path = write_robot_drive(folder, kind, frames=FRAMES, seed=SEED, segmenter=errors, compressed=kind == "mcap")
-    assert path == folder / KINDS[kind]
-    return folder
-
-
 @pytest.fixture(scope="module")
 def moments():
     return list(robot_drive(FRAMES, seed=SEED, segmenter=SegmenterErrors.none()))
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def drive_folder(request, moments, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp(request.param)
+    kind = request.param
+    options = {"seed": SEED, "segmenter": SegmenterErrors.none()}
+
+    def simulated_once(frames, **asked):
+        assert {key: asked[key] for key in options} == options
+        return iter(moments[:frames])
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sys.modules[write_robot_drive.__module__], "robot_drive", simulated_once)
+        path = write_robot_drive(folder, kind, frames=FRAMES, **options, compressed=kind == "mcap")
+    assert path == folder / KINDS[kind]
+    return folder
 
 
 def ious(labels, truth):
@@ -99,7 +107,7 @@ def test_the_bag_holds_what_was_simulated(drive_folder, moments):
         np.testing.assert_array_equal(image.read(), moment.image)
         assert image.camera.distortion == MODEL.distortion
         np.testing.assert_allclose(image.camera.T_camera_lidar, ROBOT.cameras[0].T_camera_lidar(), atol=1e-12)
-        masks = ldls.InstanceMasks.from_coco(drive_folder / f"masks/{frame.name}.json")
+        masks = ldls.read_masks(drive_folder / f"masks/{frame.name}.json")
         np.testing.assert_array_equal(masks.to_array(), moment.masks.to_array())
         truth = read_annotations(drive_folder / f"annotations/{frame.name}.txt")
         np.testing.assert_array_equal(truth.instances, moment.sweep.instances)
@@ -113,7 +121,7 @@ def test_from_bag_to_labelled_bag_and_back(drive_folder, moments, tmp_path):
     with LabelledBag(out, kind) as bag:
         bag.copy(source.path)
         for number, frame in enumerate(source):
-            masks = ldls.InstanceMasks.from_coco(drive_folder / f"masks/{frame.name}.json")
+            masks = ldls.read_masks(drive_folder / f"masks/{frame.name}.json")
             results.append(ldls.segment(frame.points, masks, frame.images[0].camera))
             bag.write(results[-1], source.header(number))
     labelled = RosBag(out, points_topic="/points_labelled")
