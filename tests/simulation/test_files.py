@@ -1,5 +1,6 @@
 """Every reader reads what is written; the suite is what it is by its seeds."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -119,16 +120,32 @@ def test_the_method_runs_on_the_files(training):
     assert (result.labels > 0).sum() > 200
 
 
+def quarter(mounted):
+    """A camera with a sixteenth of the pixels, to be drawn sooner."""
+    model, (u, v) = mounted.model, mounted.model.center_px
+    smaller = replace(
+        model,
+        width=model.width // 4,
+        height=model.height // 4,
+        focal_px=model.focal_px / 4,
+        center_px=(u / 4, v / 4),
+    )
+    return replace(mounted, model=smaller)
+
+
 def test_a_ring_has_a_folder_for_each_camera(tmp_path):
-    frame = scene_frame(0, rig=make_rig(lidar="hdl-32e", camera="ring"))
+    ring = make_rig(lidar="hdl-32e", camera="ring")
+    assert {(mounted.model.height, mounted.model.width) for mounted in ring.cameras} == {(900, 1600)}
+    assert [mounted.model.focal_px for mounted in ring.cameras] == [809.2 if k == 3 else 1266.4 for k in range(6)]
+    frame = scene_frame(0, rig=replace(ring, cameras=tuple(map(quarter, ring.cameras))))
     write_kitti(tmp_path, "000000", frame)
-    views = [project(frame.points, view.camera, image_size=(900, 1600))[0] for view in frame.views]
+    views = [project(frame.points, view.camera, image_size=(225, 400))[0] for view in frame.views]
     assert len(np.unique(np.concatenate(views))) > 0.5 * len(frame.points)
     for k in range(1, 6):
         camera = ldls.read_camera(tmp_path / f"training/calib_ring_{k}/000000.txt")
-        assert camera.projection[0, 0] == pytest.approx(809.2 if k == 3 else 1266.4)
+        assert camera.projection[0, 0] == pytest.approx((809.2 if k == 3 else 1266.4) / 4)
         assert (tmp_path / f"training/image_ring_{k}/000000.png").stat().st_size > 10_000
-        assert ldls.read_masks(tmp_path / f"training/masks_ring_{k}/000000.json").image_size == (900, 1600)
+        assert ldls.read_masks(tmp_path / f"training/masks_ring_{k}/000000.json").image_size == (225, 400)
 
 
 def orders(count):
