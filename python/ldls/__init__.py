@@ -29,10 +29,16 @@ from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Instance, OrientedBox, Report, Segmentation, SegmentedObject
 from ldls.view import SeenView, View
-from ldls.viewing.notebook import html_of
 
-# pictures lie above the nouns, which know nothing of them
-Segmentation._repr_html_ = html_of
+
+def _html_of(result: Segmentation) -> str:
+    from ldls.viewing.notebook import html_of
+
+    return html_of(result)
+
+
+# pictures lie above the nouns, which know nothing of them, and are imported when one is shown
+Segmentation._repr_html_ = _html_of
 
 __all__ = [
     "CalibrationError",

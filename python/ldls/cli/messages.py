@@ -14,7 +14,6 @@ from rich.table import Table
 
 from ldls.errors import LdlsError
 from ldls.segmentation import SegmentedObject
-from ldls.viewing.object_tables import HEADINGS, cells_of, nearest_first, objects_found
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -58,6 +57,8 @@ def flowing(text: str) -> str:
 
 def object_table(objects: Sequence[SegmentedObject]) -> Table:
     """Name, points, distance and size of each object, the nearest first and those without points last."""
+    from ldls.viewing.object_tables import HEADINGS, cells_of, nearest_first, objects_found
+
     table = Table(title=objects_found(objects))
     for heading in HEADINGS:
         table.add_column(heading, justify="left" if heading == "object" else "right")
