@@ -10,9 +10,10 @@ from pathlib import Path
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.datasets.frame import CameraImage
+from ldls.datasets.frame import CameraImage, Frame
 from ldls.errors import InputError, LeftOutWarning, SourceError
-from ldls.io import read_image
+from ldls.io import read_image, read_points
+from ldls.io.labels import read_labeling
 from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
 
@@ -28,28 +29,40 @@ class FileSource:
     Attributes:
         path: Folder of the source.
         names: Names of the frames of which every file is there, sorted.
+        stamps: Times of the sweeps in seconds; None where the source does not say.
         left_out: What the others lack, by their names.
         camera_names: Name of the camera of each image of a frame.
     """
 
-    def __init__(self, path: Path, parts: Mapping[str, Mapping[str, Path]], camera_names: Iterable[str]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        parts: Mapping[str, Mapping[str, Path]],
+        camera_names: Iterable[str],
+        *,
+        truth: bool,
+        columns: int | None = None,
+    ) -> None:
         """Keep the frames that have a file of each part; warns of sweeps that lack one.
 
         Args:
             path: Folder of the source.
             parts: Files by frame of each part, as "velodyne" and "image_2"; the first are the sweeps.
             camera_names: Name of the camera of each image of a frame.
+            truth: Give frames their truth, where it is there.
+            columns: Floats a row of `.bin` files.
 
         Raises:
             SourceError: No frame is whole.
         """
         self.path, self.camera_names = path, tuple(camera_names)
-        self._parts = parts
+        self._parts, self._truth, self._columns = parts, truth, columns
         lacks = {name: [part for part in parts if name not in parts[part]] for name in set().union(*parts.values())}
         self.names = tuple(sorted(name for name, missing in lacks.items() if not missing))
         if not self.names:
             counts = ", ".join(f"{part} {len(files)}" for part, files in parts.items())
             raise SourceError(f"{path}: no frame has a file in each of these, found {counts}; names must agree")
+        self.stamps: tuple[float | None, ...] = (None,) * len(self.names)
         self.left_out = {name: f"no {' and no '.join(lacks[name])}" for name in sorted(lacks) if lacks[name]}
         self._points = next(iter(parts.values()))
         warn_left_out(path, [why for name, why in self.left_out.items() if name in self._points], len(self._points))
@@ -60,6 +73,27 @@ class FileSource:
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
         return tuple(files[self.names[index]] for files in self._parts.values())
+
+    def __getitem__(self, index: int) -> Frame:
+        name = self.names[index]
+        points = read_points(self._points[name], columns=self._columns)
+        images = tuple(self._image(camera, index) for camera in self.camera_names)
+        truth = self._read_truth(name, points, images[0].camera) if self._truth else None
+        return Frame(name=name, points=points, stamp=self.stamps[index], images=images, truth=truth)
+
+    def _image(self, camera: str, index: int) -> CameraImage:
+        """The image of a camera in a frame."""
+        raise NotImplementedError
+
+    def _truth_files(self, name: str) -> Iterable[tuple[Path, str | None]]:
+        """Files that may hold the truth of a frame, and their formats; the first that is there does."""
+        raise NotImplementedError
+
+    def _read_truth(self, name: str, points: Points, camera: Camera) -> Labeling | None:
+        for path, format in self._truth_files(name):
+            if path.exists():
+                return check_truth(read_labeling(path, format=format, points=points, camera=camera), points, path)
+        return None
 
 
 def find_files(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:

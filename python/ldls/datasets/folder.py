@@ -5,21 +5,19 @@ from __future__ import annotations
 import glob
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path, PurePath
 
 from ldls.camera import Camera
-from ldls.cloud import Points
-from ldls.datasets.file_source import FileSource, check_truth, image_from_file
+from ldls.datasets.file_source import FileSource, image_from_file
 from ldls.datasets.folder_description import FILE, CameraDescription, read_description, template
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.frame import CameraImage
 from ldls.errors import CorruptFileError, ParameterError, SourceError
-from ldls.io import read_camera, read_masks, read_points
+from ldls.io import read_camera, read_masks
 from ldls.io.files import read_lines, strictly_below
 from ldls.io.images import read_image_size
-from ldls.io.labels.label_formats import read_labeling
-from ldls.labeling import Labeling
 
 __all__ = ["FolderSource", "template"]
 
@@ -61,10 +59,10 @@ class FolderSource(FileSource):
         self._described = read_description(self._file)
         self._cameras = self._described.cameras
         images = {f"cameras.{name}": self._find(each.images) for name, each in self._cameras.items()}
-        super().__init__(self.path, {"points": self._find(self._described.points), **images}, self._cameras)
+        parts = {"points": self._find(self._described.points), **images}
+        super().__init__(self.path, parts, self._cameras, truth=truth, columns=self._described.columns)
         self.stamps = self._read_stamps(self._described.stamps)
         self._image_stamps = {name: self._read_stamps(each.stamps) for name, each in self._cameras.items()}
-        self._truth = truth
         for each in self._cameras.values():
             self._camera(each, self.names[0])
 
@@ -76,17 +74,6 @@ class FolderSource(FileSource):
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
         return (self._file, *super().files(index))
-
-    def __getitem__(self, index: int) -> Frame:
-        name = self.names[index]
-        points = read_points(self._points[name], columns=self._described.columns)
-        return Frame(
-            name=name,
-            points=points,
-            stamp=self.stamps[index],
-            images=tuple(self._image(camera, index) for camera in self._cameras),
-            truth=self._read_truth(name, points),
-        )
 
     def _image(self, camera: str, index: int) -> CameraImage:
         name, described = self.names[index], self._cameras[camera]
@@ -103,14 +90,9 @@ class FolderSource(FileSource):
         path = self._one(each.calibration or "", name)
         return read_camera(path, format="kitti", camera=each.number, image_size=each.image_size)
 
-    def _read_truth(self, name: str, points: Points) -> Labeling | None:
+    def _truth_files(self, name: str) -> Iterable[tuple[Path, str | None]]:
         pattern = self._described.truth
-        if not self._truth or pattern is None:
-            return None
-        path = self._one(pattern, name)
-        if not path.exists():
-            return None
-        return check_truth(read_labeling(path, format=self._described.truth_format), points, path)
+        return [] if pattern is None else [(self._one(pattern, name), self._described.truth_format)]
 
     def _read_stamps(self, pattern: str | None) -> tuple[float | None, ...]:
         if pattern is None:

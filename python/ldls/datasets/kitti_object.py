@@ -6,33 +6,27 @@ FOLDER/annotations/NNNNNN.txt (a class a point) or FOLDER/label_2/NNNNNN.txt (bo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
-from ldls.camera import Camera
-from ldls.cloud import Points
 from ldls.datasets.file_source import (
     IMAGE_SUFFIXES,
     POINT_SUFFIXES,
     FileSource,
-    check_truth,
     choose,
     find_files,
     image_from_file,
 )
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import ParameterError
-from ldls.io import read_camera, read_masks, read_points
+from ldls.io import read_camera, read_masks
 from ldls.io.images import read_image_size
-from ldls.io.labels.annotations import read_annotations
-from ldls.io.labels.kitti_objects import read_kitti_boxes
-from ldls.labeling import Labeling
 
 SPLITS = ("training", "testing")
-TRUTHS = {"annotations": "annotations", "boxes": "label_2"}
-"""Folder of each kind of truth, the one that is taken first first."""
+TRUTHS = {"annotations": ("annotations", "annotations"), "boxes": ("label_2", "kitti-boxes")}
+"""Folder and format of each kind of truth, in the order in which they are looked for."""
 
 
 class KittiObjectSource(FileSource):
@@ -76,7 +70,7 @@ class KittiObjectSource(FileSource):
         """
         path = _training(Path(path), split)
         self._numbers = {f"image_{n}": n for n in camera_numbers(camera)}
-        self._masks, self._truth = masks, truth
+        self._masks = masks
         parts = {
             "velodyne": find_files(path / "velodyne", POINT_SUFFIXES),
             "calib": find_files(path / "calib", (".txt",)),
@@ -92,37 +86,26 @@ class KittiObjectSource(FileSource):
         if isinstance(truth, str):
             if truth not in TRUTHS:
                 raise ParameterError(f"truth: got {truth!r}, expected true, false, {' or '.join(TRUTHS)}")
-            parts[TRUTHS[truth]] = find_files(path / TRUTHS[truth], (".txt",))
-        super().__init__(path, parts, self._numbers)
-        self.stamps: tuple[float | None, ...] = (None,) * len(self.names)
+            folder, _ = TRUTHS[truth]
+            parts[folder] = find_files(path / folder, (".txt",))
+        self._truths = [TRUTHS[truth]] if isinstance(truth, str) else [*TRUTHS.values()]
+        super().__init__(path, parts, self._numbers, truth=bool(truth))
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """True for a path that looks like KITTI's object data."""
         return any(_is_frames(folder) for folder in (path, *(path / split for split in SPLITS)))
 
-    def __getitem__(self, index: int) -> Frame:
+    def _image(self, camera: str, index: int) -> CameraImage:
         name = self.names[index]
-        points = read_points(self._points[name])
-        images = tuple(self._image(camera, name) for camera in self.camera_names)
-        return Frame(name=name, points=points, images=images, truth=self._read_truth(name, points, images[0].camera))
-
-    def _image(self, camera: str, name: str) -> CameraImage:
         masks = None if self._masks is None else read_masks(self._parts[self._masks][name])
         path = self._images.get(camera, {}).get(name, self.path / camera / f"{name}.png")
         size = read_image_size(path) if masks is None else masks.image_size
         calib = read_camera(self._parts["calib"][name], format="kitti", camera=self._numbers[camera], image_size=size)
         return image_from_file(camera, path, calib, masks=masks)
 
-    def _read_truth(self, name: str, points: Points, camera: Camera) -> Labeling | None:
-        wanted = [self._truth] if isinstance(self._truth, str) else [*TRUTHS] if self._truth else []
-        for kind in wanted:
-            path = self.path / TRUTHS[kind] / f"{name}.txt"
-            if path.exists() and kind == "boxes":
-                return read_kitti_boxes(path, points=points, camera=camera)
-            if path.exists():
-                return check_truth(read_annotations(path), points, path)
-        return None
+    def _truth_files(self, name: str) -> Iterable[tuple[Path, str]]:
+        return [(self.path / folder / f"{name}.txt", format) for folder, format in self._truths]
 
 
 def _is_frames(path: Path) -> bool:

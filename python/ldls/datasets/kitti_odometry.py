@@ -6,27 +6,23 @@ sequences/NN/{velodyne/NNNNNN.bin,image_2/NNNNNN.png,calib.txt}; times.txt and l
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from ldls.cloud import Points
 from ldls.datasets.file_source import (
     IMAGE_SUFFIXES,
     POINT_SUFFIXES,
     FileSource,
-    check_truth,
     choose,
     find_files,
     image_from_file,
 )
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers, read_stamps
-from ldls.io import read_camera, read_points
+from ldls.io import read_camera
 from ldls.io.images import read_image_size
-from ldls.io.labels.semantic_kitti import read_semantic_kitti
-from ldls.labeling import Labeling
 
 
 class KittiOdometrySource(FileSource):
@@ -69,36 +65,23 @@ class KittiOdometrySource(FileSource):
         cameras = {f"image_{n}": n for n in camera_numbers(camera)}
         points = find_files(path / "velodyne", POINT_SUFFIXES)
         images = {name: find_files(path / name, IMAGE_SUFFIXES) for name in cameras}
-        super().__init__(path, {"velodyne": points, **images}, cameras)
+        super().__init__(path, {"velodyne": points, **images}, cameras, truth=truth)
         calib = path / "calib.txt"
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}
         self.stamps = read_stamps(path / "times.txt", self.names, _seconds, example="0.103736")
-        self._truth = truth
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """True for a path that looks like a sequence, or holds some."""
         return _is_sequence(path) or bool(_sequences(path)) or bool(_sequences(path / "sequences"))
 
-    def __getitem__(self, index: int) -> Frame:
-        name = self.names[index]
-        points = read_points(self._points[name])
-        return Frame(
-            name=name,
-            points=points,
-            stamp=self.stamps[index],
-            images=tuple(self._image(camera, index) for camera in self._cameras),
-            truth=self._read_truth(name, points) if self._truth else None,
-        )
-
     def _image(self, name: str, index: int) -> CameraImage:
         path = self._parts[name][self.names[index]]
         camera = replace(self._cameras[name], image_size=read_image_size(path))
         return image_from_file(name, path, camera, stamp=self.stamps[index])
 
-    def _read_truth(self, name: str, points: Points) -> Labeling | None:
-        path = self.path / "labels" / f"{name}.label"
-        return check_truth(read_semantic_kitti(path), points, path) if path.exists() else None
+    def _truth_files(self, name: str) -> Iterable[tuple[Path, str]]:
+        return [(self.path / "labels" / f"{name}.label", "semantic-kitti")]
 
 
 def _is_sequence(path: Path) -> bool:

@@ -6,7 +6,7 @@ data/NNNNNNNNNN.{bin,png} and timestamps.txt. For truth, annotations/NNNNNNNNNN.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -17,16 +17,14 @@ from ldls.datasets.file_source import (
     POINT_SUFFIXES,
     FileSource,
     check_folders,
-    check_truth,
     choose,
     find_files,
     image_from_file,
 )
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers, read_stamps
 from ldls.errors import SourceError
-from ldls.io import read_camera, read_points
-from ldls.io.labels.annotations import read_annotations
+from ldls.io import read_camera
 
 LIDAR = "velodyne_points"
 
@@ -76,32 +74,21 @@ class KittiRawSource(FileSource):
         self._cameras = {name: read_camera(path.parent, camera=n) for name, n in cameras.items()}
         points = find_files(path / LIDAR / "data", POINT_SUFFIXES)
         images = {name: find_files(path / name / "data", IMAGE_SUFFIXES) for name in cameras}
-        super().__init__(path, {LIDAR: points, **images}, cameras)
+        super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
         self.stamps = _stamps(path / LIDAR, self.names)
         self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}
-        self._truth = truth
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """True for a path that looks like a drive, or a day with drives."""
         return (path / LIDAR).is_dir() or bool(_drives(path))
 
-    def __getitem__(self, index: int) -> Frame:
-        name = self.names[index]
-        points = read_points(self._points[name])
-        annotations = self.path / "annotations" / f"{name}.txt"
-        known = self._truth and annotations.exists()
-        return Frame(
-            name=name,
-            points=points,
-            stamp=self.stamps[index],
-            images=tuple(self._image(camera, index) for camera in self._cameras),
-            truth=check_truth(read_annotations(annotations), points, annotations) if known else None,
-        )
-
     def _image(self, camera: str, index: int) -> CameraImage:
         path = self._parts[camera][self.names[index]]
         return image_from_file(camera, path, self._cameras[camera], stamp=self._image_stamps[camera][index])
+
+    def _truth_files(self, name: str) -> Iterable[tuple[Path, str]]:
+        return [(self.path / "annotations" / f"{name}.txt", "annotations")]
 
 
 def _drives(path: Path) -> list[str]:
