@@ -1,4 +1,4 @@
-"""Which topics of a bag are read."""
+"""The topics of a bag that are read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ldls.io.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, POINTS
 
 @dataclass(frozen=True)
 class RosTopics:
-    """Topics of clouds, of the images of each camera, and of their CameraInfo.
+    """The topics that make frames.
 
     Attributes:
         points: Topic of the clouds.
@@ -63,8 +63,8 @@ def _one(bag: Bag, option: str, given: str | None, types: tuple[str, ...]) -> st
     if given is not None:
         if given in fitting:
             return given
-        found = bag.topics[given].type if given in bag.topics else "no such topic"
-        raise InputError(f"{bag.path}: {option}: {given!r} is {found}, expected {expected}; {_listed(bag)}")
+        kind = bag.topics[given].type if given in bag.topics else "no such topic"
+        raise InputError(f"{bag.path}: {option}: {given!r} is {kind}, expected {expected}; {_listed(bag)}")
     if len(fitting) == 1:
         return fitting[0]
     raise InputError(
@@ -73,7 +73,5 @@ def _one(bag: Bag, option: str, given: str | None, types: tuple[str, ...]) -> st
 
 
 def _listed(bag: Bag) -> str:
-    rows = [
-        f"{topic.name} ({topic.type}, {topic.count})" for topic in sorted(bag.topics.values(), key=lambda t: t.name)
-    ]
+    rows = (f"{name} ({topic.type}, {topic.count})" for name, topic in sorted(bag.topics.items()))
     return "the bag has " + (", ".join(rows) or "no topics")

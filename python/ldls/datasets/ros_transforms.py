@@ -1,18 +1,22 @@
-"""Transforms between the frames of a robot, from /tf_static and /tf."""
+"""Transforms from lidar to camera: those given by hand, and those of a robot's frames from /tf_static and /tf."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion
-from ldls.errors import CalibrationError
+from ldls.errors import CalibrationError, ParameterError
+from ldls.io.files import read_lines
 from ldls.io.ros.messages import Message, nanoseconds
 
 Matrix = NDArray[np.float64]
+GivenTransform = ArrayLike | str | PathLike[str]
 
 
 @dataclass
@@ -21,7 +25,7 @@ class _Edge:
 
     Attributes:
         parent: The parent.
-        stamps_ns: When each holds.
+        stamps_ns: The time at which each holds.
         transforms: (4, 4) each, from the frame's to the parent's coordinates.
     """
 
@@ -75,10 +79,10 @@ class TransformTree:
         return np.linalg.inv(up_target) @ up_source
 
     def _ancestors(self, frame: str) -> list[str]:
-        found = [frame]
-        while found[-1] in self._edges and self._edges[found[-1]].parent not in found:
-            found.append(self._edges[found[-1]].parent)
-        return found
+        chain = [frame]
+        while chain[-1] in self._edges and self._edges[chain[-1]].parent not in chain:
+            chain.append(self._edges[chain[-1]].parent)
+        return chain
 
     def _connected(self, one: str, other: str) -> bool:
         return one == other or self._ancestors(one)[-1] == self._ancestors(other)[-1]
@@ -106,3 +110,46 @@ def _matrix(message: Message, name: str) -> Matrix:
     q, t = message.rotation, message.translation
     rotation = from_quaternion(f"transforms: from {name}", np.array([q.w, q.x, q.y, q.z], np.float64))
     return from_parts(rotation, np.array([t.x, t.y, t.z], np.float64))
+
+
+def given_transforms(
+    given: GivenTransform | Mapping[str, GivenTransform] | None, image_topics: Sequence[str]
+) -> dict[str, Matrix]:
+    """(4, 4) from lidar to camera coordinates by image topic, for those that are given.
+
+    Args:
+        given: Arrays (4, 4) or text files of 12 or 16 numbers by rows, where # begins a comment; one for the only
+            camera, or a mapping from image topic.
+        image_topics: The image topics.
+
+    Raises:
+        ParameterError: A topic is none of the image topics, or there are several cameras for one transform.
+        CalibrationError: A file has other than 12 or 16 numbers.
+        FileNotFoundError: There is no such file.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        if len(image_topics) > 1:
+            raise ParameterError(f"T_camera_lidar: there are {len(image_topics)} cameras; pass a mapping from topic")
+        given = dict.fromkeys(image_topics, given)
+    unknown = sorted(set(given) - set(image_topics))
+    if unknown:
+        raise ParameterError(f"T_camera_lidar: {', '.join(unknown)} is none of {', '.join(image_topics)}")
+    return {
+        topic: _read_transform(Path(one)) if isinstance(one, str | PathLike) else np.asarray(one, np.float64)
+        for topic, one in given.items()
+    }
+
+
+def _read_transform(path: Path) -> Matrix:
+    words = [word for line in read_lines(path) for word in line.partition("#")[0].replace(",", " ").split()]
+    try:
+        numbers = np.array(words, np.float64)
+    except ValueError:
+        raise CalibrationError(f"{path}: expected numbers only, got {words[:5]}") from None
+    if numbers.size not in (12, 16):
+        raise CalibrationError(f"{path}: expected the 12 or 16 numbers of a transform, got {numbers.size}")
+    transform = np.eye(4)
+    transform.flat[: numbers.size] = numbers
+    return transform

@@ -3,41 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from os import PathLike
 from pathlib import Path
-from threading import Lock
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from ldls.camera import Camera
+from ldls.camera.camera_info import MESSAGE_FIELDS
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.datasets.pairing import NONE, nearest
-from ldls.datasets.ros_cameras import camera_of
-from ldls.datasets.ros_topics import RosTopics, choose_topics
-from ldls.datasets.ros_transforms import TransformTree
-from ldls.datasets.transform_files import read_transform
-from ldls.errors import CalibrationError, FileFormatError, InputError, ParameterError
+from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
+from ldls.datasets.ros_topics import choose_topics
+from ldls.datasets.ros_transforms import GivenTransform, TransformTree, given_transforms
+from ldls.errors import CalibrationError, ParameterError, within
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
 from ldls.io.ros.images import decode_compressed, decode_image
-from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, read_header, seconds
+from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, Message, seconds
 from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud
 from ldls.io.ros.point_cloud2 import decode as decode_points
 
 STATIC_TRANSFORMS, MOVING_TRANSFORMS = "/tf_static", "/tf"
-GivenTransform = ArrayLike | str | PathLike[str]
-
-
-@dataclass(frozen=True)
-class _Entry:
-    """Where a message is: its topic, when it was received, and its number among those of that moment."""
-
-    topic: str
-    header: Header
-    received_ns: int
-    rank: int
 
 
 class RosBag:
@@ -57,7 +44,7 @@ class RosBag:
         names: Stamp of each sweep in nanoseconds; running numbers of six digits where stamps repeat themselves.
         topics: The topics that are read.
         max_offset_s: The tolerance.
-        unpaired: How many sweeps have no image within the tolerance.
+        unpaired: Number of sweeps with no image within the tolerance.
     """
 
     kind = "rosbag"
@@ -83,11 +70,11 @@ class RosBag:
             image_topics: Topics of the images (Image or CompressedImage), one a camera; the only one there is by
                 default, and () for clouds alone. Names with "image_rect" are those of rectified images.
             info_topics: Topic of the CameraInfo of each image topic; the one beside it by default.
-            max_offset_s: How far stamps of sweep and image may be apart, in seconds.
+            max_offset_s: Longest time between the stamps of sweep and image, in seconds.
             T_camera_lidar: (4, 4) from lidar to camera coordinates, or a text file of its 12 or 16 numbers, instead of
                 the bag's transforms; a mapping from image topic to either for several cameras.
-            fields: What the clouds call x, y, z and intensity, where it is not that.
-            recover: Whether a truncated bag yields its whole messages and a warning instead of an error.
+            fields: The clouds' own names of x, y, z and intensity, where they differ.
+            recover: If true, a truncated bag yields its whole messages and a warning instead of an error.
 
         Raises:
             TruncatedFileError: The bag's end is missing; the message has the stamp of the last whole message.
@@ -102,70 +89,44 @@ class RosBag:
         unknown = sorted(set(fields or {}) - set(READ_FIELDS))
         if unknown:
             raise ParameterError(f"fields: got {', '.join(unknown)}, expected {', '.join(READ_FIELDS)}")
-        self.path = Path(path)
-        self.max_offset_s = max_offset_s
+        self.path, self.max_offset_s = Path(path), max_offset_s
         self._recover = recover
         self._fields = dict(fields or {})
         self._bag = open_bag(self.path, recover=recover)
         self.topics = choose_topics(self._bag, points_topic, image_topics, info_topics)
-        self._given = _given_transforms(T_camera_lidar, self.topics)
-        entries = self._index()
-        self._infos = [_some(self.path, topic, entries[topic]) for topic in self.topics.infos]
-        self._pair(entries[self.topics.points], [entries[topic] for topic in self.topics.images])
-        self._tree: TransformTree | None = None
-        self._reading = Lock()
+        self._given = given_transforms(T_camera_lidar, self.topics.images)
+        self._pair()
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Whether `path` looks like a bag."""
+        """True if `path` looks like a bag."""
         return (path.suffix in SUFFIXES and path.is_file()) or (path / "metadata.yaml").is_file()
 
-    def _index(self) -> dict[str, list[_Entry]]:
-        """Headers of the messages of every topic that is read, in the order of their stamps."""
-        wanted = {self.topics.points, *self.topics.images, *self.topics.infos}
-        found: dict[str, list[_Entry]] = {topic: [] for topic in wanted}
-        ranks: dict[tuple[str, int], int] = {}
-        for message in self._bag.messages(wanted):
-            at = (message.topic, message.received_ns)
-            ranks[at] = ranks.get(at, -1) + 1
-            header = read_header(message.raw, ros2=self._bag.ros2)
-            found[message.topic].append(_Entry(message.topic, header, message.received_ns, ranks[at]))
-        return {topic: sorted(entries, key=lambda e: e.header.stamp_ns) for topic, entries in found.items()}
-
-    def _pair(self, sweeps: list[_Entry], images: list[list[_Entry]]) -> None:
-        stamps = _stamps(self.path, self.topics.points, sweeps)
-        chosen = np.empty((len(sweeps), len(images)), np.int64)
-        offsets = np.full(chosen.shape, np.nan)
-        for column, entries in enumerate(images):
-            topic = self.topics.images[column]
-            others = _stamps(self.path, topic, entries)
-            rows = nearest(stamps, others)
-            offset = (others[rows] - stamps) / NANOSECONDS
-            near = np.abs(offset) <= self.max_offset_s
-            if not near.any():
-                raise InputError(
-                    f"{self.path}: no image of {topic} is within {self.max_offset_s} s of a cloud of "
-                    f"{self.topics.points}; the nearest is {offset[np.abs(offset).argmin()]:+.6f} s off, stamps run "
-                    f"from {seconds(int(stamps[0]))} and from {seconds(int(others[0]))}; pass max_offset_s="
-                )
-            chosen[:, column], offsets[near, column] = np.where(near, rows, NONE), offset[near]
-        kept = np.flatnonzero((chosen != NONE).any(axis=1) if images else np.ones(len(sweeps), bool))
+    def _pair(self) -> None:
+        """Read the stamps and keep the sweeps that have an image."""
+        points, images, infos = self.topics.points, self.topics.images, self.topics.infos
+        messages = read_stamps(self._bag, {points, *images, *infos})
+        for topic in (points, *images):
+            check_clock(self._bag, messages[topic])
+        sweeps = messages[points]
+        columns = [nearest_images(self._bag, sweeps, messages[topic], self.max_offset_s) for topic in images]
+        kept = [row for row in range(len(sweeps)) if not images or any(column[row] for column in columns)]
         self.unpaired = len(sweeps) - len(kept)
-        self._offsets_s = offsets[kept]
-        self._sweeps = [sweeps[row] for row in kept.tolist()]
-        self._images = [
-            [
-                entries[index] if index != NONE else None
-                for entries, index in zip(images, chosen[row].tolist(), strict=True)
-            ]
-            for row in kept.tolist()
-        ]
-        self.names = _names(stamps[kept])
+        self._sweeps = [sweeps[row] for row in kept]
+        self._images = [[column[row] for column in columns] for row in kept]
+        self._infos = {image: messages[info] for image, info in zip(images, infos, strict=True)}
+        stamps = [str(sweep.header.stamp_ns) for sweep in self._sweeps]
+        repeated = len(set(stamps)) < len(stamps)
+        self.names = tuple(f"{number:06d}" for number in range(len(stamps))) if repeated else tuple(stamps)
 
     @property
     def offsets_s(self) -> NDArray[np.float64]:
         """(frames, cameras) by how much each image is later than its sweep, in seconds; NaN where there is none."""
-        return self._offsets_s.copy()
+        offsets = [
+            [offset_s(sweep, image) if image else np.nan for image in images]
+            for sweep, images in zip(self._sweeps, self._images, strict=True)
+        ]
+        return np.array(offsets, np.float64).reshape(len(self), len(self.topics.images))
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -184,11 +145,8 @@ class RosBag:
         Raises:
             FileFormatError: The message cannot be read.
         """
-        sweep = self._sweeps[index]
-        try:
-            return decode_points(self._message(sweep))
-        except FileFormatError as error:
-            raise type(error)(self._place(sweep, error)) from None
+        with within(self._place(self._sweeps[index])):
+            return decode_points(self._message(self._sweeps[index]))
 
     @property
     def camera_names(self) -> tuple[str, ...]:
@@ -214,69 +172,52 @@ class RosBag:
         """
         if not -len(self) <= index < len(self):
             raise IndexError(f"frame {index}: there are {len(self)}")
-        sweep = self._sweeps[index]
-        try:
-            points = self.cloud(index).points(self._fields)
-        except FileFormatError as error:
-            raise type(error)(self._place(sweep, error)) from None
-        images = tuple(
-            self._image(camera, entry, sweep.header)
-            for camera, entry in enumerate(self._images[index])
-            if entry is not None
-        )
+        sweep, cloud = self._sweeps[index], self.cloud(index)
+        with within(self._place(sweep)):
+            points = cloud.points(self._fields)
+        images = tuple(self._image(image, sweep.header) for image in self._images[index] if image)
         return Frame(name=self.names[index], points=points, stamp=sweep.header.stamp_ns / NANOSECONDS, images=images)
 
-    def _image(self, camera: int, entry: _Entry, sweep: Header) -> CameraImage:
-        topic = self.topics.images[camera]
-        infos = self._infos[camera]
-        stamps = np.array([info.header.stamp_ns for info in infos], np.int64)
-        info = infos[int(nearest(np.array([entry.header.stamp_ns]), stamps)[0])]
-        try:
-            transform = self._transform(topic, sweep, entry.header)
-            model = camera_of(self._message(info), transform, "image_rect" in topic)
-        except CalibrationError as error:
-            raise CalibrationError(self._place(info, error)) from None
+    def _image(self, image: StampedMessage, sweep: Header) -> CameraImage:
+        info = nearest(self._infos[image.topic], image.header.stamp_ns)
+        with within(self._place(info)):
+            camera = _camera(self._message(info), self._transform(image, sweep), rectified="image_rect" in image.topic)
         return CameraImage(
-            name=_camera_name(topic),
-            camera=model,
-            read=partial(self._pixels, entry, model.image_size),
-            stamp=entry.header.stamp_ns / NANOSECONDS,
+            name=_camera_name(image.topic),
+            camera=camera,
+            read=partial(self._pixels, image, camera.image_size),
+            stamp=image.header.stamp_ns / NANOSECONDS,
         )
 
-    def _transform(self, topic: str, sweep: Header, image: Header) -> NDArray[np.float64]:
-        if topic in self._given:
-            return self._given[topic]
-        if self._tree is None:
-            self._tree = TransformTree(
-                self._transforms(STATIC_TRANSFORMS), partial(self._transforms, MOVING_TRANSFORMS)
-            )
-        return self._tree.lookup(image.frame_id, sweep.frame_id, image.stamp_ns)
+    def _transform(self, image: StampedMessage, sweep: Header) -> NDArray[np.float64]:
+        if image.topic in self._given:
+            return self._given[image.topic]
+        return self._tree.lookup(image.header.frame_id, sweep.frame_id, image.header.stamp_ns)
 
-    def _transforms(self, name: str) -> Iterator[Any]:
+    @cached_property
+    def _tree(self) -> TransformTree:
+        return TransformTree(self._transforms(STATIC_TRANSFORMS), partial(self._transforms, MOVING_TRANSFORMS))
+
+    def _transforms(self, name: str) -> Iterator[Message]:
         """The messages of a topic of transforms, under any robot's prefix."""
         kinds = (TRANSFORMS, OLD_TRANSFORMS)
         topics = [t.name for t in self._bag.topics.values() if t.type in kinds and t.name.endswith(name)]
         for message in self._bag.messages(topics):
             yield self._bag.decode(message.topic, message.raw)
 
-    def _pixels(self, entry: _Entry, image_size: tuple[int, int] | None) -> NDArray[np.uint8]:
-        compressed = self._bag.topics[entry.topic].type == COMPRESSED_IMAGE
-        try:
-            message = self._message(entry)
-            pixels = decode_compressed(message) if compressed else decode_image(message)
-        except FileFormatError as error:
-            raise type(error)(self._place(entry, error)) from None
-        if image_size is not None and pixels.shape[:2] != image_size:
-            raise CalibrationError(self._place(entry, f"image is {pixels.shape[:2]}, its CameraInfo says {image_size}"))
+    def _pixels(self, image: StampedMessage, image_size: tuple[int, int] | None) -> NDArray[np.uint8]:
+        compressed = self._bag.topics[image.topic].type == COMPRESSED_IMAGE
+        with within(self._place(image)):
+            pixels = (decode_compressed if compressed else decode_image)(self._message(image))
+            if image_size is not None and pixels.shape[:2] != image_size:
+                raise CalibrationError(f"image is {pixels.shape[:2]}, its CameraInfo says {image_size}")
         return pixels
 
-    def _message(self, entry: _Entry) -> Any:  # noqa: ANN401
-        with self._reading:  # readers of bags seek in one file
-            content = self._bag.read(entry.topic, entry.received_ns, entry.rank)
-        return self._bag.decode(entry.topic, content)
+    def _message(self, place: StampedMessage) -> Message:
+        return self._bag.decode(place.topic, self._bag.read(place.topic, place.received_ns, place.rank))
 
-    def _place(self, entry: _Entry, error: object) -> str:
-        return f"{self.path}: {entry.topic} at {seconds(entry.header.stamp_ns)}: {error}"
+    def _place(self, message: StampedMessage) -> str:
+        return f"{self.path}: {message.topic} at {seconds(message.header.stamp_ns)}"
 
     def close(self) -> None:
         """Close the bag; frames can no longer be read."""
@@ -289,12 +230,10 @@ class RosBag:
         self.close()
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_bag", "_tree", "_reading")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_bag", "_tree")}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
-        self._tree = None
-        self._reading = Lock()
         self._bag = open_bag(self.path, recover=self._recover)
 
     def __repr__(self) -> str:
@@ -305,43 +244,11 @@ def _camera_name(topic: str) -> str:
     return topic.strip("/").replace("/", "_")
 
 
-def _some(path: Path, topic: str, entries: list[_Entry]) -> list[_Entry]:
-    if not entries:
-        raise InputError(f"{path}: {topic} has no messages; choose another topic")
-    return entries
+def _camera(info: Message, T_camera_lidar: NDArray[np.float64], *, rectified: bool) -> Camera:
+    """The camera of a CameraInfo message, by K and D of raw images and by P of rectified ones.
 
-
-def _stamps(path: Path, topic: str, entries: list[_Entry]) -> NDArray[np.int64]:
-    """(n,) stamps of the messages of a topic, in nanoseconds.
-
-    Raises:
-        InputError: There are none, or a clock stood still.
+    Transforms of ROS lead to the frame in which P projects points (`image_geometry` does so), which R leads to from the
+    camera as it is mounted; so R is left out here.
     """
-    stamps = np.array([entry.header.stamp_ns for entry in _some(path, topic, entries)], np.int64)
-    if len(stamps) > 1 and (stamps == stamps[0]).all():
-        raise InputError(
-            f"{path}: all {len(stamps)} messages of {topic} have the stamp {seconds(int(stamps[0]))}, so they cannot "
-            "be paired; set the stamps in their headers"
-        )
-    return stamps
-
-
-def _names(stamps: NDArray[np.int64]) -> tuple[str, ...]:
-    if len(np.unique(stamps)) == len(stamps):
-        return tuple(str(stamp) for stamp in stamps.tolist())
-    return tuple(f"{number:06d}" for number in range(len(stamps)))
-
-
-def _given_transforms(
-    given: GivenTransform | Mapping[str, GivenTransform] | None, topics: RosTopics
-) -> dict[str, NDArray[np.float64]]:
-    if given is None:
-        return {}
-    if not isinstance(given, Mapping):
-        if len(topics.images) > 1:
-            raise ParameterError(f"T_camera_lidar: there are {len(topics.images)} cameras; pass a mapping from topic")
-        given = dict.fromkeys(topics.images, given)
-    unknown = sorted(set(given) - set(topics.images))
-    if unknown:
-        raise ParameterError(f"T_camera_lidar: {', '.join(unknown)} is none of {', '.join(topics.images)}")
-    return {topic: read_transform(one) for topic, one in given.items()}
+    names = (name for name in MESSAGE_FIELDS if name not in ("R", "r") and hasattr(info, name))
+    return Camera.from_camera_info({name: getattr(info, name) for name in names}, T_camera_lidar, rectified=rectified)

@@ -71,7 +71,7 @@ class LabelledBag:
         Args:
             result: Labels of the points.
             header: Stamp and frame of the cloud, as `RosBag.header` gives them.
-            received_ns: When a player shall send it, in nanoseconds; at its stamp by default.
+            received_ns: Time at which a player shall send it, in nanoseconds; its stamp by default.
 
         Raises:
             LimitError: A category id is beyond 255.
@@ -84,7 +84,7 @@ class LabelledBag:
 
         Args:
             path: The bag to copy from, of the same version of ROS.
-            topics: Which topics.
+            topics: Names of the topics.
             recover: As in `RosBag`.
 
         Raises:

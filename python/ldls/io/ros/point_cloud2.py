@@ -17,7 +17,7 @@ DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "
 """sensor_msgs/PointField: the number of each type."""
 POSITION = ("x", "y", "z")
 READ_FIELDS = (*POSITION, "intensity")
-"""What `PointCloud.points` has, in this order."""
+"""Columns of `PointCloud.points`, in this order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class PointCloud:
     """The N points of a PointCloud2 message, in its order; those of missing returns stay.
 
     Attributes:
-        header: When and in which frame they were measured.
+        header: Time and frame of the measurement.
         fields: (N,) structured array with every field of the message under its name, in this machine's byte order.
     """
 
@@ -36,7 +36,7 @@ class PointCloud:
         """(N, 3) x y z in metres, or (N, 4) with intensity where there is one; float64 where x y z are.
 
         Args:
-            names: What the message calls x, y, z and intensity, where it is not that.
+            names: The message's own names of x, y, z and intensity, where they differ.
 
         Raises:
             FileFormatError: x, y or z is missing or no real number; the message lists the fields there are.
@@ -57,9 +57,9 @@ class PointCloud:
     def _check_position(self, names: list[str]) -> None:
         for name in names:
             if not self._is_number(name) or self.fields.dtype[name].kind != "f":
-                found = ", ".join(f"{n} {self.fields.dtype[n]}" for n in self.fields.dtype.names or ())
+                fields = ", ".join(f"{n} {self.fields.dtype[n]}" for n in self.fields.dtype.names or ())
                 raise FileFormatError(
-                    f"points: expected a field {name!r} of float32 or float64, found {found or 'no fields'}; if it is "
+                    f"points: expected a field {name!r} of float32 or float64, found {fields or 'no fields'}; if it is "
                     f'called otherwise, pass fields={{"{name}": its name}}'
                 )
 

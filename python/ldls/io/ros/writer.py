@@ -29,7 +29,7 @@ class BagWriter:
     Attributes:
         path: Where it will be: a file for "rosbag1", a folder for the others.
         kind: "rosbag1", "rosbag2" (SQLite) or "mcap".
-        ros2: Whether messages are serialised as ROS 2 does.
+        ros2: True if messages are serialised as ROS 2 does.
         types: The typestore of `rosbags` that messages are made with.
     """
 
