@@ -12,7 +12,7 @@ from ldls import batch
 from ldls.datasets import open_source
 from ldls.simulation import Drive, drive_folder, write_drive
 
-N_FRAMES = 8
+N_FRAMES = 5
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "drive")
 
 drive = Drive(n_frames=N_FRAMES, seed=4)

@@ -38,8 +38,8 @@ def mean_iou(frames: list[SceneFrame], params: ldls.Params) -> float:
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "tuning")
 out.mkdir(parents=True, exist_ok=True)
-tuning = [scene_frame(seed) for seed in range(100, 104)]
-held_out = [scene_frame(seed) for seed in range(200, 204)]
+tuning = [scene_frame(seed) for seed in range(100, 103)]
+held_out = [scene_frame(seed) for seed in range(200, 203)]
 
 found = {}
 rows = ["| sigma, m^2 | " + " | ".join(f"K = {k}" for k in NEIGHBORS) + " |", "| ---: |" + " ---: |" * len(NEIGHBORS)]
