@@ -76,6 +76,11 @@ class _Chunk(NamedTuple):
     size: int
     compression: str = ""
 
+    @property
+    def packed(self) -> bool:
+        """True if they are compressed."""
+        return self.compression not in ("", "none")
+
     def read(self) -> bytes:
         """The records, decompressed.
 
@@ -85,7 +90,7 @@ class _Chunk(NamedTuple):
         with self.path.open("rb") as file:
             file.seek(self.start)
             content = file.read(self.size)
-        if self.compression in ("", "none"):
+        if not self.packed:
             return content
         try:
             module = {"bz2": "bz2", "lz4": "lz4.frame", "zstd": "rosbags.rosbag2.reader"}[self.compression]
@@ -96,9 +101,9 @@ class _Chunk(NamedTuple):
 
     def read_part(self, start: int, size: int) -> bytes:
         """`size` bytes from `start` on, both counted after decompression."""
-        if self.compression in ("", "none"):
-            return self._replace(start=self.start + start, size=size).read()
-        return self.read()[start : start + size]
+        if self.packed:
+            return self.read()[start : start + size]
+        return self._replace(start=self.start + start, size=size).read()
 
 
 class _Scan:
@@ -124,6 +129,12 @@ class _Scan:
     def take(self, content: Buffer, start: int, place: _Chunk) -> str | None:
         """Take in the whole messages from `start` on of `content`, which lies at `place`."""
         raise NotImplementedError
+
+    def take_chunk(self, start: int, size: int, left: int, compression: str) -> None:
+        """Take in the whole messages of a chunk, of which `left` bytes are in the file."""
+        chunk = _Chunk(self.path, start, min(size, left), compression)
+        if size <= left or not chunk.packed:  # a part of packed bytes cannot be unpacked
+            self.take(chunk.read(), 0, chunk)
 
     def add(self, channel: int, received_ns: int, read: Callable[[], bytes]) -> None:
         """Take in a whole message."""
@@ -155,8 +166,7 @@ class _Rosbag1(_Scan):
     def take_record(self, header: Any, content: Buffer, place: _Chunk, start: int, size: int) -> None:  # noqa: ANN401
         kind, left = header.get_uint8("op"), len(content) - start
         if kind == 5 and place.start == 0:  # a chunk, which holds no chunks
-            chunk = _Chunk(self.path, start, min(size, left), header.get_string("compression"))
-            self.take(chunk.read(), 0, chunk)
+            self.take_chunk(start, size, left, header.get_string("compression"))
         elif kind == 3:  # the header of the bag
             self.indexed = header.get_uint64("index_pos") != 0
         elif kind == 7 and size <= left:  # a connection
@@ -189,12 +199,10 @@ class _Mcap(_Scan):
         return f"ends at byte {len(content)} without a footer"
 
     def take_record(self, kind: int, content: Buffer, place: _Chunk, start: int, size: int) -> None:
-        end = min(start + size, len(content))
         if kind == 6 and place.start == 0:  # a chunk: times, size, checksum, compression, compressed size, records
             compression, records = _text(content, start + 28)
-            chunk = _Chunk(self.path, records + 8, end - records - 8, compression)
-            self.take(chunk.read(), 0, chunk)
-        elif end < start + size:
+            self.take_chunk(records + 8, start + size - records - 8, len(content) - records - 8, compression)
+        elif start + size > len(content):
             return
         elif kind == 3:  # a schema
             (number,) = struct.unpack_from("<H", content, start)
