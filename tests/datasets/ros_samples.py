@@ -60,7 +60,7 @@ class Recording:
             for topic in self.info_topics:
                 bag.add_topic(Topic(topic, CAMERA_INFO, 0))
             if self.edges:
-                bag.write("/tf_static", transforms(bag.types, self.edges, START_NS), START_NS)
+                bag.write_message("/tf_static", transforms(bag.types, self.edges, START_NS), START_NS)
             for number in range(self.sweeps):
                 self._write_sweep(bag, number)
         return path
@@ -69,13 +69,13 @@ class Recording:
         stamp = START_NS if self.stamps_stand_still else START_NS + number * STEP_NS
         received = START_NS + number * STEP_NS + 1_000_000
         if self.moving:
-            bag.write("/tf", transforms(bag.types, self.moving, stamp, height=float(number)), received)
-        bag.write(self.points_topic, encode(bag.types, self.cloud(number), Header(stamp, "lidar")), received)
+            bag.write_message("/tf", transforms(bag.types, self.moving, stamp, height=float(number)), received)
+        bag.write_message(self.points_topic, encode(bag.types, self.cloud(number), Header(stamp, "lidar")), received)
         header = Header(stamp + self.image_offset_ns, "camera")
         for topic in self.info_topics:
-            bag.write(topic, self.info(bag.types, header), received)
+            bag.write_message(topic, self.info(bag.types, header), received)
         for topic in self.image_topics:
-            bag.write(topic, image(bag.types, picture(number), header=header), received)
+            bag.write_message(topic, image(bag.types, picture(number), header=header), received)
 
     def cloud(self, number: int) -> dict:
         values = np.random.default_rng(number).uniform(1, 9, (50, len(self.columns))).astype(self.point_dtype)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from os import PathLike
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -23,7 +22,7 @@ HIGHEST_CLASS = 255
 TOPIC = "/points_labelled"
 
 
-class LabelledBag:
+class LabelledBag(BagWriter):
     """A bag to write labelled clouds to; it appears under its name only when it is whole.
 
     Each cloud is a PointCloud2 message with all its points in their order and the fields x, y, z (float32, metres),
@@ -52,18 +51,13 @@ class LabelledBag:
             FileExistsError: There is something at `path` already.
             ImportError: The extra `ros` is not installed.
         """
+        super().__init__(path, kind)
         self.topic = topic
-        self._bag = BagWriter(path, kind)
 
     def __enter__(self) -> Self:
-        self._bag.__enter__()
-        self._bag.add_topic(Topic(self.topic, POINTS, 0))
+        super().__enter__()
+        self.add_topic(Topic(self.topic, POINTS, 0))
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._bag.__exit__(kind, error, trace)
 
     def write(self, result: Segmentation, header: Header, *, received_ns: int | None = None) -> None:
         """Write the labelled points of `result`, with the header of the cloud that they are of.
@@ -76,8 +70,8 @@ class LabelledBag:
         Raises:
             LimitError: A category id is beyond 255.
         """
-        message = encode(self._bag.types, labelled_columns(result), header)
-        self._bag.write(self.topic, message, header.stamp_ns if received_ns is None else received_ns)
+        message = encode(self.types, labelled_columns(result), header)
+        self.write_message(self.topic, message, header.stamp_ns if received_ns is None else received_ns)
 
     def copy(self, path: str | PathLike[str], *, topics: Collection[str] | None = None, recover: bool = False) -> None:
         """Copy topics of another bag, all by default, so that images and transforms play beside the labels.
@@ -93,16 +87,16 @@ class LabelledBag:
         """
         source = open_bag(Path(path), recover=recover)
         try:
-            if source.ros2 != self._bag.ros2:
+            if source.ros2 != self.ros2:
                 raise UnsupportedFormatError(
-                    f"{path}: a bag of ROS {1 + source.ros2} cannot be copied into one of ROS {1 + self._bag.ros2}; "
+                    f"{path}: a bag of ROS {1 + source.ros2} cannot be copied into one of ROS {1 + self.ros2}; "
                     "choose another kind, or convert it with rosbags-convert"
                 )
             chosen = [name for name in source.topics if topics is None or name in topics]
             for name in chosen:
-                self._bag.add_topic(source.topics[name], source.types)
+                self.add_topic(source.topics[name], source.types)
             for message in source.messages(chosen):
-                self._bag.write_raw(message.topic, message.raw, message.received_ns)
+                self.write_raw(message.topic, message.raw, message.received_ns)
         finally:
             source.close()
 

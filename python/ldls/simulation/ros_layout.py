@@ -90,7 +90,7 @@ def write_robot_drive(
         bag.add_topic(Topic(POINTS_TOPIC, POINTS, 0))
         bag.add_topic(Topic(image_topic, COMPRESSED_IMAGE if compressed else IMAGE, 0))
         bag.add_topic(Topic(INFO_TOPIC, CAMERA_INFO, 0))
-        bag.write("/tf_static", _static_transforms(bag.types), START_NS)
+        bag.write_message("/tf_static", _static_transforms(bag.types), START_NS)
         for moment in robot_drive(frames, seed=seed, segmenter=segmenter):
             _write_moment(bag, image_topic, moment)
             _write_beside(folder, moment)
@@ -116,7 +116,7 @@ def _write_moment(bag: BagWriter, image_topic: str, moment: Moment) -> None:
         (image_topic, image, taken),
         (INFO_TOPIC, info, taken),
     ):
-        bag.write(topic, message, stamp_ns + LATENCY_NS)
+        bag.write_message(topic, message, stamp_ns + LATENCY_NS)
 
 
 def velodyne_columns(sweep: Sweep) -> dict[str, NDArray[Any]]:

@@ -96,7 +96,7 @@ class BagWriter:
             connection = add(topic.name, topic.type, typestore=known, latching=int(topic.latched))
         self._connections[topic.name] = (connection, topic.type)
 
-    def write(self, topic: str, message: Message, received_ns: int) -> None:
+    def write_message(self, topic: str, message: Message, received_ns: int) -> None:
         """Write a message as if received at that time."""
         kind = self._connections[topic][1]
         self.write_raw(topic, serialize(self.types, message, kind, ros2=self.ros2), received_ns)
