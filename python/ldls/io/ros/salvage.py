@@ -76,11 +76,6 @@ class _Chunk(NamedTuple):
     size: int
     compression: str = ""
 
-    @property
-    def packed(self) -> bool:
-        """True if they are compressed."""
-        return self.compression not in ("", "none")
-
     def read(self) -> bytes:
         """The records, decompressed.
 
@@ -90,7 +85,7 @@ class _Chunk(NamedTuple):
         with self.path.open("rb") as file:
             file.seek(self.start)
             content = file.read(self.size)
-        if not self.packed:
+        if not self.compression:
             return content
         try:
             module = {"bz2": "bz2", "lz4": "lz4.frame", "zstd": "rosbags.rosbag2.reader"}[self.compression]
@@ -101,7 +96,7 @@ class _Chunk(NamedTuple):
 
     def read_part(self, start: int, size: int) -> bytes:
         """`size` bytes from `start` on, both counted after decompression."""
-        if self.packed:
+        if self.compression:
             return self.read()[start : start + size]
         return self._replace(start=self.start + start, size=size).read()
 
@@ -132,8 +127,8 @@ class _Scan:
 
     def take_chunk(self, start: int, size: int, left: int, compression: str) -> None:
         """Take in the whole messages of a chunk, of which `left` bytes are in the file."""
-        chunk = _Chunk(self.path, start, min(size, left), compression)
-        if size <= left or not chunk.packed:  # a part of packed bytes cannot be unpacked
+        chunk = _Chunk(self.path, start, min(size, left), compression.replace("none", ""))
+        if size <= left or not chunk.compression:  # a part of compressed bytes is good for nothing
             self.take(chunk.read(), 0, chunk)
 
     def add(self, channel: int, received_ns: int, read: Callable[[], bytes]) -> None:
