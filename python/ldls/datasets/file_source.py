@@ -107,6 +107,16 @@ def find_files(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
     return {path.name.removesuffix(path.suffix): path for path in sorted(files)}
 
 
+def find_points(folder: Path) -> dict[str, Path]:
+    """Sweeps of `folder` by frame; see `find_files`."""
+    return find_files(folder, POINT_SUFFIXES)
+
+
+def find_images(folder: Path) -> dict[str, Path]:
+    """Images of `folder` by frame; see `find_files`."""
+    return find_files(folder, IMAGE_SUFFIXES)
+
+
 def warn_left_out(path: Path, reasons: Iterable[str], n_sweeps: int) -> None:
     """Warn of sweeps that are left out, if there are any, by what they lack."""
     counted = Counter(reasons)
@@ -131,7 +141,8 @@ def check_folders(path: Path, names: Iterable[str]) -> None:
         raise FileNotFoundError(f"{path}: there is no such folder")
     missing = [name for name in names if not (path / name).is_dir()]
     if missing:
-        raise SourceError(f"{path}: has no folder {', '.join(missing)}; found {listing(path)}")
+        there = some(sorted(child.name for child in path.iterdir())) or "nothing"
+        raise SourceError(f"{path}: has no folder {', '.join(missing)}; found {there}")
 
 
 def choose(path: Path, what: str, there: Sequence[str], wanted: str | None) -> str:
@@ -148,11 +159,6 @@ def choose(path: Path, what: str, there: Sequence[str], wanted: str | None) -> s
     if wanted is None:
         raise SourceError(f"{path}: holds {len(there)} {what}s ({listed}); say which by {what}=")
     raise SourceError(f"{path}: has no {what} {wanted!r}; found {listed}")
-
-
-def listing(path: Path) -> str:
-    """The content of a folder in a few words."""
-    return some(sorted(child.name for child in path.iterdir())) or "nothing"
 
 
 def some(names: Sequence[str]) -> str:

@@ -10,14 +10,7 @@ from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
-from ldls.datasets.file_source import (
-    IMAGE_SUFFIXES,
-    POINT_SUFFIXES,
-    FileSource,
-    choose,
-    find_files,
-    image_from_file,
-)
+from ldls.datasets.file_source import FileSource, choose, find_files, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import ParameterError
@@ -72,11 +65,11 @@ class KittiObjectSource(FileSource):
         self._numbers = {f"image_{n}": n for n in camera_numbers(camera)}
         self._masks = masks
         parts = {
-            "velodyne": find_files(path / "velodyne", POINT_SUFFIXES),
+            "velodyne": find_points(path / "velodyne"),
             "calib": find_files(path / "calib", (".txt",)),
         }
         there = [name for name in self._numbers if masks is None or (path / name).is_dir()]
-        self._images = {name: find_files(path / name, IMAGE_SUFFIXES) for name in there}
+        self._images = {name: find_images(path / name) for name in there}
         if masks is None:
             parts |= self._images
         elif len(self._numbers) == 1:

@@ -11,14 +11,7 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from ldls.datasets.file_source import (
-    IMAGE_SUFFIXES,
-    POINT_SUFFIXES,
-    FileSource,
-    choose,
-    find_files,
-    image_from_file,
-)
+from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers, read_stamps
 from ldls.io import read_camera
@@ -63,8 +56,8 @@ class KittiOdometrySource(FileSource):
         """
         path = _sequence(Path(path), sequence)
         cameras = {f"image_{n}": n for n in camera_numbers(camera)}
-        points = find_files(path / "velodyne", POINT_SUFFIXES)
-        images = {name: find_files(path / name, IMAGE_SUFFIXES) for name in cameras}
+        points = find_points(path / "velodyne")
+        images = {name: find_images(path / name) for name in cameras}
         super().__init__(path, {"velodyne": points, **images}, cameras, truth=truth)
         calib = path / "calib.txt"
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}

@@ -12,15 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ldls.datasets.file_source import (
-    IMAGE_SUFFIXES,
-    POINT_SUFFIXES,
-    FileSource,
-    check_folders,
-    choose,
-    find_files,
-    image_from_file,
-)
+from ldls.datasets.file_source import FileSource, check_folders, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers, read_stamps
 from ldls.errors import SourceError
@@ -72,8 +64,8 @@ class KittiRawSource(FileSource):
         cameras = {f"image_{n:02d}": n for n in camera_numbers(camera)}
         check_folders(path, [LIDAR, *cameras])
         self._cameras = {name: read_camera(path.parent, camera=n) for name, n in cameras.items()}
-        points = find_files(path / LIDAR / "data", POINT_SUFFIXES)
-        images = {name: find_files(path / name / "data", IMAGE_SUFFIXES) for name in cameras}
+        points = find_points(path / LIDAR / "data")
+        images = {name: find_images(path / name / "data") for name in cameras}
         super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
         self.stamps = _stamps(path / LIDAR, self.names)
         self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
-import inspect
+from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,6 +16,7 @@ from ldls.datasets.nuscenes import NuScenesSource
 from ldls.datasets.nuscenes_frame import NuScenesFrameSource
 from ldls.datasets.rosbag import RosBag
 from ldls.errors import ParameterError, SourceError
+from ldls.io.options import check_options
 
 
 class SourceClass(Protocol):
@@ -75,11 +75,11 @@ def open_source(
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such file or folder")
     if kind is not None and kind not in SOURCES:
-        raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(SOURCES)}{_nearest(kind, list(SOURCES))}")
+        near = get_close_matches(kind, SOURCES, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(SOURCES)}{hint}")
     source = SOURCES[guess_kind(path) if kind is None else kind]
-    known = _options_of(source)
-    _check_options(source, known, options)
-    if "truth" in known:
+    if "truth" in check_options(source.kind, source, options):
         options["truth"] = truth
     return source(path, **options)
 
@@ -98,19 +98,3 @@ def guess_kind(path: Path) -> str:
         raise SourceError(f"{path}: may be {what}; say which by kind= or --dataset")
     what = "; ".join(f"{kind} ({source.looks_for})" for kind, source in SOURCES.items())
     raise SourceError(f"{path}: is no source of frames; looked for {what}")
-
-
-def _options_of(source: SourceClass) -> list[str]:
-    return [p.name for p in inspect.signature(source).parameters.values() if p.kind == p.KEYWORD_ONLY]
-
-
-def _check_options(source: SourceClass, known: list[str], options: dict[str, Any]) -> None:
-    for name in options:
-        if name not in known:
-            there = f"expected {', '.join(known)}" if known else "expected none"
-            raise ParameterError(f"{name}: {source.kind} has no such option, {there}{_nearest(name, known)}")
-
-
-def _nearest(name: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {close[0]}?" if close else ""

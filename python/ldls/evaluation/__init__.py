@@ -12,8 +12,7 @@ from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.evaluation import Evaluation, FrameCounts, evaluate
 from ldls.evaluation.figures import iou_against_iterations, iou_against_range, scores_against_range
-from ldls.evaluation.instance import InstanceScores
-from ldls.evaluation.object_score import ObjectScore, object_scores
+from ldls.evaluation.instance import InstanceScores, ObjectScore, object_scores
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticQuality, PanopticScores
 from ldls.evaluation.semantic import SemanticScores

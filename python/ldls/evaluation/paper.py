@@ -14,8 +14,8 @@ from ldls.datasets import Frame, Source
 from ldls.errors import InputError
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.evaluation import Evaluation, evaluate
+from ldls.evaluation.instance import ObjectScore, object_scores
 from ldls.evaluation.methods import FULL, compare
-from ldls.evaluation.object_score import ObjectScore, object_scores
 from ldls.evaluation.pair import Pair, ranges_of
 from ldls.label_diffusion import segment
 from ldls.labeling import Labeling

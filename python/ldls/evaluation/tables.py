@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -102,9 +102,7 @@ def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     names = _classes(evaluations)
     rows: list[tuple[Cell, ...]] = []
     for method, evaluation in evaluations.items():
-        for name in names:
-            c = evaluation.semantic[name]
-            rows.append((method, name, c.tp + c.fn, *map(percent, (c.precision, c.recall, c.iou))))
+        rows += [(method, *scores) for scores in _class_scores(evaluation)]
         if len(names) > 1:
             rows.append((method, "mean", None, None, None, percent(evaluation.semantic.mean_iou)))
     columns = ("method", "class", "true points", "precision", "recall", "IoU")
@@ -162,12 +160,7 @@ def frame_table(evaluation: Evaluation) -> Table:
 
 def range_table(by_range: Mapping[float, Evaluation]) -> Table:
     """Precision, recall and IoU of each class over the points up to each maximum range (the paper's range figures)."""
-    rows = []
-    for limit_m, evaluation in by_range.items():
-        for name in evaluation.names:
-            counts = evaluation.semantic[name]
-            scores = (percent(score) for score in (counts.precision, counts.recall, counts.iou))
-            rows.append((f"{limit_m:g}", name, counts.tp + counts.fn, *scores))
+    rows = [(f"{limit_m:g}", *scores) for limit_m, each in by_range.items() for scores in _class_scores(each)]
     columns = ("maximum range, m", "class", "true points", "precision", "recall", "IoU")
     return Table("Points by maximum range", columns, tuple(rows), PERCENT)
 
@@ -181,6 +174,14 @@ def iteration_table(by_iterations: Mapping[int, Evaluation]) -> Table:
         rows.append((count, *scores, percent(evaluation.semantic.mean_iou)))
     columns = ("iterations", *(f"{name} IoU" for name in names), "mean IoU")
     return Table("Points by number of iterations", columns, tuple(rows), PERCENT)
+
+
+def _class_scores(evaluation: Evaluation) -> Iterator[tuple[str, int, *tuple[float | None, ...]]]:
+    """Name, true points, precision, recall and IoU of each class."""
+    for name in evaluation.names:
+        counts = evaluation.semantic[name]
+        scores = counts.precision, counts.recall, counts.iou
+        yield name, counts.tp + counts.fn, *map(percent, scores)
 
 
 def _classes(evaluations: Mapping[str, Evaluation]) -> tuple[str, ...]:

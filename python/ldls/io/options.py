@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
+from difflib import get_close_matches
 
 from ldls.errors import ParameterError
 
@@ -24,5 +25,7 @@ def check_options(place: str, function: Callable[..., object], given: Iterable[s
     for option in given:
         if option not in known:
             expected = f"expected {', '.join(known)}" if known else "they have none"
-            raise ParameterError(f"{option}: no option of {place}; {expected}")
+            near = get_close_matches(option, known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ParameterError(f"{option}: no option of {place}; {expected}{hint}")
     return known
