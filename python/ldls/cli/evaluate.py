@@ -22,7 +22,7 @@ FORMAT_NAMES = "annotations, kitti-boxes, ldls, semantic-kitti, squeezeseg, nusc
 
 
 class Missing(StrEnum):
-    """What becomes of a frame without its pair."""
+    """Treatment of frames without their pair."""
 
     ERROR = "error"
     SKIP = "skip"
@@ -121,11 +121,11 @@ def _show(by_method: dict[str, Evaluation], out: Path | None) -> None:
     screen = console()
     for table in tables.values():
         screen.print(table.rich())
-    for method, found in by_method.items():
-        counted, all_points = (sum(getattr(f, field) for f in found.frames) for field in ("n_counted", "n_points"))
-        counts = f"{_frames(len(found.frames))}, {counted:,} of {all_points:,} points counted"
+    for method, scores in by_method.items():
+        counted, all_points = (sum(getattr(f, field) for f in scores.frames) for field in ("n_counted", "n_points"))
+        counts = f"{_frames(len(scores.frames))}, {counted:,} of {all_points:,} points counted"
         screen.print(counts if len(by_method) == 1 else f"{method}: {counts}", highlight=False)
-    if len({sum(f.n_counted for f in found.frames) for found in by_method.values()}) > 1:
+    if len({sum(f.n_counted for f in scores.frames) for scores in by_method.values()}) > 1:
         screen.print("the methods label different points: their scores do not compare", highlight=False)
     if out:
         screen.print(

@@ -48,21 +48,21 @@ def info(
     from ldls.datasets import open_source
     from ldls.datasets.inspection import check_stamps, inspect, sample
 
-    found = open_source(source, kind=dataset, **parse_options(option or []))
-    indices = list(range(len(found))) if every else sample(len(found), LOOKED_AT)
-    facts = [inspect(found, at) for at in progress(indices, len(indices), "looking at frames")]
-    stamps = stamps_of(found)
-    findings = [finding for each in facts for finding in each.findings] + check_stamps(found.names, stamps)
+    frames = open_source(source, kind=dataset, **parse_options(option or []))
+    indices = list(range(len(frames))) if every else sample(len(frames), LOOKED_AT)
+    facts = [inspect(frames, at) for at in progress(indices, len(indices), "looking at frames")]
+    stamps = stamps_of(frames)
+    findings = [finding for each in facts for finding in each.findings] + check_stamps(frames.names, stamps)
     screen = console()
-    screen.print(summary_table(found, facts, stamps))
-    cameras = camera_table(found, facts)
+    screen.print(summary_table(frames, facts, stamps))
+    cameras = camera_table(frames, facts)
     if cameras is not None:
         screen.print(cameras)
     screen.print(
-        finding_table(findings) if findings else f"looked at {len(facts)} of {len(found)} frames, found nothing wrong"
+        finding_table(findings) if findings else f"looked at {len(facts)} of {len(frames)} frames, found nothing wrong"
     )
     if picture is not None:
-        write_picture(chosen_frame(found, frame), picture)
+        write_picture(chosen_frame(frames, frame), picture)
         screen.print(f"wrote {picture}", highlight=False, soft_wrap=True)
     if any(finding.broken for finding in findings):
         raise typer.Exit(1)
@@ -90,10 +90,10 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
     if left_out:
         table.add_row("left out", f"{len(left_out):,} ({counts_of(left_out)})")
     table.add_row("time", _time(stamps))
-    counts = [found.n_points for found in facts if found.n_points] or [0]
+    counts = [each.n_points for each in facts if each.n_points] or [0]
     table.add_row("points a frame", _range(f"{min(counts):,}", f"{max(counts):,}"))
     classes = classes_of(facts)
-    labelled = sum(found.truth is not None for found in facts)
+    labelled = sum(each.truth is not None for each in facts)
     named = ", ".join(f"{name} {count:,}" for name, count in classes.items())
     table.add_row("truth", escape(f"points in {labelled} of {len(facts)} frames: {named}") if labelled else "none")
     return table
@@ -106,7 +106,7 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
 
     from ldls.datasets.inspection import field_of_view_deg
 
-    whole = next((found for found in facts if found.in_view), None)
+    whole = next((each for each in facts if each.in_view), None)
     if whole is None:
         return None
     table = Table(title="cameras")
@@ -115,8 +115,8 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
         table.add_column(heading)
     for image in source[source.names.index(whole.name)].images:
         across, down = field_of_view_deg(image.camera)
-        shares = [found.in_view[image.name] for found in facts if image.name in found.in_view]
-        offsets = [found.offsets_s[image.name] for found in facts if image.name in found.offsets_s]
+        shares = [each.in_view[image.name] for each in facts if image.name in each.in_view]
+        offsets = [each.offsets_s[image.name] for each in facts if image.name in each.offsets_s]
         height, width = image.camera.image_size or (0, 0)
         table.add_row(
             escape(image.name),
@@ -130,7 +130,7 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
 
 
 def finding_table(findings: Sequence[Finding]) -> Table:
-    """What was found, the broken first."""
+    """The findings, the broken first."""
     from rich.markup import escape
     from rich.table import Table
 

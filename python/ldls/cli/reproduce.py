@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Truth(StrEnum):
-    """What the frames are scored by."""
+    """Kinds of truth to score by."""
 
     ANNOTATIONS = "annotations"
     BOXES = "boxes"
@@ -61,13 +61,13 @@ def reproduce(
 
     frames = KittiObjectSource(_folder(folder, suite), masks="masks", truth=truth.value)
     labelled = progress(label(frames, params=Params(threads=threads)), len(frames), "labelling")
-    found = score(list(labelled), classes=ClassSet.kitti(words(classes)))
+    experiment = score(list(labelled), classes=ClassSet.kitti(words(classes)))
     screen = console()
-    tables = _tables(found)
+    tables = _tables(experiment)
     for stem, table in tables.items():
         table.write(out, stem)
         screen.print(table.rich())
-    figures = _draw(found, out)
+    figures = _draw(experiment, out)
     screen.print(f"{len(frames)} frames; wrote {', '.join(tables)} as .md, .csv and .json", highlight=False)
     screen.print(f"and {', '.join(path.name for path in figures)} to {out}", highlight=False, soft_wrap=True)
 
@@ -84,28 +84,28 @@ def _folder(folder: Path | None, suite: SuitePart | None) -> Path:
     return suite_folder(suite.value) / "training"
 
 
-def _tables(found: Experiment) -> dict[str, Table]:
+def _tables(experiment: Experiment) -> dict[str, Table]:
     from ldls.evaluation import tables
 
     return {
-        "comparison": tables.semantic_table(found.methods),
-        "instances": tables.instance_table(found.methods),
-        "panoptic": tables.panoptic_table(found.methods),
-        "ablation": tables.ablation_table(found.methods),
-        "range": tables.range_table(found.by_range),
-        "iterations": tables.iteration_table(found.by_iterations),
+        "comparison": tables.semantic_table(experiment.methods),
+        "instances": tables.instance_table(experiment.methods),
+        "panoptic": tables.panoptic_table(experiment.methods),
+        "ablation": tables.ablation_table(experiment.methods),
+        "range": tables.range_table(experiment.by_range),
+        "iterations": tables.iteration_table(experiment.by_iterations),
     }
 
 
-def _draw(found: Experiment, out: Path) -> list[Path]:
+def _draw(experiment: Experiment, out: Path) -> list[Path]:
     """The figures drawn: those for which there is something to draw."""
     from ldls.evaluation import figures
     from ldls.evaluation.methods import FULL
 
-    names = found.methods[FULL].names
-    by_range = {name: {limit: one.semantic[name] for limit, one in found.by_range.items()} for name in names}
-    objects = {name: [(score.range_m, score.iou) for score in found.objects if score.name == name] for name in names}
-    after = {name: {count: one.semantic[name].iou for count, one in found.by_iterations.items()} for name in names}
+    names = experiment.methods[FULL].names
+    by_range = {name: {limit: one.semantic[name] for limit, one in experiment.by_range.items()} for name in names}
+    objects = {name: [(one.range_m, one.iou) for one in experiment.objects if one.name == name] for name in names}
+    after = {name: {n: one.semantic[name].iou for n, one in experiment.by_iterations.items()} for name in names}
     paths = [out / "range.png", out / "iterations.png"]
     figures.scores_against_range(by_range, paths[0])
     figures.iou_against_iterations(after, paths[1])

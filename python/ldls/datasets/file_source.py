@@ -20,7 +20,7 @@ from ldls.masks import InstanceMasks
 POINT_SUFFIXES = (".bin", ".npy")
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 LISTED = 8
-"""How many names an error lists."""
+"""Number of names that an error lists."""
 
 
 class FileSource:
@@ -30,7 +30,7 @@ class FileSource:
         path: Folder of the source.
         names: Names of the frames of which every file is there, sorted.
         stamps: Times of the sweeps in seconds; None where the source does not say.
-        left_out: What the others lack, by their names.
+        left_out: Parts that the others lack, by name of the frame.
         camera_names: Name of the camera of each image of a frame.
     """
 
@@ -126,7 +126,7 @@ def warn_left_out(path: Path, reasons: Iterable[str], n_sweeps: int) -> None:
 
 
 def counts_of(reasons: Iterable[str]) -> str:
-    """How often each reason occurs, the most frequent first."""
+    """Counts of the reasons, the most frequent first."""
     return ", ".join(f"{count:,} {reason}" for reason, count in Counter(reasons).most_common())
 
 

@@ -32,7 +32,7 @@ class FolderSource(FileSource):
         path: Folder of ldls.toml.
         names: Values of {frame}, sorted.
         stamps: Times of the sweeps in seconds; None for each without a file of stamps.
-        left_out: What frames lack that have only some of their files, by name.
+        left_out: Parts that incomplete frames lack, by name of the frame.
     """
 
     kind = "folder"

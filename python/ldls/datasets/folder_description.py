@@ -1,4 +1,4 @@
-"""`ldls.toml`: what lies where in a plain folder of frames."""
+"""`ldls.toml`, which describes a plain folder of frames."""
 
 from __future__ import annotations
 
@@ -57,16 +57,16 @@ calibration_camera = 2              # which P of the file; 2 by default
 
 @dataclass(frozen=True, kw_only=True)
 class CameraDescription:
-    """What ldls.toml says of a camera.
+    """A camera as ldls.toml describes it.
 
     Attributes:
         images: Pattern of its images.
         masks: Pattern of their masks, if there are any.
         stamps: File of their stamps, if there is one.
         calibration: Pattern of KITTI calibration files, where the calibration is not inline.
-        number: Which camera of those files.
+        number: Number of the camera in those files.
         inline: The camera, where its calibration is inline.
-        image_size: (height, width) in pixels, where it is told.
+        image_size: (height, width) in pixels, where it is given.
     """
 
     images: str
@@ -80,7 +80,7 @@ class CameraDescription:
 
 @dataclass(frozen=True, kw_only=True)
 class FolderDescription:
-    """What ldls.toml says.
+    """The content of an ldls.toml.
 
     Attributes:
         points: Pattern of the sweeps.
@@ -100,7 +100,7 @@ class FolderDescription:
 
 
 def read_description(path: Path) -> FolderDescription:
-    """What an ldls.toml says.
+    """Read and check an ldls.toml.
 
     Raises:
         CorruptFileError: It is no TOML.

@@ -1,4 +1,4 @@
-"""Whether the frames of a source look sound."""
+"""Checks of the frames of a source."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Finding:
 
     Attributes:
         frame: Name of the frame; empty where it is about the source.
-        what: What was found.
-        broken: Whether it makes the frame useless; otherwise it is worth a look.
+        what: Description of it.
+        broken: True where it makes the frame useless; otherwise it is worth a look.
     """
 
     frame: str
@@ -40,15 +40,15 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class FrameFacts:
-    """What one frame holds.
+    """Contents of one frame.
 
     Attributes:
         name: Name of the frame.
         n_points: Its points.
         in_view: Share of the points that each camera sees, by its name.
-        offsets_s: How much later than the sweep each image was taken, in seconds, where both stamps are known.
+        offsets_s: Time of each image after the sweep, in seconds, where both stamps are known.
         truth: Points of each class that truth has; None without truth.
-        findings: What is not as it should be.
+        findings: Faults of the frame.
     """
 
     name: str
@@ -65,7 +65,7 @@ def sample(count: int, wanted: int) -> list[int]:
 
 
 def inspect(source: Source, index: int) -> FrameFacts:
-    """What a frame holds and what is wrong with it; a frame that cannot be read is a finding, not an error."""
+    """Contents and faults of a frame; a frame that cannot be read is a finding, not an error."""
     name = source.names[index]
     try:
         frame = source[index]
@@ -82,7 +82,7 @@ def inspect(source: Source, index: int) -> FrameFacts:
         truth=None if frame.truth is None else {n: c for n, c in frame.truth.counts().items() if c},
         findings=(
             *_of_cloud(frame),
-            *(found for image in frame.images for found in _of_image(frame, image)),
+            *(finding for image in frame.images for finding in _of_image(frame, image)),
             *_of_views(name, shares if len(frame.points) else {}),
             *_of_offsets(name, offsets),
         ),
@@ -118,8 +118,8 @@ def field_of_view_deg(camera: Camera) -> tuple[float, float]:
 def classes_of(facts: Iterable[FrameFacts]) -> dict[str, int]:
     """Points of each class of the truth over all frames, the most frequent first."""
     counts: dict[str, int] = {}
-    for found in facts:
-        for name, count in (found.truth or {}).items():
+    for each in facts:
+        for name, count in (each.truth or {}).items():
             counts[name] = counts.get(name, 0) + count
     return dict(sorted(counts.items(), key=lambda pair: -pair[1]))
 

@@ -33,7 +33,7 @@ class KittiObjectSource(FileSource):
         path: Folder with velodyne, image_2 and calib.
         names: Numbers of the frames, as "000571".
         stamps: None for each frame, as the data set has none.
-        left_out: What frames lack that have only some of their files, by name.
+        left_out: Parts that incomplete frames lack, by name of the frame.
     """
 
     kind = "kitti-object"

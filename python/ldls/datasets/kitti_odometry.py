@@ -26,7 +26,7 @@ class KittiOdometrySource(FileSource):
         path: Folder of the sequence, as `sequences/08`.
         names: Numbers of the frames, as "000000".
         stamps: Seconds since the sequence began, of sweep and image alike; None for each without times.txt.
-        left_out: What frames lack that have only some of their files, by name.
+        left_out: Parts that incomplete frames lack, by name of the frame.
     """
 
     kind = "kitti-odometry"

@@ -32,7 +32,7 @@ class KittiRawSource(FileSource):
         path: Folder of the drive, as `2011_09_26/2011_09_26_drive_0001_sync`.
         names: Numbers of the frames, as "0000000000".
         stamps: Times of the sweeps in seconds since 1970, KITTI's clock taken for UTC; single ones may be None.
-        left_out: What frames lack that have only some of their files, by name.
+        left_out: Parts that incomplete frames lack, by name of the frame.
     """
 
     kind = "kitti-raw"

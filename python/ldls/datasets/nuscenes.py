@@ -41,7 +41,7 @@ class NuScenesSource:
         path: Folder of the data set.
         names: Scene and number of each frame in it, as "scene-0061_007"; scenes in the order of their time.
         stamps: Times of the sweeps in seconds since 1970.
-        left_out: What frames lack that have only some of their files, by name.
+        left_out: Parts that incomplete frames lack, by name of the frame.
     """
 
     kind = "nuscenes"

@@ -1,4 +1,4 @@
-"""The tables of nuScenes: what each sensor took for a key frame, and where the car and its sensors were.
+"""The tables of nuScenes: readings of sensors for each key frame, and poses of the car and its sensors.
 
 Tables are read a row at a time; only rows of the key frames that are wanted are kept.
 """
@@ -24,12 +24,12 @@ TABLES = ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "se
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What one sensor took for a key frame.
+    """Reading of one sensor for a key frame.
 
     Attributes:
         token: Its token in sample_data.
         filename: Its file, below the folder of the data set.
-        stamp_us: When it was taken, in microseconds since 1970.
+        stamp_us: Time at which it was taken, in microseconds since 1970.
         sensor: Token of its calibrated sensor.
         pose: Token of the car's pose then.
         size: (height, width) of an image in pixels.
@@ -118,7 +118,7 @@ def read_sensors(tables: Path, channels: tuple[str, ...]) -> dict[str, Calibrate
 def read_readings(
     tables: Path, samples: Mapping[str, str], sensors: Mapping[str, CalibratedSensor]
 ) -> dict[str, dict[str, Reading]]:
-    """What each of `sensors` took for the key frames `samples`: by sample and channel.
+    """Readings of `sensors` for the key frames `samples`, by sample and channel.
 
     Raises:
         CorruptFileError: The table is broken.

@@ -17,13 +17,13 @@ from ldls.labeling import Labeling
 GROUND_THICKNESS_M = 0.15
 """Points this near the ground belong to it: returns scatter by centimetres, and tyres and shoes hide little more."""
 SURROUNDINGS_M = 1.0
-"""How far around a box the ground is looked for."""
+"""Distance from a box within which the ground is looked for."""
 BOX_ERROR_M = 0.5
-"""How far the ground can lie above or below the bottom of a box."""
+"""Largest height of the ground above or below the bottom of a box."""
 GROUND_SCATTER_M = 0.1
 """Returns around a box that lie higher above the fitted ground than this are something else: kerbs, bushes, walls."""
 ROUNDS = 5
-"""How often the ground is fitted, each time without what the last fit left above it."""
+"""Fits of the ground, each without the points that the last one left above it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Counts:
-    """How many things (points, or instances) were found, invented and missed.
+    """Numbers of things (points, or instances) found, invented and missed.
 
     Scores are None where there is nothing to score: neither truth nor prediction has such a thing. Otherwise a score
     whose denominator is 0 is 0: the precision of what was never predicted, the recall of what was only invented.

@@ -17,7 +17,7 @@ from ldls.labeling import Labeling
 
 @dataclass(frozen=True)
 class FrameCounts:
-    """What one frame brought.
+    """Counts of one frame.
 
     Attributes:
         name: Name of the frame.
@@ -63,7 +63,7 @@ def evaluate(
 
     Args:
         pairs: Prediction and truth of each frame, as `Pair` or (name, prediction, truth).
-        classes: What is scored, and what becomes of other classes.
+        classes: The scored classes, and the treatment of all others.
         thresholds: IoU from which on a matched instance is found.
         max_range_m: Points farther from the lidar than this do not count; needs `Pair.ranges_m`.
         minimum_points: Smaller true instances, and smaller unmatched segments in panoptic quality, do not count.

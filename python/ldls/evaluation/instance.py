@@ -136,7 +136,7 @@ def matched_iou(overlap: Overlaps, matched: NDArray[np.int64]) -> NDArray[np.flo
 
 @dataclass(frozen=True)
 class ObjectScore:
-    """How well one true instance was overlap.
+    """Score of one true instance.
 
     Attributes:
         frame: Name of the frame.

@@ -28,7 +28,7 @@ class PanopticQuality:
 
     Attributes:
         counts: Segments found, invented and missed.
-        iou_sum: Sum of the IoUs of the segments overlap.
+        iou_sum: Sum of the IoUs of the segments found.
     """
 
     counts: Counts = field(default_factory=Counts)

@@ -45,8 +45,8 @@ class SemanticScores:
         if name not in self.names:
             raise KeyError(name)
         k = self.names.index(name) + 1
-        found = int(self.confusion[k, k])
-        return Counts(found, int(self.confusion[:, k].sum()) - found, int(self.confusion[k].sum()) - found)
+        hits = int(self.confusion[k, k])
+        return Counts(hits, int(self.confusion[:, k].sum()) - hits, int(self.confusion[k].sum()) - hits)
 
     @property
     def mean_iou(self) -> float | None:

@@ -29,10 +29,10 @@ class Table:
     """A table of scores.
 
     Attributes:
-        title: What it shows.
+        title: Its title.
         columns: Heads of the columns.
         rows: Cells: text, whole numbers, numbers shown with one decimal, or None where there is nothing to score.
-        note: What the reader must know.
+        note: A note to the reader, shown below.
 
     Raises:
         ParameterError: A row has not a cell for each column, or a number is not finite.

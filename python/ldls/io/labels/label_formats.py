@@ -26,7 +26,7 @@ class Format:
     """A format of labels.
 
     Attributes:
-        ending: How its files' names end; what stands before is the name of the frame.
+        ending: End of its files' names; the rest is the name of the frame.
         read: Reader of a file.
         needs_points: True where the reader needs the frame's points and camera.
     """
@@ -49,7 +49,7 @@ FORMATS: dict[str, Format] = {
 
 SAY_WHICH = "say which by format=, or by --truth-format and --prediction-format"
 LISTED = 10
-"""How many frames an error lists."""
+"""Number of frames that an error lists."""
 
 
 def read_labeling(
@@ -80,7 +80,7 @@ def read_labeling(
         return chosen.read(path)
     if points is None or camera is None:
         missing = "points" if points is None else "camera"
-        raise InputError(f"{missing}: {path} holds boxes ({name}), whose points are found by points and camera")
+        raise InputError(f"{missing}: {path} holds boxes ({name}), whose points take points and camera to find")
     return chosen.read(path, points=points, camera=camera)
 
 
