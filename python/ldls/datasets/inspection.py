@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -117,11 +118,10 @@ def field_of_view_deg(camera: Camera) -> tuple[float, float]:
 
 def classes_of(facts: Iterable[FrameFacts]) -> dict[str, int]:
     """Points of each class of the truth over all frames, the most frequent first."""
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for each in facts:
-        for name, count in (each.truth or {}).items():
-            counts[name] = counts.get(name, 0) + count
-    return dict(sorted(counts.items(), key=lambda pair: -pair[1]))
+        counts.update(each.truth or {})
+    return dict(counts.most_common())
 
 
 def _angle_deg(camera: Camera, axis: int) -> float:
