@@ -13,7 +13,7 @@ from ldls.batch.lock import LOCK_NAME
 from ldls.cli import app
 
 KILLED_AT = Path(__file__).with_name("killed_at.py")
-PATIENCE_S = 60
+PATIENCE_S = 300
 SLOWLY = """
 import time
 from ldls.batch.frame_work import FrameWork
@@ -69,13 +69,16 @@ def has_done_some(running, out):
 
 
 def _comes_to(running, state):
+    wait_for(lambda: running.poll() is not None or state())
+    return running.poll() is None
+
+
+def wait_for(state):
+    """Wait until `state` holds, longer than any machine needs."""
     patience = time.monotonic() + PATIENCE_S
-    while running.poll() is None:
-        if state():
-            return True
+    while not state():
         assert time.monotonic() < patience
         time.sleep(0.001)
-    return False
 
 
 def killed_after(arguments, out, seconds):

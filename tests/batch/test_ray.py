@@ -51,11 +51,12 @@ def test_a_worker_killed_on_the_way_costs_nothing(ray, source, undisturbed, tmp_
     killed = []
 
     def kill_one(finished, _failed, _total):
+        if finished == 5:
+            runs.wait_for(lambda: len(worker_pids(os.getpid())) == 2)
         if finished in (15, 35):
-            pids = [pid for pid in worker_pids(os.getpid()) if pid not in killed]
-            assert len(pids) == 2 - len(killed) or killed
-            os.kill(pids[0], signal.SIGKILL)
-            killed.append(pids[0])
+            pid = next(pid for pid in worker_pids(os.getpid()) if pid not in killed)
+            os.kill(pid, signal.SIGKILL)
+            killed.append(pid)
 
     summary = batch.run(source, tmp_path, stored(source), engine="ray", workers=2, on_progress=kill_one)
     assert len(killed) == 2
@@ -66,16 +67,34 @@ def test_a_worker_killed_on_the_way_costs_nothing(ray, source, undisturbed, tmp_
 
 def test_a_killed_run_goes_on_on_either_engine(ray, source, undisturbed, tmp_path):
     words = runs.arguments(source, tmp_path)
-    killed = runs.finished(["file renamed", "10", *words], [str(runs.KILLED_AT)])
-    assert killed.returncode == -signal.SIGKILL, killed.stderr
-    with runs.process([*words, *map(str, WORKERS)]) as running:
-        while len(list(tmp_path.glob("*.label"))) < 20:
-            assert running.poll() is None
-        running.kill()
+    for more in ((), WORKERS):
+        killed = runs.finished(["line written", "2", *words, *map(str, more)], [str(runs.KILLED_AT)])
+        assert killed.returncode == -signal.SIGKILL, killed.stderr
     outcome = runs.finished([*words, *map(str, WORKERS)])
     assert outcome.returncode == 0, outcome.stderr
     assert "by earlier runs" in outcome.stdout
     assert runs.contents(tmp_path) == undisturbed
+
+
+def test_a_full_disk(ray, source, small_disk):
+    outcome = runs.finished([*runs.arguments(source, small_disk), *map(str, WORKERS)])
+    assert outcome.returncode == 1
+    assert "No space left on device while" in outcome.stderr
+    assert "ing frame 000" in outcome.stderr
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1", "127.0.0.1:port"])
+def test_an_address_where_no_cluster_is(ray, few, tmp_path, address):
+    with pytest.raises(BatchError, match=f"cannot join '{address}'"):
+        batch.run(few, tmp_path / "out", stored(few), engine="ray", ray_address=address)
+
+
+@pytest.fixture(scope="module")
+def cluster(ray):
+    """One that was there before the run; what follows uses it."""
+    ray.init(address="local", num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")
+    yield ray
+    ray.shutdown()
 
 
 class Deadly:
@@ -98,9 +117,11 @@ class Deadly:
         return self.source.files(index)
 
 
-def test_a_frame_that_kills_its_workers_is_passed_over(ray, few, tmp_path):
+def test_bad_frames_and_frames_that_kill_their_workers_are_passed_over(cluster, few, tmp_path):
     from ray import cloudpickle
 
+    sound = (few / "velodyne/000002.bin").read_bytes()
+    (few / "velodyne/000002.bin").write_bytes(b"x" * 17)
     # workers do not have the tests on their path
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
     try:
@@ -108,30 +129,17 @@ def test_a_frame_that_kills_its_workers_is_passed_over(ray, few, tmp_path):
         summary = batch.run(deadly, tmp_path / "out", stored(few), engine="ray", workers=2)
     finally:
         cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
-    (failure,) = summary.failures
-    assert (failure.frame, failure.stage, failure.code) == ("000004", "worker", "worker_died")
-    assert summary.n_done == 11
+    assert [(failure.frame, failure.stage, failure.code) for failure in summary.failures] == [
+        ("000002", "read", "truncated_file"),
+        ("000004", "worker", "worker_died"),
+    ]
+    assert summary.n_done == 10
+    assert cluster.is_initialized()
+    (few / "velodyne/000002.bin").write_bytes(sound)
     assert batch.run(few, tmp_path / "out", stored(few)).n_done == 12
 
 
-def test_bad_frames_and_a_full_disk(ray, source, small_disk, few, tmp_path):
-    (few / "velodyne/000002.bin").write_bytes(b"x" * 17)
-    outcome = runs.finished([*runs.arguments(few, tmp_path / "out"), *map(str, WORKERS)])
-    assert outcome.returncode == 2, outcome.stderr
-    assert "11 of 12 frames done, 1 failed" in outcome.stdout
-    outcome = runs.finished([*runs.arguments(source, small_disk), *map(str, WORKERS)])
-    assert outcome.returncode == 1
-    assert "No space left on device while" in outcome.stderr
-    assert "ing frame 000" in outcome.stderr
-
-
-@pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1", "127.0.0.1:port"])
-def test_an_address_where_no_cluster_is(ray, few, tmp_path, address):
-    with pytest.raises(BatchError, match=f"cannot join '{address}'"):
-        batch.run(few, tmp_path / "out", stored(few), engine="ray", ray_address=address)
-
-
-def test_gpus_that_are_not_there(ray, few, tmp_path):
+def test_gpus_that_are_not_there(cluster, few, tmp_path):
     with pytest.raises(BatchError, match="the cluster has 0, a worker wants 64"):
         batch.run(few, tmp_path / "out", stored(few), engine="ray", gpus=64)
 

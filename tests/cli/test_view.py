@@ -63,7 +63,10 @@ def test_a_ring_takes_an_image_for_each_camera(small_scene, saved):
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drive")
-    done = CliRunner().invoke(app, ["simulate", "--layout", "kitti-raw", "--frames", "3", str(folder)])
+    done = CliRunner().invoke(
+        app,
+        ["simulate", "--layout", "kitti-raw", "--frames", "3", "--lidar", "vlp-16", "--camera", "robot", str(folder)],
+    )
     assert done.exit_code == 0, done.output
     (found,) = folder.glob("*/*_sync")
     return found
