@@ -5,10 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
 import ldls
 from ldls.cli import app
+
+# the same examples in every run, and no clock: a loaded machine is no fault of the code
+settings.register_profile("tests", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("tests")
 
 KITTI_FRAMES = ("000000", "000001", "000002", "000003", "000571")
 

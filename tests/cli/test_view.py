@@ -180,7 +180,7 @@ def test_where_there_is_a_display_the_viewer_is_the_target(monkeypatch):
 
 def test_the_command_ends_by_itself_and_says_one_line(saved):
     command = [sys.executable, "-m", "ldls", "view", "frame.npz", "--rerun", "a.rrd"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=True)
     assert done.stderr == "" and len(done.stdout.splitlines()) == 1
 
 

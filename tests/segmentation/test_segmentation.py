@@ -378,7 +378,7 @@ def test_a_forked_child_computes_the_same(small_scene):
     answers = context.SimpleQueue()
     child = context.Process(target=segment_in_child, args=((points, masks, camera), answers))
     child.start()
-    child.join(timeout=10)
+    child.join(timeout=300)
     assert child.exitcode == 0
     assert answers.get() == expected
 

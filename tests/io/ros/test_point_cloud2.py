@@ -57,7 +57,7 @@ def cloud_of(count, columns=XYZ, seed=0):
     return cloud
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     columns=st.lists(st.sampled_from(sorted(NUMBERS)), max_size=4),
     position=st.sampled_from(["f4", "f8"]),
