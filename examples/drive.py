@@ -22,7 +22,7 @@ source = open_source(drive_folder(out / "raw", drive))
 masks_folder = source.path / "masks_02"
 print(f"\n{source.kind}: {len(source)} frames, cameras {', '.join(source.camera_names)}")
 
-# As on a robot: one object keeps its memory from frame to frame.
+# As on a robot: frame after frame, each with the camera of its moment.
 stream = ldls.LabelDiffusion()
 for frame in source:
     (image,) = frame.images

@@ -15,7 +15,6 @@ __all__ = [
     "Products",
     "Rle",
     "SegmentationArrays",
-    "StreamMemory",
     "__version__",
     "check_params",
     "default_threads",
@@ -84,10 +83,6 @@ class Camera:
     def project(self, x: float, y: float, z: float) -> tuple[float, float, float]: ...
 
 @final
-class StreamMemory:
-    def __new__(cls) -> StreamMemory: ...
-
-@final
 class Products:
     def __new__(cls, point_graph: _Csr, labels: _Csr, n_labels: int, iterations: int | None) -> Products: ...
     def advance(self, products: int, threads: int | None) -> NDArray[np.float32]: ...
@@ -118,7 +113,6 @@ def segment(
     params: _Params,
     keep_origin: bool,
     threads: int | None,
-    memory: StreamMemory | None,
 ) -> SegmentationArrays: ...
 def segment_ring(
     points: _Points,
@@ -129,7 +123,6 @@ def segment_ring(
     params: _Params,
     keep_origin: bool,
     threads: int | None,
-    memory: StreamMemory | None,
 ) -> tuple[SegmentationArrays, list[tuple[NDArray[np.int64], NDArray[np.float64]]], list[list[tuple[int, int]]]]: ...
 def check_params(params: _Params, threads: int | None) -> None: ...
 def default_threads() -> int: ...

@@ -74,8 +74,7 @@ def segment(
 class LabelDiffusion:
     """Segments the frames of a stream: what one camera, or a ring of them, and one lidar yield, frame after frame.
 
-    Does what `segment` does, but keeps the memory that a frame needs for the next one: after the first frame of a size
-    only the result is allocated. Several threads may call at a time; each then has memory of its own.
+    Does what `segment` does, with cameras and parameters that are checked once. Several threads may call at a time.
 
     Attributes:
         camera: The camera that takes the images, or several.
@@ -103,7 +102,6 @@ class LabelDiffusion:
         self.camera = camera
         self._cameras = cameras
         self.params = params or Params()
-        self._memory = _ldls.StreamMemory()
 
     def segment(
         self,
@@ -119,7 +117,7 @@ class LabelDiffusion:
         Options, result and errors are those of `ldls.segment`.
         """
         views = self._views(masks) if self._cameras else _views(masks, None)
-        return _segment(points, views, self.params, nonfinite, keep_origin, same_object, self._memory)
+        return _segment(points, views, self.params, nonfinite, keep_origin, same_object)
 
     def _views(self, masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View]) -> tuple[View, ...]:
         each = (masks,) if isinstance(masks, InstanceMasks) else tuple(masks)
@@ -152,16 +150,15 @@ def _segment(
     nonfinite: str,
     keep_origin: bool,
     same_object: float,
-    memory: _ldls.StreamMemory | None = None,
 ) -> Segmentation:
     cloud = as_points(points)
     _check_nonfinite(cloud, nonfinite)
     if not 0 < same_object <= 1:
         raise ParameterError(f"same_object: got {same_object!r}, expected more than 0 and at most 1")
     if len(views) == 1:
-        arrays, seen, instances = _one_camera(cloud, views[0], params, keep_origin, memory)
+        arrays, seen, instances = _one_camera(cloud, views[0], params, keep_origin)
     else:
-        arrays, seen, instances = _ring(cloud, views, params, keep_origin, same_object, memory)
+        arrays, seen, instances = _ring(cloud, views, params, keep_origin, same_object)
     _warn(cloud, arrays.report)
     return Segmentation(
         labels=arrays.labels,
@@ -180,12 +177,8 @@ def _segment(
 _Outcome = tuple[_ldls.SegmentationArrays, tuple[SeenView, ...], tuple[Instance, ...]]
 
 
-def _one_camera(
-    cloud: Points, view: View, params: Params, keep_origin: bool, memory: _ldls.StreamMemory | None
-) -> _Outcome:
-    arrays = _ldls.segment(
-        cloud, view.masks.core, view.camera.core, params.as_tuple(), keep_origin, params.threads, memory
-    )
+def _one_camera(cloud: Points, view: View, params: Params, keep_origin: bool) -> _Outcome:
+    arrays = _ldls.segment(cloud, view.masks.core, view.camera.core, params.as_tuple(), keep_origin, params.threads)
     labels = np.arange(1, len(view.masks) + 1, dtype=np.int32)
     seen = SeenView(view=view, in_view=arrays.in_view, pixels=arrays.pixels, labels=labels)
     instances = tuple(_instance(label, [(0, label - 1)], (view,)) for label in labels.tolist())
@@ -198,7 +191,6 @@ def _ring(
     params: Params,
     keep_origin: bool,
     same_object: float,
-    memory: _ldls.StreamMemory | None,
 ) -> _Outcome:
     arrays, sightings, objects = _ldls.segment_ring(
         cloud,
@@ -209,7 +201,6 @@ def _ring(
         params.as_tuple(),
         keep_origin,
         params.threads,
-        memory,
     )
     sources = [[(number, mask - 1) for number, mask in parts] for parts in objects]
     instances = tuple(_instance(label, parts, views) for label, parts in enumerate(sources, start=1))

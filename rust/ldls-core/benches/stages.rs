@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ldls_core::{
-    Camera, Cloud, InstanceMasks, Memory, Neighbors, Params, PointGraph, Rle, diffuse,
+    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, diffuse,
     keep_largest_components, segment,
 };
 use std::hint::black_box;
@@ -64,56 +64,33 @@ fn stages(criterion: &mut Criterion) {
             values: &values,
             columns: 3,
         };
-        let view = camera
-            .view(cloud, HEIGHT, WIDTH, false, &mut Memory::of_one_frame())
-            .expect("a view");
+        let view = camera.view(cloud, HEIGHT, WIDTH, false).expect("a view");
         let mut labels = masks
-            .pixel_labels(
-                &view.uv,
-                params.window,
-                params.pixel_weight,
-                &mut Memory::of_one_frame(),
-            )
+            .pixel_labels(&view.uv, params.window, params.pixel_weight)
             .expect("labels");
         let neighbors = Neighbors::search(&view.points, params.neighbors);
         let mut graph = PointGraph::<f32>::from_neighbors(&view.points, &neighbors, params.sigma)
             .expect("a graph");
-        graph
-            .normalize_rows(&mut labels, &mut Memory::of_one_frame())
-            .expect("rows");
-        let exact = |memory: &mut Memory| {
+        graph.normalize_rows(&mut labels).expect("rows");
+        let exact = || {
             let mut a = PointGraph::<f64>::from_neighbors(&view.points, &neighbors, params.sigma)?;
-            let mut b = masks.pixel_labels(&view.uv, params.window, params.pixel_weight, memory)?;
-            a.normalize_rows(&mut b, memory)?;
+            let mut b = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
+            a.normalize_rows(&mut b)?;
             Ok((a, b))
         };
-        let diffused = diffuse(
-            &graph,
-            &labels,
-            masks.len() + 1,
-            params.iterations,
-            exact,
-            &mut Memory::of_one_frame(),
-        )
-        .expect("labels");
+        let diffused =
+            diffuse(&graph, &labels, masks.len() + 1, params.iterations, exact).expect("labels");
 
         let mut group = criterion.benchmark_group("stage");
         group
             .throughput(Throughput::Elements(view.points.len() as u64))
             .sample_size(10);
         group.bench_function(BenchmarkId::new("project", n), |b| {
-            b.iter(|| {
-                black_box(camera.view(cloud, HEIGHT, WIDTH, false, &mut Memory::of_one_frame()))
-            });
+            b.iter(|| black_box(camera.view(cloud, HEIGHT, WIDTH, false)));
         });
         group.bench_function(BenchmarkId::new("pixel labels", n), |b| {
             b.iter(|| {
-                black_box(masks.pixel_labels::<f32>(
-                    &view.uv,
-                    params.window,
-                    params.pixel_weight,
-                    &mut Memory::of_one_frame(),
-                ))
+                black_box(masks.pixel_labels::<f32>(&view.uv, params.window, params.pixel_weight))
             });
         });
         group.bench_function(BenchmarkId::new("neighbors", n), |b| {
@@ -136,7 +113,6 @@ fn stages(criterion: &mut Criterion) {
                     masks.len() + 1,
                     params.iterations,
                     exact,
-                    &mut Memory::of_one_frame(),
                 ))
             });
         });
@@ -144,8 +120,7 @@ fn stages(criterion: &mut Criterion) {
             b.iter(|| black_box(keep_largest_components(&graph, &diffused.labels)));
         });
         group.bench_function(BenchmarkId::new("whole frame", n), |b| {
-            let mut memory = Memory::of_stream();
-            b.iter(|| black_box(segment(cloud, &masks, &camera, &params, false, &mut memory)));
+            b.iter(|| black_box(segment(cloud, &masks, &camera, &params, false)));
         });
         group.finish();
     }

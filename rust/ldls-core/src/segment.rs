@@ -5,7 +5,7 @@ use crate::graph::{PointGraph, keep_largest_by_index};
 use crate::masks::{InstanceMasks, PixelLabels};
 use crate::neighbors::{Adjacency, KdTree, arrange};
 use crate::projection::{Camera, Cloud, View, ViewCounts};
-use crate::{Error, Memory, Params, Real, Result};
+use crate::{Error, Params, Real, Result};
 use std::time::{Duration, Instant};
 
 /// Label of points that the image does not see.
@@ -64,8 +64,7 @@ pub struct Timings {
 
 /// Segments `cloud` by the instance masks of the image that `camera` took.
 ///
-/// Points at exactly (0, 0, 0) are taken for missing returns unless `keep_origin` is set. A stream of frames hands on
-/// one `memory`; a single frame takes a new one.
+/// Points at exactly (0, 0, 0) are taken for missing returns unless `keep_origin` is set.
 ///
 /// # Errors
 /// Whatever [`Params::check`] and [`Camera::view`] refuse, and [`Error::TooManyPoints`].
@@ -75,15 +74,14 @@ pub fn segment(
     camera: &Camera,
     params: &Params,
     keep_origin: bool,
-    memory: &mut Memory,
 ) -> Result<Segmentation> {
     params.check()?;
     check_edges(cloud.len(), params.neighbors)?;
     let clock = Stopwatch::start();
-    let mut view = camera.view(cloud, masks.height(), masks.width(), keep_origin, memory)?;
+    let mut view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
     let uv = std::mem::take(&mut view.uv);
     let seeds = OneImage { masks, uv: &uv };
-    let mut segmentation = label_points(cloud.len(), view, &seeds, params, clock, memory)?;
+    let mut segmentation = label_points(cloud.len(), view, &seeds, params, clock)?;
     segmentation.view.uv = uv;
     Ok(segmentation)
 }
@@ -94,12 +92,7 @@ pub(crate) trait Seeds: Sync {
     fn labels(&self) -> usize;
 
     /// The pixel edges of the points in `order`.
-    fn pixel_labels<T: Real>(
-        &self,
-        order: &[u32],
-        params: &Params,
-        memory: &mut Memory,
-    ) -> Result<PixelLabels<T>>;
+    fn pixel_labels<T: Real>(&self, order: &[u32], params: &Params) -> Result<PixelLabels<T>>;
 }
 
 /// The pixels of one image, and where each point in view falls on it.
@@ -113,17 +106,11 @@ impl Seeds for OneImage<'_> {
         self.masks.len() + 1
     }
 
-    fn pixel_labels<T: Real>(
-        &self,
-        order: &[u32],
-        params: &Params,
-        memory: &mut Memory,
-    ) -> Result<PixelLabels<T>> {
-        let uv = arrange(order, self.uv, memory);
+    fn pixel_labels<T: Real>(&self, order: &[u32], params: &Params) -> Result<PixelLabels<T>> {
+        let uv = arrange(order, self.uv);
         let labels = self
             .masks
-            .pixel_labels(&uv, params.window, params.pixel_weight, memory)?;
-        memory.keep(uv);
+            .pixel_labels(&uv, params.window, params.pixel_weight)?;
         Ok(labels)
     }
 }
@@ -135,34 +122,32 @@ pub(crate) fn label_points(
     seeds: &impl Seeds,
     params: &Params,
     mut clock: Stopwatch,
-    memory: &mut Memory,
 ) -> Result<Segmentation> {
     let project = clock.lap();
     // from here on, rows are in the order of the tree: near points are near in memory
-    let tree = KdTree::new(&view.points, memory);
-    let points = tree.arrange(&view.points, memory);
-    memory.keep(std::mem::take(&mut view.points));
-    let adjacency = Adjacency::search(&tree, &points, params.neighbors, memory);
-    let order = tree.into_order(memory);
+    let tree = KdTree::new(&view.points);
+    let points = arrange(&tree.order, &std::mem::take(&mut view.points));
+    let adjacency = Adjacency::search(&tree, &points, params.neighbors);
+    let order = tree.into_order();
     let neighbors = clock.lap();
-    let pixels = seeds.pixel_labels(&order, params, memory)?;
+    let pixels = seeds.pixel_labels(&order, params)?;
     let pixel_labels = clock.lap();
-    let (a, b) = normalized_graph::<f32>(&points, &adjacency, pixels, params, memory)?;
+    let (a, b) = normalized_graph::<f32>(&points, &adjacency, pixels, params)?;
     let graph = clock.lap();
-    let exact = |memory: &mut Memory| {
-        let pixels = seeds.pixel_labels(&order, params, memory)?;
-        normalized_graph::<f64>(&points, &adjacency, pixels, params, memory)
+    let exact = || {
+        let pixels = seeds.pixel_labels(&order, params)?;
+        normalized_graph::<f64>(&points, &adjacency, pixels, params)
     };
-    let diffused = diffuse(&a, &b, seeds.labels(), params.iterations, exact, memory)?;
+    let diffused = diffuse(&a, &b, seeds.labels(), params.iterations, exact)?;
     let diffusion = clock.lap();
     let kept = if params.remove_outliers {
-        Some(keep_largest_by_index(&a, &diffused.labels, &order, memory)?)
+        Some(keep_largest_by_index(&a, &diffused.labels, &order)?)
     } else {
         None
     };
     let components = clock.lap();
 
-    let rows = arrange(&order, &view.indices, memory);
+    let rows = arrange(&order, &view.indices);
     let whole_cloud =
         |labels: &[u32]| scatter(n, &rows, OUT_OF_VIEW, labels.iter().map(|&m| m as i32));
     let segmentation = Segmentation {
@@ -186,15 +171,6 @@ pub(crate) fn label_points(
         },
         view,
     };
-    a.keep_in(memory);
-    b.keep_in(memory);
-    adjacency.keep_in(memory);
-    diffused.keep_in(memory);
-    memory.keep(points);
-    [order, rows]
-        .into_iter()
-        .chain(kept)
-        .for_each(|vector| memory.keep(vector));
     Ok(segmentation)
 }
 
@@ -204,10 +180,9 @@ fn normalized_graph<T: Real>(
     adjacency: &Adjacency,
     mut pixels: PixelLabels<T>,
     params: &Params,
-    memory: &mut Memory,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
-    let mut graph = PointGraph::from_adjacency(points, adjacency, params.sigma, memory);
-    graph.normalize_rows(&mut pixels, memory)?;
+    let mut graph = PointGraph::from_adjacency(points, adjacency, params.sigma);
+    graph.normalize_rows(&mut pixels)?;
     Ok((graph, pixels))
 }
 

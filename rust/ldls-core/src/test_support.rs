@@ -1,8 +1,6 @@
 //! A wall of points before cameras whose masks are rectangles: what the tests of rings segment.
 
-use crate::{
-    Camera, Cloud, InstanceMasks, Memory, Params, RingSegmentation, RingView, Rle, segment_ring,
-};
+use crate::{Camera, Cloud, InstanceMasks, Params, RingSegmentation, RingView, Rle, segment_ring};
 
 const IDENTITY: [f64; 16] = [
     1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
@@ -41,6 +39,5 @@ pub(crate) fn segment(views: &[RingView]) -> RingSegmentation {
         values: &values,
         columns: 3,
     };
-    let memory = &mut Memory::of_one_frame();
-    segment_ring(cloud, views, 0.5, &Params::paper(), false, memory).unwrap()
+    segment_ring(cloud, views, 0.5, &Params::paper(), false).unwrap()
 }

@@ -6,12 +6,12 @@
     reason = "pyo3 hands arguments over by value"
 )]
 
+mod allocator;
 mod arrays;
 mod call;
 mod camera;
 mod errors;
 mod masks;
-mod memory;
 mod products;
 mod segment;
 mod stages;
@@ -26,8 +26,6 @@ mod _ldls {
     #[pymodule_export]
     use crate::masks::{Masks, Rle};
     #[pymodule_export]
-    use crate::memory::StreamMemory;
-    #[pymodule_export]
     use crate::products::Products;
     #[pymodule_export]
     use crate::segment::{SegmentationArrays, check_params, segment, segment_ring};
@@ -41,7 +39,7 @@ mod _ldls {
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyModuleMethods;
         crate::call::remember_panics();
-        crate::memory::keep_for_a_while();
+        crate::allocator::keep_for_a_while();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -4,8 +4,7 @@ use crate::arrays::{Points, matrix};
 use crate::call::{checked_threads, run, run_at_once};
 use crate::camera::Camera;
 use crate::masks::Masks;
-use crate::memory::StreamMemory;
-use ldls_core::{Memory, Params, RingView, Timings};
+use ldls_core::{Params, RingView, Timings};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -41,11 +40,7 @@ pub struct SegmentationArrays {
 
 /// Segments points by the masks of the image that the camera took.
 #[pyfunction]
-#[pyo3(signature = (points, masks, camera, params, keep_origin, threads, memory))]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "the face in Python has few; here each is one extraction"
-)]
+#[pyo3(signature = (points, masks, camera, params, keep_origin, threads))]
 pub fn segment(
     py: Python<'_>,
     points: Points<'_>,
@@ -54,18 +49,11 @@ pub fn segment(
     params: ParamsTuple,
     keep_origin: bool,
     threads: Option<usize>,
-    memory: Option<&StreamMemory>,
 ) -> PyResult<SegmentationArrays> {
     let cloud = points.cloud(py)?;
     let params = params.params();
     let mut found = run(py, threads, || {
-        let segment = |memory: &mut Memory| {
-            ldls_core::segment(cloud, &masks.0, &camera.0, &params, keep_origin, memory)
-        };
-        match memory {
-            Some(stream) => stream.lend(segment),
-            None => segment(&mut Memory::of_one_frame()),
-        }
+        ldls_core::segment(cloud, &masks.0, &camera.0, &params, keep_origin)
     })?;
     let pixels = matrix(py, std::mem::take(&mut found.view.uv).into_flattened(), 2)?;
     arrays(py, found, pixels)
@@ -78,7 +66,7 @@ type ObjectParts = Vec<Vec<(usize, u32)>>;
 
 /// Segments points by the masks of the images that several cameras took.
 #[pyfunction]
-#[pyo3(signature = (points, masks, categories, cameras, same_object, params, keep_origin, threads, memory))]
+#[pyo3(signature = (points, masks, categories, cameras, same_object, params, keep_origin, threads))]
 #[expect(
     clippy::too_many_arguments,
     reason = "the face in Python has few; here each is one extraction"
@@ -93,7 +81,6 @@ pub fn segment_ring(
     params: ParamsTuple,
     keep_origin: bool,
     threads: Option<usize>,
-    memory: Option<&StreamMemory>,
 ) -> PyResult<(SegmentationArrays, SightingArrays, ObjectParts)> {
     let cloud = points.cloud(py)?;
     let params = params.params();
@@ -108,13 +95,7 @@ pub fn segment_ring(
         })
         .collect();
     let found = run(py, threads, || {
-        let segment = |memory: &mut Memory| {
-            ldls_core::segment_ring(cloud, &views, same_object, &params, keep_origin, memory)
-        };
-        match memory {
-            Some(stream) => stream.lend(segment),
-            None => segment(&mut Memory::of_one_frame()),
-        }
+        ldls_core::segment_ring(cloud, &views, same_object, &params, keep_origin)
     })?;
     let sightings = found
         .sightings

@@ -7,7 +7,7 @@ use crate::arrays::{
 use crate::call::run;
 use crate::camera::Camera;
 use crate::masks::Masks;
-use ldls_core::{Memory, PointGraph};
+use ldls_core::PointGraph;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
@@ -33,13 +33,7 @@ pub fn project(
 ) -> PyResult<ViewArrays> {
     let cloud = points.cloud(py)?;
     let view = run(py, threads, || {
-        camera.0.view(
-            cloud,
-            height,
-            width,
-            keep_origin,
-            &mut Memory::of_one_frame(),
-        )
+        camera.0.view(cloud, height, width, keep_origin)
     })?;
     let indices: Vec<i64> = view.indices.iter().map(|&index| i64::from(index)).collect();
     Ok((
@@ -106,9 +100,7 @@ pub fn pixel_labels(
 ) -> PyResult<PixelLabelArrays> {
     let pixels = rows::<2>(py, "pixels", &pixels)?;
     let labels = run(py, threads, || {
-        masks
-            .0
-            .pixel_labels(&pixels, window, pixel_weight, &mut Memory::of_one_frame())
+        masks.0.pixel_labels(&pixels, window, pixel_weight)
     })?;
     Ok(label_arrays(py, labels))
 }
@@ -135,9 +127,7 @@ pub fn normalize_rows(
 ) -> PyResult<(CsrArrays, PixelLabelArrays)> {
     let mut graph = graph(py, &point_graph)?;
     let mut labels = labels_of(py, &labels, slice(py, "mass", &mass)?.to_vec())?;
-    run(py, None, || {
-        graph.normalize_rows(&mut labels, &mut Memory::of_one_frame())
-    })?;
+    run(py, None, || graph.normalize_rows(&mut labels))?;
     let (offsets, columns, weights) = graph.into_csr();
     Ok((
         csr_arrays(py, &offsets, &columns, weights),

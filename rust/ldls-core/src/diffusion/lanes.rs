@@ -1,7 +1,7 @@
 //! Which labels share a sweep over the graph, and where in a row of values each of them lies.
 
+use crate::Real;
 use crate::masks::PixelLabels;
-use crate::{Memory, Real};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -112,7 +112,7 @@ pub(crate) struct LaneSeeds<T> {
 }
 
 impl<T: Real> LaneSeeds<T> {
-    pub(crate) fn new(b: &PixelLabels<T>, pass: &[Lane], memory: &mut Memory) -> Self {
+    pub(crate) fn new(b: &PixelLabels<T>, pass: &[Lane]) -> Self {
         let lane_of = |label: usize| {
             pass.iter()
                 .position(|lane| *lane == Lane::Label(label as u32))
@@ -131,12 +131,12 @@ impl<T: Real> LaneSeeds<T> {
         };
         let points = || (0..b.rows()).into_par_iter().with_min_len(ROWS_A_TASK);
         let mut seeds = Self {
-            background: memory.collect(points().map(background)),
+            background: points().map(background).collect(),
             lanes: pass.len(),
             least: T::from_f64(T::NEGLIGIBLE * largest_weight(b)),
-            offsets: memory.empty(b.rows() + 1),
-            entries: memory.empty(0),
-            probe: probe.map(|lane| (lane, memory.collect(points().map(|i| probe_seed(b, i))))),
+            offsets: Vec::with_capacity(b.rows() + 1),
+            entries: Vec::with_capacity(0),
+            probe: probe.map(|lane| (lane, points().map(|i| probe_seed(b, i)).collect())),
         };
         seeds.offsets.push(0);
         for i in 0..b.rows() {
@@ -147,16 +147,6 @@ impl<T: Real> LaneSeeds<T> {
             seeds.offsets.push(seeds.entries.len() as u32);
         }
         seeds
-    }
-
-    /// Keeps the vectors, which are no longer needed.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        memory.keep(self.background);
-        memory.keep(self.offsets);
-        memory.keep(self.entries);
-        if let Some((_, seeds)) = self.probe {
-            memory.keep(seeds);
-        }
     }
 
     /// For each block of `block` rows, bit g where lanes of group g have seeds.

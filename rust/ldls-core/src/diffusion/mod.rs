@@ -28,7 +28,7 @@ use self::values::Values;
 use self::winners::{Best, Contested, update};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::{Error, Memory, Result};
+use crate::{Error, Result};
 use rayon::prelude::*;
 
 /// What a series in single precision may leave out.
@@ -62,13 +62,7 @@ pub struct Diffused {
     pub convergence: Convergence,
 }
 
-impl Diffused {
-    /// Keeps the vectors, which are no longer needed.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        memory.keep(self.labels);
-        memory.keep(self.confidence);
-    }
-}
+impl Diffused {}
 
 impl Convergence {
     /// Whether the run went on until one more product would change next to nothing.
@@ -89,7 +83,7 @@ impl Convergence {
 
 /// Diffuses labels 0 to `n_labels` - 1 from their seeds `b` over the graph `a` and picks the winner at every
 /// point. `iterations` is the number of products, `None` as many as it takes. `exact` yields `a` and `b` in
-/// double precision, for points at which single precision does not tell the winner. Works in `memory`.
+/// double precision, for points at which single precision does not tell the winner.
 ///
 /// # Errors
 /// [`Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and whatever `exact` returns.
@@ -98,34 +92,30 @@ pub fn diffuse(
     b: &PixelLabels,
     n_labels: usize,
     iterations: Option<usize>,
-    exact: impl FnOnce(&mut Memory) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
-    memory: &mut Memory,
+    exact: impl FnOnce() -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
 ) -> Result<Diffused> {
     check(a, b, n_labels)?;
-    let mut best = memory.filled(a.len(), Best::default());
+    let mut best = vec![Best::default(); a.len()];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let choose = |lanes: &[Lane], z: &Values<f32, WIDTH_F32>| update(&mut best, lanes, z);
-    let mut convergence = for_each_pass(a, b, &labels, iterations, choose, memory);
+    let mut convergence = for_each_pass(a, b, &labels, iterations, choose);
     let contested = Contested::among(&best, convergence.error);
     if !contested.points.is_empty() {
-        let (a, b) = exact(memory)?;
+        let (a, b) = exact()?;
         let labels = contested.labels(&best, n_labels);
         let mut refined = vec![(0, f64::NEG_INFINITY); contested.points.len()];
         let choose = |lanes: &[Lane], z: &Values<f64, WIDTH_F64>| {
             contested.refine(&mut refined, lanes, z);
         };
-        for_each_pass(&a, &b, &labels, iterations, choose, memory);
-        a.keep_in(memory);
-        b.keep_in(memory);
+        for_each_pass(&a, &b, &labels, iterations, choose);
         for (&point, &(label, _)) in contested.points.iter().zip(&refined) {
             best[point as usize].labels[0] = label;
         }
         convergence.refined = contested.points.len();
     }
     let best_of = best.par_iter().with_min_len(BLOCK);
-    let labels = memory.collect(best_of.clone().map(|best| best.labels[0]));
-    let confidence = memory.collect(best_of.map(Best::confidence));
-    memory.keep(best);
+    let labels = best_of.clone().map(|best| best.labels[0]).collect();
+    let confidence = best_of.map(Best::confidence).collect();
     Ok(Diffused {
         labels,
         confidence,
@@ -153,8 +143,7 @@ pub fn likelihoods(
             }
         }
     };
-    let memory = &mut Memory::of_one_frame();
-    let convergence = for_each_pass(a, b, &labels, iterations, write, memory);
+    let convergence = for_each_pass(a, b, &labels, iterations, write);
     Ok((all, convergence))
 }
 
@@ -182,7 +171,6 @@ fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
     labels: &[u32],
     iterations: Option<usize>,
     mut done: impl FnMut(&[Lane], &Values<T, WIDTH>),
-    memory: &mut Memory,
 ) -> Convergence {
     let tolerance = if WIDTH == WIDTH_F64 {
         TOLERANCE_F64
@@ -190,23 +178,19 @@ fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
         TOLERANCE_F32
     };
     let mut scheme = Scheme::choose(a, iterations, tolerance);
-    let rows = Rows::new(a, memory);
+    let rows = Rows::new(a);
     let mut convergence = Convergence::default();
     let probe = WIDTH == WIDTH_F32;
     for lanes in plan(b, labels, WIDTH, probe) {
-        let seeds = LaneSeeds::new(b, &lanes, memory);
-        let mut pass = scheme.run(&rows, &seeds, memory);
+        let seeds = LaneSeeds::new(b, &lanes);
+        let mut pass = scheme.run(&rows, &seeds);
         if !matches!(scheme, Scheme::Products(_)) && !pass.is_sound(&lanes, largest_overlap(b)) {
             scheme = iterations.map_or(Scheme::UntilConverged, Scheme::Products);
-            pass.keep_in(memory);
-            pass = scheme.run(&rows, &seeds, memory);
+            pass = scheme.run(&rows, &seeds);
         }
         done(&lanes, &pass.z);
         convergence.merge(pass.convergence());
-        pass.keep_in(memory);
-        seeds.keep_in(memory);
     }
-    rows.keep_in(memory);
     convergence
 }
 
@@ -229,7 +213,7 @@ mod tests {
         (a, b)
     }
 
-    fn never(_: &mut Memory) -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
+    fn never() -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
         panic!("single precision tells the winner")
     }
 
@@ -265,7 +249,7 @@ mod tests {
             weights: vec![],
             mass: vec![0.0],
         };
-        let diffused = diffuse(&a, &b, 3, Some(5), never, &mut Memory::of_one_frame()).unwrap();
+        let diffused = diffuse(&a, &b, 3, Some(5), never).unwrap();
         assert_eq!((diffused.labels[0], diffused.confidence[0]), (0, 0.0));
     }
 
@@ -334,8 +318,7 @@ mod tests {
             b.offsets.push(b.labels.len());
             b.mass.push(T::from_f64(lambda * 25.0));
         }
-        a.normalize_rows(&mut b, &mut Memory::of_one_frame())
-            .unwrap();
+        a.normalize_rows(&mut b).unwrap();
         (a, b)
     }
 
@@ -404,8 +387,8 @@ mod tests {
         ) {
             let seen = &seen[..points.len()];
             let (a, b) = system::<f32>(&points, seen, lambda);
-            let double = |_: &mut Memory| Ok(system::<f64>(&points, seen, lambda));
-            let found = diffuse(&a, &b, 30, Some(iterations), double, &mut Memory::of_one_frame()).unwrap();
+            let double = || Ok(system::<f64>(&points, seen, lambda));
+            let found = diffuse(&a, &b, 30, Some(iterations), double).unwrap();
             let (a, b) = system::<f64>(&points, seen, lambda);
             let expected = plain_products(&a, &b, 30, iterations);
             for (i, (label, z)) in found.labels.iter().zip(expected.chunks(30)).enumerate() {

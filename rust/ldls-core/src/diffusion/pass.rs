@@ -6,9 +6,9 @@ use super::series::{Interval, Series, Tolerance};
 use super::state::{Rows, State};
 use super::sweeps::{Step, Sweep};
 use super::values::Values;
+use crate::Real;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::{Memory, Real};
 use rayon::prelude::*;
 
 /// By how much the terms that a series leaves out are taken to exceed what the probe says of them.
@@ -40,8 +40,6 @@ pub(crate) enum Scheme {
 /// What one pass came to.
 pub(crate) struct Pass<T, const WIDTH: usize> {
     pub(crate) z: Values<T, WIDTH>,
-    /// No longer needed.
-    other: Values<T, WIDTH>,
     sweeps: usize,
     residual: Option<f64>,
     /// What the terms left out may amount to.
@@ -77,7 +75,6 @@ impl Scheme {
         &self,
         rows: &Rows<T>,
         seeds: &LaneSeeds<T>,
-        memory: &mut Memory,
     ) -> Pass<T, WIDTH> {
         // the first product yields the seeds, the first step of a series its last term
         let first = match self {
@@ -86,7 +83,7 @@ impl Scheme {
                 series.coefficients[series.degree()]
             }
         };
-        let state = State::new(rows, seeds, T::from_f64(first), memory);
+        let state = State::new(rows, seeds, T::from_f64(first));
         match self {
             Self::Products(products) => run_products(state, *products),
             Self::UntilConverged => run_until_converged(state),
@@ -116,7 +113,6 @@ fn run_products<T: Sweep<WIDTH>, const WIDTH: usize>(
     state.run(&vec![step(PRODUCT); products.saturating_sub(1)]);
     Pass {
         z: state.z,
-        other: state.previous,
         sweeps: products,
         residual: None,
         error: 0.0,
@@ -156,7 +152,6 @@ fn run_series<T: Sweep<WIDTH>, const WIDTH: usize>(
     }
     Pass {
         z: state.z,
-        other: state.previous,
         sweeps: degree,
         residual: None,
         error,
@@ -173,7 +168,6 @@ fn last_product<T: Sweep<WIDTH>, const WIDTH: usize>(
     let residual = largest_change(&state);
     Pass {
         z: state.previous,
-        other: state.z,
         sweeps: sweeps + 1,
         residual: Some(residual),
         error,
@@ -267,11 +261,6 @@ impl<T: Real, const WIDTH: usize> Pass<T, WIDTH> {
             error,
             refined: 0,
         }
-    }
-
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        self.z.keep_in(memory);
-        self.other.keep_in(memory);
     }
 
     /// Whether little is left out, and no likelihood is negative or too large.

@@ -6,8 +6,8 @@ use super::lanes::{BACKGROUND_LANE, LaneSeeds};
 use super::sweeps::{Inputs, Step, Sweep};
 use super::tiles::Tiles;
 use super::values::{SharedValues, Values, Window};
+use crate::Real;
 use crate::graph::PointGraph;
-use crate::{Memory, Real};
 use rayon::prelude::*;
 
 /// Rows that one task of the thread pool seeds.
@@ -22,16 +22,10 @@ pub(crate) struct Rows<'a, T> {
 }
 
 impl<'a, T: Real> Rows<'a, T> {
-    pub(crate) fn new(a: &'a PointGraph<T>, memory: &mut Memory) -> Self {
-        let blocks = Blocks::new(a, memory);
-        let tiles = Tiles::new(&blocks, memory);
+    pub(crate) fn new(a: &'a PointGraph<T>) -> Self {
+        let blocks = Blocks::new(a);
+        let tiles = Tiles::new(&blocks);
         Self { a, blocks, tiles }
-    }
-
-    /// Keeps the vectors, which are no longer needed.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        self.blocks.keep_in(memory);
-        self.tiles.keep_in(memory);
     }
 }
 
@@ -48,15 +42,10 @@ pub(crate) struct State<'a, T, const WIDTH: usize> {
 
 impl<'a, T: Sweep<WIDTH>, const WIDTH: usize> State<'a, T, WIDTH> {
     /// z = `scale` * s, with the probe's seeds as they are.
-    pub(crate) fn new(
-        rows: &'a Rows<'a, T>,
-        seeds: &'a LaneSeeds<T>,
-        scale: T,
-        memory: &mut Memory,
-    ) -> Self {
+    pub(crate) fn new(rows: &'a Rows<'a, T>, seeds: &'a LaneSeeds<T>, scale: T) -> Self {
         let (points, groups) = (rows.a.len(), seeds.lanes.div_ceil(WIDTH).max(1));
-        let mut z = Values::zero(points, groups, memory);
-        let previous = Values::zero(points, groups, memory);
+        let mut z = Values::zero(points, groups);
+        let previous = Values::zero(points, groups);
         let first = z.group_mut(0).par_iter_mut().zip(&seeds.background);
         first.with_min_len(ROWS_A_TASK).for_each(|(row, &weight)| {
             row[BACKGROUND_LANE] = scale * weight;

@@ -7,7 +7,6 @@
 //! et al., Int. J. High Performance Computing Applications 18(1), 2004). What is computed does not depend on it.
 
 use super::blocks::{BLOCK, Blocks};
-use crate::Memory;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -33,19 +32,19 @@ pub(crate) struct Tiles {
 }
 
 impl Tiles {
-    pub(crate) fn new(blocks: &Blocks, memory: &mut Memory) -> Self {
-        Self::in_regions(blocks, REGION, memory)
+    pub(crate) fn new(blocks: &Blocks) -> Self {
+        Self::in_regions(blocks, REGION)
     }
 
     /// Regions of `size` tiles each.
-    fn in_regions(blocks: &Blocks, size: usize, memory: &mut Memory) -> Self {
+    fn in_regions(blocks: &Blocks, size: usize) -> Self {
         let tiles = blocks.rows().div_ceil(TILE);
         let round = if tiles <= size { 1 } else { ROUND };
         // the region of each tile in each step: what must wait for a later region is left to that one
-        let mut regions = memory.empty(tiles * round);
+        let mut regions = Vec::with_capacity(tiles * round);
         regions.extend((0..tiles).map(|tile| (tile / size) as u32));
         if round > 1 {
-            let edges = edges(blocks, memory);
+            let edges = edges(blocks);
             for step in 1..round {
                 regions.extend_from_within((step - 1) * tiles..);
                 let (before, after) = regions.split_at_mut(step * tiles);
@@ -56,16 +55,15 @@ impl Tiles {
                     after[b] = after[b].max(before[a]);
                 }
             }
-            memory.keep(edges);
         }
         // sorted by region and step
         let place = |at: usize| regions[at] as usize * round + at / tiles;
-        let mut offsets = memory.filled(tiles.div_ceil(size) * round + 1, 0);
+        let mut offsets = vec![0; tiles.div_ceil(size) * round + 1];
         (0..regions.len()).for_each(|at| offsets[place(at) + 1] += 1);
         for at in 1..offsets.len() {
             offsets[at] += offsets[at - 1];
         }
-        let mut order = memory.filled(regions.len(), 0);
+        let mut order = vec![0; regions.len()];
         for at in 0..regions.len() {
             let next = &mut offsets[place(at)];
             order[*next] = (at % tiles) as u32;
@@ -74,19 +72,12 @@ impl Tiles {
         // each place now begins where it ended
         offsets.rotate_right(1);
         offsets[0] = 0;
-        memory.keep(regions);
         Self {
             rows: blocks.rows(),
             round,
             order,
             offsets,
         }
-    }
-
-    /// Keeps the vectors, which are no longer needed.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        memory.keep(self.order);
-        memory.keep(self.offsets);
     }
 
     /// Calls `work(rows, step)` for steps 0 to `steps` - 1 of every tile of rows, on all threads of the pool.
@@ -113,10 +104,10 @@ impl Tiles {
 }
 
 /// The pairs of different tiles with edges from one to the other, some of them twice.
-fn edges(blocks: &Blocks, memory: &mut Memory) -> Vec<[u32; 2]> {
-    let mut edges = memory.empty(0);
+fn edges(blocks: &Blocks) -> Vec<[u32; 2]> {
+    let mut edges = Vec::with_capacity(0);
     // at which tile each was last met
-    let mut met = memory.filled(blocks.rows().div_ceil(TILE), u32::MAX);
+    let mut met = vec![u32::MAX; blocks.rows().div_ceil(TILE)];
     for block in 0..blocks.len() {
         let tile = (block * BLOCK / TILE) as u32;
         met[tile as usize] = tile;
@@ -127,7 +118,6 @@ fn edges(blocks: &Blocks, memory: &mut Memory) -> Vec<[u32; 2]> {
             }
         }
     }
-    memory.keep(met);
     edges
 }
 
@@ -157,13 +147,12 @@ mod tests {
             region in 1_usize..20,
             steps in 0_usize..30,
         ) {
-            let memory = &mut Memory::of_one_frame();
-            let blocks = Blocks::new(&graph(rows, &reaches), memory);
+            let blocks = Blocks::new(&graph(rows, &reaches));
             let count = rows.div_ceil(TILE);
-            let edges = edges(&blocks, memory);
+            let edges = edges(&blocks);
             let taken: Vec<AtomicUsize> = (0..count).map(|_| AtomicUsize::new(0)).collect();
             let violations = AtomicUsize::new(0);
-            Tiles::in_regions(&blocks, region, memory).run(steps, |rows, step| {
+            Tiles::in_regions(&blocks, region).run(steps, |rows, step| {
                 let tile = rows.start / TILE;
                 let of_tile = edges.iter().filter(|edge| edge.contains(&(tile as u32)));
                 let ready = of_tile.flatten().all(|&other| {
@@ -182,9 +171,8 @@ mod tests {
     #[test]
     fn a_large_cloud_is_divided_and_most_of_a_region_takes_all_steps_of_a_round_at_once() {
         let rows = 4 * REGION * TILE;
-        let memory = &mut Memory::of_one_frame();
-        let blocks = Blocks::new(&graph(rows, &[1]), memory);
-        let tiles = Tiles::new(&blocks, memory);
+        let blocks = Blocks::new(&graph(rows, &[1]));
+        let tiles = Tiles::new(&blocks);
         assert_eq!((tiles.round, tiles.offsets.len() - 1), (ROUND, 4 * ROUND));
         let last = tiles.offsets.windows(2).nth(ROUND - 1).unwrap();
         assert!(last[1] - last[0] > REGION / 2);

@@ -3,7 +3,8 @@
 //! Which thread may touch which rows when is the business of [`super::tiles`], which orders the steps of tiles of rows.
 
 use super::lanes::MOST_GROUPS;
-use crate::{Memory, Real};
+use crate::Real;
+use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -56,18 +57,13 @@ impl<T: Real, const WIDTH: usize> GroupValues<T, WIDTH> {
 
 impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
     /// Zeros at `points` points.
-    pub(crate) fn zero(points: usize, groups: usize, memory: &mut Memory) -> Self {
+    pub(crate) fn zero(points: usize, groups: usize) -> Self {
         let length = GroupValues::<T, WIDTH>::length_for(points);
-        let buffers = memory.filled_together(groups, length, &T::default());
+        let buffers = (0..groups)
+            .into_par_iter()
+            .map(|_| vec![T::default(); length]);
         let group = |buffer| GroupValues::new(buffer, points);
-        Self(buffers.into_iter().map(group).collect())
-    }
-
-    /// Keeps the vectors, which are no longer needed.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        self.0
-            .into_iter()
-            .for_each(|group| memory.keep(group.buffer));
+        Self(buffers.map(group).collect())
     }
 
     /// The values of `group` at all points.

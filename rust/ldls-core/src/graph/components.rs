@@ -1,7 +1,7 @@
 //! Outlier removal: an instance keeps its largest connected component (method, step 7).
 
 use super::point_graph::PointGraph;
-use crate::{Error, Memory, Result};
+use crate::{Error, Result};
 
 /// Turns every point that is not in the largest connected component of its label into background (0). Edges are
 /// taken as undirected; of components of one size, the one with the lowest point index is kept.
@@ -10,7 +10,7 @@ use crate::{Error, Memory, Result};
 /// [`Error::Mismatch`] where `labels` is of another length than the graph.
 pub fn keep_largest_components(graph: &PointGraph, labels: &[u32]) -> Result<Vec<u32>> {
     let indices: Vec<u32> = (0..labels.len() as u32).collect();
-    keep_largest_by_index(graph, labels, &indices, &mut Memory::of_one_frame())
+    keep_largest_by_index(graph, labels, &indices)
 }
 
 /// The same for points whose rows are not in the order of their `indices`.
@@ -18,7 +18,6 @@ pub(crate) fn keep_largest_by_index(
     graph: &PointGraph,
     labels: &[u32],
     indices: &[u32],
-    memory: &mut Memory,
 ) -> Result<Vec<u32>> {
     if labels.len() != graph.len() {
         let problem = format!(
@@ -31,15 +30,15 @@ pub(crate) fn keep_largest_by_index(
             problem,
         });
     }
-    let mut sets = DisjointSets::new(labels.len(), memory);
+    let mut sets = DisjointSets::new(labels.len());
     for (i, &label) in labels.iter().enumerate().filter(|(_, label)| **label > 0) {
         for (j, _) in graph.row(i).filter(|&(j, _)| labels[j] == label) {
             sets.join(i as u32, j as u32);
         }
     }
-    let mut components = memory.empty(labels.len());
+    let mut components = Vec::with_capacity(labels.len());
     components.extend((0..labels.len() as u32).map(|i| sets.root(i)));
-    let largest = largest_of_each(labels, &components, indices, memory);
+    let largest = largest_of_each(labels, &components, indices);
     let kept = |(&label, &component): (&u32, &u32)| {
         if largest[label as usize].root == component {
             label
@@ -47,10 +46,8 @@ pub(crate) fn keep_largest_by_index(
             0
         }
     };
-    let mut all = memory.empty(labels.len());
+    let mut all = Vec::with_capacity(labels.len());
     all.extend(labels.iter().zip(&components).map(kept));
-    memory.keep(components);
-    memory.keep(sets.parents);
     Ok(all)
 }
 
@@ -70,13 +67,8 @@ impl Component {
     };
 }
 
-fn largest_of_each(
-    labels: &[u32],
-    components: &[u32],
-    indices: &[u32],
-    memory: &mut Memory,
-) -> Vec<Component> {
-    let mut found = memory.filled(labels.len(), Component::NONE);
+fn largest_of_each(labels: &[u32], components: &[u32], indices: &[u32]) -> Vec<Component> {
+    let mut found = vec![Component::NONE; labels.len()];
     for (&root, &index) in components.iter().zip(indices) {
         let component = &mut found[root as usize];
         let first = component.first.min(index);
@@ -95,7 +87,6 @@ fn largest_of_each(
             *best = component;
         }
     }
-    memory.keep(found);
     largest
 }
 
@@ -105,8 +96,8 @@ struct DisjointSets {
 }
 
 impl DisjointSets {
-    fn new(n: usize, memory: &mut Memory) -> Self {
-        let mut parents = memory.empty(n);
+    fn new(n: usize) -> Self {
+        let mut parents = Vec::with_capacity(n);
         parents.extend(0..n as u32);
         Self { parents }
     }
@@ -155,13 +146,7 @@ mod tests {
 
     #[test]
     fn rows_may_come_in_another_order_than_indices() {
-        let kept = keep_largest_by_index(
-            &chain(5),
-            &[3, 3, 0, 3, 3],
-            &[4, 3, 2, 1, 0],
-            &mut Memory::of_one_frame(),
-        )
-        .unwrap();
+        let kept = keep_largest_by_index(&chain(5), &[3, 3, 0, 3, 3], &[4, 3, 2, 1, 0]).unwrap();
         assert_eq!(kept, [0, 0, 0, 3, 3]);
     }
 

@@ -2,7 +2,7 @@
 
 use crate::masks::PixelLabels;
 use crate::neighbors::{Adjacency, Neighbors, squared_distance};
-use crate::{Error, Memory, Real, Result};
+use crate::{Error, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -72,19 +72,13 @@ impl<T: Real> PointGraph<T> {
                 columns: Arc::new(columns),
             },
             sigma,
-            &mut Memory::of_one_frame(),
         ))
     }
 
     /// The same from rows that begin with the point itself.
-    pub(crate) fn from_adjacency(
-        points: &[[f64; 3]],
-        adjacency: &Adjacency,
-        sigma: f64,
-        memory: &mut Memory,
-    ) -> Self {
+    pub(crate) fn from_adjacency(points: &[[f64; 3]], adjacency: &Adjacency, sigma: f64) -> Self {
         let (count, degree) = (points.len(), adjacency.degree);
-        let mut weights = memory.filled(count * degree, T::default());
+        let mut weights = vec![T::default(); count * degree];
         let rows = weights
             .par_chunks_mut(degree)
             .zip(adjacency.columns.par_chunks(degree))
@@ -152,11 +146,7 @@ impl<T: Real> PointGraph<T> {
     ///
     /// # Errors
     /// [`Error::Mismatch`] where `labels` is of another number of points.
-    pub fn normalize_rows(
-        &mut self,
-        labels: &mut PixelLabels<T>,
-        memory: &mut Memory,
-    ) -> Result<()> {
+    pub fn normalize_rows(&mut self, labels: &mut PixelLabels<T>) -> Result<()> {
         if labels.rows() != self.len() {
             let problem = format!("{} rows, the graph has {}", labels.rows(), self.len());
             return Err(Error::Mismatch {
@@ -171,7 +161,7 @@ impl<T: Real> PointGraph<T> {
             if sum > 0.0 { 1.0 / sum } else { 0.0 }
         };
         let masses = labels.mass.par_iter().enumerate().with_min_len(BLOCK);
-        let scales = memory.collect(masses.map(scale));
+        let scales: Vec<f64> = masses.map(scale).collect();
         scale_rows(&mut self.weights, &scales, |rows| self.rows.range(rows));
         let range = |rows: Range<usize>| labels.offsets[rows.start]..labels.offsets[rows.end];
         scale_rows(&mut labels.weights, &scales, range);
@@ -180,13 +170,7 @@ impl<T: Real> PointGraph<T> {
             .iter_mut()
             .zip(&scales)
             .for_each(|(mass, scale)| rescale(mass, *scale));
-        memory.keep(scales);
         Ok(())
-    }
-
-    /// Keeps the weights, which are no longer needed.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        memory.keep(self.weights);
     }
 
     /// Number of points.
@@ -286,9 +270,7 @@ mod tests {
             mass: vec![0.5; 4],
         };
         let mut graph = chain();
-        graph
-            .normalize_rows(&mut labels, &mut Memory::of_one_frame())
-            .unwrap();
+        graph.normalize_rows(&mut labels).unwrap();
         for i in 0..4 {
             let sum: f32 = graph.row(i).map(|(_, weight)| weight).sum::<f32>() + labels.mass[i];
             assert!((sum - 1.0).abs() < 1e-6, "row {i} sums to {sum}");

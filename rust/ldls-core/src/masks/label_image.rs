@@ -3,7 +3,6 @@
 
 use super::instance_masks::InstanceMasks;
 use super::rle::Rle;
-use crate::Memory;
 use std::collections::HashMap;
 
 /// The labels of every pixel, column by column. Pixels hold the number of a set of labels: a set for each combination
@@ -35,11 +34,11 @@ pub(crate) struct WindowCounts {
 }
 
 impl LabelImage {
-    pub(crate) fn paint(masks: &InstanceMasks, memory: &mut Memory) -> Self {
+    pub(crate) fn paint(masks: &InstanceMasks) -> Self {
         let mut image = Self {
             height: masks.height(),
             width: masks.width(),
-            pixels: memory.filled(masks.height() * masks.width(), 0),
+            pixels: vec![0; masks.height() * masks.width()],
             sets: vec![LabelSet { label: 0, rest: 0 }],
         };
         for (m, mask) in masks.masks().iter().enumerate() {

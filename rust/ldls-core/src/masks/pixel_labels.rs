@@ -3,7 +3,7 @@
 use super::instance_masks::InstanceMasks;
 use super::label_image::{LabelImage, WindowCounts};
 use crate::projection::nearest_pixel;
-use crate::{Error, Memory, Real, Result};
+use crate::{Error, Real, Result};
 use rayon::prelude::*;
 
 /// Points handled by one task of the thread pool.
@@ -34,30 +34,23 @@ impl InstanceMasks {
         uv: &[[f64; 2]],
         window: usize,
         pixel_weight: f64,
-        memory: &mut Memory,
     ) -> Result<PixelLabels<T>> {
-        let image = LabelImage::paint(self, memory);
-        let count = uv.len().div_ceil(BLOCK);
-        let mut blocks: Vec<PixelLabels<T>> = memory.as_left(count);
-        let outcomes: Vec<Result<()>> = blocks
-            .par_iter_mut()
-            .zip(uv.par_chunks(BLOCK))
+        let image = LabelImage::paint(self);
+        let blocks: Vec<Result<PixelLabels<T>>> = uv
+            .par_chunks(BLOCK)
             .enumerate()
-            .map(|(block, (labels, uv))| {
-                labels.clear();
+            .map(|(block, uv)| {
+                let mut labels = PixelLabels::default();
                 let mut counts = WindowCounts::default();
                 for (i, &uv) in (block * BLOCK..).zip(uv) {
                     image.count(self.nearest_pixel(i, uv)?, window / 2, &mut counts);
                     labels.push(&counts, pixel_weight);
                 }
-                Ok(())
+                Ok(labels)
             })
             .collect();
-        memory.keep(image.pixels);
-        outcomes.into_iter().collect::<Result<()>>()?;
-        let labels = PixelLabels::concatenate(&blocks[..count], memory);
-        memory.keep_as_is(blocks);
-        Ok(labels)
+        let blocks = blocks.into_iter().collect::<Result<Vec<_>>>()?;
+        Ok(PixelLabels::concatenate(&blocks))
     }
 
     /// Direct projection: the label of the pixel nearest to each of `uv`; of several masks, the first.
@@ -65,7 +58,7 @@ impl InstanceMasks {
     /// # Errors
     /// As [`InstanceMasks::pixel_labels`].
     pub fn direct_labels(&self, uv: &[[f64; 2]]) -> Result<Vec<u32>> {
-        let image = LabelImage::paint(self, &mut Memory::of_one_frame());
+        let image = LabelImage::paint(self);
         let label = |(i, &uv): (usize, &[f64; 2])| {
             let set = image.set_at(self.nearest_pixel(i, uv)?);
             Ok(image.labels_of(set).last().unwrap_or(0))
@@ -126,13 +119,6 @@ impl<T: Real> PixelLabels<T> {
         })
     }
 
-    fn clear(&mut self) {
-        self.offsets.clear();
-        self.labels.clear();
-        self.weights.clear();
-        self.mass.clear();
-    }
-
     fn push(&mut self, counts: &WindowCounts, pixel_weight: f64) {
         for &(label, count) in &counts.labels {
             self.labels.push(label);
@@ -144,14 +130,14 @@ impl<T: Real> PixelLabels<T> {
         self.offsets.push(self.labels.len());
     }
 
-    fn concatenate(blocks: &[Self], memory: &mut Memory) -> Self {
+    fn concatenate(blocks: &[Self]) -> Self {
         let points: usize = blocks.iter().map(Self::rows).sum();
         let entries = blocks.iter().map(|block| block.labels.len()).sum();
         let mut all = Self {
-            offsets: memory.empty(points + 1),
-            labels: memory.empty(entries),
-            weights: memory.empty(entries),
-            mass: memory.empty(points),
+            offsets: Vec::with_capacity(points + 1),
+            labels: Vec::with_capacity(entries),
+            weights: Vec::with_capacity(entries),
+            mass: Vec::with_capacity(points),
         };
         all.offsets.push(0);
         for block in blocks {
@@ -163,14 +149,6 @@ impl<T: Real> PixelLabels<T> {
             all.mass.extend_from_slice(&block.mass);
         }
         all
-    }
-
-    /// Keeps the vectors, which are no longer needed.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        memory.keep(self.offsets);
-        memory.keep(self.labels);
-        memory.keep(self.weights);
-        memory.keep(self.mass);
     }
 
     /// Number of points.
@@ -206,7 +184,7 @@ mod tests {
     #[test]
     fn a_window_at_the_corner_has_fewer_pixels() {
         let labels = masks(6, 6, &[vec![true; 36]])
-            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0, &mut Memory::of_one_frame())
+            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0)
             .unwrap();
         assert_eq!(
             (labels.mass[0], labels.row(0).collect::<Vec<_>>()),
@@ -220,7 +198,7 @@ mod tests {
             pixels in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 63), 0..4),
             u in -0.5..8.49_f64, v in -0.5..6.49_f64, reach in 0_usize..4,
         ) {
-            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, &mut Memory::of_one_frame()).unwrap();
+            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0).unwrap();
             let mut expected = vec![0.0_f32; pixels.len() + 1];
             let mut mass = 0.0;
             for row in 0..7_usize {

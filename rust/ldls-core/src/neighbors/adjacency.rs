@@ -3,7 +3,6 @@
 
 use super::kdtree::{FAN, KdTree};
 use super::leaf_search::search_leaf;
-use crate::Memory;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -23,14 +22,9 @@ pub(crate) struct Adjacency {
 
 impl Adjacency {
     /// The `k` nearest neighbours of `points`, which are in the order of their `tree`.
-    pub(crate) fn search(
-        tree: &KdTree,
-        points: &[[f64; 3]],
-        k: usize,
-        memory: &mut Memory,
-    ) -> Self {
+    pub(crate) fn search(tree: &KdTree, points: &[[f64; 3]], k: usize) -> Self {
         let degree = k.min(points.len().saturating_sub(1)) + 1;
-        let mut columns = memory.filled(points.len() * degree, 0);
+        let mut columns = vec![0; points.len() * degree];
         let tasks = columns
             .par_chunks_mut(degree * FAN * LEAVES_A_TASK)
             .enumerate();
@@ -48,13 +42,6 @@ impl Adjacency {
         Self {
             degree,
             columns: Arc::new(columns),
-        }
-    }
-
-    /// Keeps the columns, if no graph has them any more.
-    pub(crate) fn keep_in(self, memory: &mut Memory) {
-        if let Ok(columns) = Arc::try_unwrap(self.columns) {
-            memory.keep(columns);
         }
     }
 
@@ -91,9 +78,8 @@ mod tests {
     #[test]
     fn coincident_points_are_duplicates_and_islands() {
         let points = vec![[1.0, 2.0, 3.0]; 120_000];
-        let memory = &mut Memory::of_one_frame();
-        let tree = KdTree::new(&points, memory);
-        let adjacency = Adjacency::search(&tree, &points, 10, memory);
+        let tree = KdTree::new(&points);
+        let adjacency = Adjacency::search(&tree, &points, 10);
         assert_eq!(adjacency.duplicates(&points), 120_000);
         assert!(adjacency.only_islands(&points));
     }

@@ -5,7 +5,6 @@
 //! kept in single precision. [`KdTree::rounding`] says by how much they differ from the points given: not
 //! at all where those came in single precision.
 
-use crate::Memory;
 use rayon::prelude::*;
 
 /// Points of a leaf, leaves of a node, nodes of a larger node.
@@ -49,7 +48,7 @@ struct Item {
 
 impl KdTree {
     /// The tree of `points`, finite coordinates in metres.
-    pub(crate) fn new(points: &[[f64; 3]], memory: &mut Memory) -> Self {
+    pub(crate) fn new(points: &[[f64; 3]]) -> Self {
         let (origin, rounding) = frame(points);
         let local = |point: &[f64; 3]| {
             [
@@ -63,12 +62,11 @@ impl KdTree {
             xyz: local(point),
             index: index as u32,
         };
-        let mut items = memory.collect(points.par_iter().enumerate().map(item));
+        let mut items = points.par_iter().enumerate().map(item).collect::<Vec<_>>();
         sort(&mut items);
-        let leaves = memory.collect(items.par_chunks(FAN).map(Leaf::new));
-        let levels = levels(&items, memory);
-        let order = memory.collect(items.par_iter().map(|item| item.index));
-        memory.keep(items);
+        let leaves = items.par_chunks(FAN).map(Leaf::new).collect();
+        let levels = levels(&items);
+        let order = items.par_iter().map(|item| item.index).collect();
         Self {
             order,
             leaves,
@@ -78,19 +76,8 @@ impl KdTree {
         }
     }
 
-    /// `values` of the points, in the order of the tree.
-    pub(crate) fn arrange<T: Copy + Send + Sync + 'static>(
-        &self,
-        values: &[T],
-        memory: &mut Memory,
-    ) -> Vec<T> {
-        arrange(&self.order, values, memory)
-    }
-
-    /// The order alone; keeps the rest, which is no longer needed.
-    pub(crate) fn into_order(self, memory: &mut Memory) -> Vec<u32> {
-        memory.keep(self.leaves);
-        self.levels.into_iter().for_each(|level| memory.keep(level));
+    /// The order alone.
+    pub(crate) fn into_order(self) -> Vec<u32> {
         self.order
     }
 
@@ -101,13 +88,9 @@ impl KdTree {
 }
 
 /// `values` in the order of the tree.
-pub(crate) fn arrange<T: Copy + Send + Sync + 'static>(
-    order: &[u32],
-    values: &[T],
-    memory: &mut Memory,
-) -> Vec<T> {
+pub(crate) fn arrange<T: Copy + Send + Sync + 'static>(order: &[u32], values: &[T]) -> Vec<T> {
     let value = |&index: &u32| values[index as usize];
-    memory.collect(order.par_iter().with_min_len(PARALLEL).map(value))
+    order.par_iter().with_min_len(PARALLEL).map(value).collect()
 }
 
 impl Leaf {
@@ -213,22 +196,20 @@ impl Hull {
     }
 }
 
-fn levels(items: &[Item], memory: &mut Memory) -> Vec<Vec<Boxes>> {
+fn levels(items: &[Item]) -> Vec<Vec<Boxes>> {
     let of_point = |item: &Item| Hull {
         low: item.xyz,
         high: item.xyz,
         first: item.index,
     };
     let around_leaf = |items: &[Item]| Hull::around(items.iter().map(of_point));
-    let mut hulls = memory.collect(items.par_chunks(FAN).map(around_leaf));
+    let mut hulls: Vec<Hull> = items.par_chunks(FAN).map(around_leaf).collect();
     let mut levels = Vec::new();
     loop {
-        levels.push(memory.collect(hulls.par_chunks(FAN).map(Boxes::new)));
+        levels.push(hulls.par_chunks(FAN).map(Boxes::new).collect());
         let around = |hulls: &[Hull]| Hull::around(hulls.iter().copied());
-        let larger = memory.collect(hulls.par_chunks(FAN).map(around));
-        memory.keep(std::mem::replace(&mut hulls, larger));
+        hulls = hulls.par_chunks(FAN).map(around).collect();
         if hulls.len() <= 1 {
-            memory.keep(hulls);
             return levels;
         }
     }
@@ -284,7 +265,7 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..5000_i32)
             .map(|i| [f64::from(i % 71), f64::from(i % 37), f64::from(i % 13)])
             .collect();
-        let tree = KdTree::new(&points, &mut Memory::of_one_frame());
+        let tree = KdTree::new(&points);
         let mut order = tree.order.clone();
         order.sort_unstable();
         assert!(
@@ -312,12 +293,9 @@ mod tests {
     #[test]
     fn map_coordinates_are_rounded_relative_to_a_point_of_theirs() {
         let points = [[5e5 + 0.125, 5e6 + 0.1, 100.0], [5e5 + 7.0, 5e6, 101.0]];
-        let tree = KdTree::new(&points, &mut Memory::of_one_frame());
+        let tree = KdTree::new(&points);
         assert_eq!(tree.origin, points[0]);
         assert!(tree.rounding > 0.0 && tree.rounding < 2e-6);
-        assert_eq!(
-            KdTree::new(&[[0.5, 2.0, 3.0]], &mut Memory::of_one_frame()).rounding,
-            0.0
-        );
+        assert_eq!(KdTree::new(&[[0.5, 2.0, 3.0]]).rounding, 0.0);
     }
 }

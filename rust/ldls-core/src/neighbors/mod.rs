@@ -13,7 +13,6 @@ pub(crate) use adjacency::Adjacency;
 pub(crate) use candidates::squared_distance;
 pub(crate) use kdtree::{KdTree, arrange};
 
-use crate::Memory;
 use rayon::prelude::*;
 
 /// The `k` nearest other points of every point, nearest first.
@@ -29,9 +28,8 @@ impl Neighbors {
     /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; the point itself is none
     /// of them.
     pub fn search(points: &[[f64; 3]], k: usize) -> Self {
-        let memory = &mut Memory::of_one_frame();
-        let tree = KdTree::new(points, memory);
-        let found = Adjacency::search(&tree, &tree.arrange(points, memory), k, memory);
+        let tree = KdTree::new(points);
+        let found = Adjacency::search(&tree, &arrange(&tree.order, points), k);
         let k = found.degree - 1;
         let mut indices = vec![0; points.len() * k];
         if k > 0 {

@@ -2,7 +2,7 @@
 
 use super::camera::{Camera, Sight};
 use super::cloud::Cloud;
-use crate::{Error, Memory, Result};
+use crate::{Error, Result};
 use rayon::prelude::*;
 
 /// Largest magnitude of a coordinate, in metres: beyond it squared distances lose their meaning.
@@ -66,37 +66,29 @@ impl Camera {
         height: usize,
         width: usize,
         keep_origin: bool,
-        memory: &mut Memory,
     ) -> Result<View> {
         let n = cloud.len();
         check_points(n)?;
         let count = n.div_ceil(BLOCK);
-        let mut blocks: Vec<View> = memory.as_left(count);
         let rows = |block: usize| block * BLOCK..n.min((block + 1) * BLOCK);
-        let outcomes: Vec<Result<()>> = blocks[..count]
-            .par_iter_mut()
-            .enumerate()
-            .map(|(block, view)| {
-                self.view_rows(cloud, rows(block), [height, width], keep_origin, view)
-            })
+        let blocks: Vec<Result<View>> = (0..count)
+            .into_par_iter()
+            .map(|block| self.view_rows(cloud, rows(block), [height, width], keep_origin))
             .collect();
         // taken in order, so that the first bad row is the one reported
-        outcomes.into_iter().collect::<Result<()>>()?;
-        let view = concatenate(&blocks[..count], memory);
-        memory.keep_as_is(blocks);
-        Ok(view)
+        let blocks = blocks.into_iter().collect::<Result<Vec<View>>>()?;
+        Ok(concatenate(&blocks))
     }
 
-    /// Makes `view` that of some rows.
+    /// The view of some rows.
     fn view_rows(
         &self,
         cloud: Cloud,
         rows: std::ops::Range<usize>,
         [height, width]: [usize; 2],
         keep_origin: bool,
-        view: &mut View,
-    ) -> Result<()> {
-        view.clear();
+    ) -> Result<View> {
+        let mut view = View::default();
         for row in rows {
             let Some(xyz) = view.counts.usable(cloud, row, keep_origin)? else {
                 continue;
@@ -111,7 +103,7 @@ impl Camera {
                 }
             }
         }
-        Ok(())
+        Ok(view)
     }
 }
 
@@ -126,15 +118,6 @@ pub(crate) fn check_points(points: usize) -> Result<()> {
         limit: i32::MAX as u64,
         of: "points",
     })
-}
-
-impl View {
-    fn clear(&mut self) {
-        self.indices.clear();
-        self.points.clear();
-        self.uv.clear();
-        self.counts = ViewCounts::default();
-    }
 }
 
 impl ViewCounts {
@@ -184,11 +167,11 @@ impl ViewCounts {
     }
 }
 
-fn concatenate(blocks: &[View], memory: &mut Memory) -> View {
+fn concatenate(blocks: &[View]) -> View {
     let n = blocks.iter().map(|block| block.indices.len()).sum();
     let mut view = View {
         indices: Vec::with_capacity(n),
-        points: memory.empty(n),
+        points: Vec::with_capacity(n),
         uv: Vec::with_capacity(n),
         counts: ViewCounts::default(),
     };
@@ -224,7 +207,6 @@ mod tests {
                 80,
                 100,
                 false,
-                &mut Memory::of_one_frame(),
             )
             .unwrap()
     }
@@ -260,9 +242,7 @@ mod tests {
             values: &[0., 0., 1., 0., 1e30, 1.],
             columns: 3,
         };
-        let error = camera()
-            .view(cloud, 10, 10, false, &mut Memory::of_one_frame())
-            .unwrap_err();
+        let error = camera().view(cloud, 10, 10, false).unwrap_err();
         assert!(
             matches!(error, Error::CoordinateOutOfRange { row: 1, .. }),
             "{error}"

@@ -4,7 +4,7 @@ use super::RingView;
 use super::sightings::{Sighting, UNSEEN};
 use crate::masks::PixelLabels;
 use crate::segment::Seeds;
-use crate::{Memory, Params, Real, Result};
+use crate::{Params, Real, Result};
 
 /// The pixels of all images.
 pub(crate) struct Images<'a> {
@@ -21,12 +21,7 @@ impl Seeds for Images<'_> {
         self.count
     }
 
-    fn pixel_labels<T: Real>(
-        &self,
-        order: &[u32],
-        params: &Params,
-        memory: &mut Memory,
-    ) -> Result<PixelLabels<T>> {
+    fn pixel_labels<T: Real>(&self, order: &[u32], params: &Params) -> Result<PixelLabels<T>> {
         let mut parts = Vec::with_capacity(self.views.len());
         for (camera, view) in self.views.iter().enumerate() {
             let slots = &self.slots[camera];
@@ -35,16 +30,12 @@ impl Seeds for Images<'_> {
                 .filter(|&slot| slot != UNSEEN)
                 .map(|slot| self.sightings[camera].uv[slot as usize])
                 .collect();
-            let labels =
-                view.masks
-                    .pixel_labels::<T>(&uv, params.window, params.pixel_weight, memory)?;
+            let labels = view
+                .masks
+                .pixel_labels::<T>(&uv, params.window, params.pixel_weight)?;
             parts.push(labels);
         }
-        let all = self.together(order, &parts);
-        for part in parts {
-            part.keep_in(memory);
-        }
-        Ok(all)
+        Ok(self.together(order, &parts))
     }
 }
 

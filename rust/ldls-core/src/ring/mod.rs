@@ -12,7 +12,7 @@ pub use sightings::Sighting;
 use crate::masks::InstanceMasks;
 use crate::projection::{Camera, Cloud, check_points};
 use crate::segment::{Stopwatch, check_edges, label_points};
-use crate::{Memory, Params, Result, Segmentation};
+use crate::{Params, Result, Segmentation};
 use images::{Images, labels_of};
 use same_objects::same_objects;
 use sightings::sight_all;
@@ -53,7 +53,6 @@ pub fn segment_ring(
     same_object: f64,
     params: &Params,
     keep_origin: bool,
-    memory: &mut Memory,
 ) -> Result<RingSegmentation> {
     params.check()?;
     check_points(cloud.len())?;
@@ -75,7 +74,7 @@ pub fn segment_ring(
         labels: labels_of(views, &objects),
         count: objects.len() + 1,
     };
-    let segmentation = label_points(cloud.len(), view, &seeds, params, clock, memory)?;
+    let segmentation = label_points(cloud.len(), view, &seeds, params, clock)?;
     Ok(RingSegmentation {
         segmentation,
         sightings,
@@ -114,9 +113,7 @@ mod tests {
             values: &values,
             columns: 3,
         };
-        let memory = &mut Memory::of_one_frame();
-        let single =
-            crate::segment(cloud, &masks, &camera, &Params::paper(), false, memory).unwrap();
+        let single = crate::segment(cloud, &masks, &camera, &Params::paper(), false).unwrap();
         assert_eq!(ring.segmentation.labels, single.labels);
         assert_eq!(ring.segmentation.confidence, single.confidence);
         assert_eq!(ring.segmentation.view.indices, single.view.indices);
