@@ -5,51 +5,31 @@
 //! labels are nearer to one another than that, they are diffused again in double precision. Where the graph
 //! is such that the series cannot be trusted, the products are run as they stand.
 
-mod activity;
-mod blocks;
-mod lanes;
+mod convergence;
 mod pass;
 mod products;
+mod schedule;
+mod seeds;
 mod series;
-mod state;
-mod sweeps;
-mod tiles;
+mod sweep;
 mod values;
 mod winners;
 
+pub use convergence::Convergence;
 pub use products::Products;
 
-use self::lanes::{Lane, LaneSeeds, plan};
-use self::pass::{CONVERGED, Scheme, labels_of, largest_overlap};
-use self::series::Tolerance;
-use self::state::Rows;
-use self::sweeps::{Sweep, WIDTH_F32, WIDTH_F64};
-use self::values::Values;
-use self::winners::{Best, Contested, update};
+use self::pass::Pass;
+use self::products::check;
+use self::schedule::Schedule;
+use self::seeds::{Seeds, plan};
+use self::series::Series;
+use self::sweep::{Sweep, WIDTH_F32, WIDTH_F64};
+use self::winners::{Best, ROWS_A_TASK};
+use crate::Real;
+use crate::Result;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::{Error, Result};
 use rayon::prelude::*;
-
-/// What a series in single precision may leave out.
-const TOLERANCE_F32: Tolerance = Tolerance(1e-7);
-/// What a series in double precision may leave out.
-const TOLERANCE_F64: Tolerance = Tolerance(1e-13);
-/// Rows handled by one task of the thread pool.
-const BLOCK: usize = 2048;
-
-/// How far a diffusion came.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Convergence {
-    /// Sweeps over the graph that were computed for a label.
-    pub sweeps: usize,
-    /// Largest change of any likelihood that one more product would make, where that bounded the run.
-    pub residual: Option<f64>,
-    /// Estimate of the largest error of a likelihood from the terms that the series leaves out.
-    pub error: f64,
-    /// Points whose label was decided in double precision.
-    pub refined: usize,
-}
 
 /// The winning label of every point.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,31 +42,12 @@ pub struct Diffused {
     pub convergence: Convergence,
 }
 
-impl Diffused {}
-
-impl Convergence {
-    /// Whether the run went on until one more product would change next to nothing.
-    pub fn converged(&self) -> bool {
-        self.residual.is_some_and(|residual| residual <= CONVERGED)
-    }
-
-    fn merge(&mut self, other: Self) {
-        self.sweeps = self.sweeps.max(other.sweeps);
-        self.residual = self
-            .residual
-            .into_iter()
-            .chain(other.residual)
-            .reduce(f64::max);
-        self.error = self.error.max(other.error);
-    }
-}
-
 /// Diffuses labels 0 to `n_labels` - 1 from their seeds `b` over the graph `a` and picks the winner at every
 /// point. `iterations` is the number of products, `None` as many as it takes. `exact` yields `a` and `b` in
-/// double precision, for points at which single precision does not tell the winner.
+/// double precision, for points at which single precision cannot decide.
 ///
 /// # Errors
-/// [`Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and whatever `exact` returns.
+/// [`crate::Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and whatever `exact` returns.
 pub fn diffuse(
     a: &PointGraph,
     b: &PixelLabels,
@@ -97,28 +58,24 @@ pub fn diffuse(
     check(a, b, n_labels)?;
     let mut best = vec![Best::default(); a.len()];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let choose = |lanes: &[Lane], z: &Values<f32, WIDTH_F32>| update(&mut best, lanes, z);
+    let choose = |pass: &Pass<f32, WIDTH_F32>| winners::update(&mut best, pass);
     let mut convergence = for_each_pass(a, b, &labels, iterations, choose);
-    let contested = Contested::among(&best, convergence.error);
-    if !contested.points.is_empty() {
+    let contested = winners::contested(&best, convergence.error);
+    if !contested.is_empty() {
         let (a, b) = exact()?;
-        let labels = contested.labels(&best, n_labels);
-        let mut refined = vec![(0, f64::NEG_INFINITY); contested.points.len()];
-        let choose = |lanes: &[Lane], z: &Values<f64, WIDTH_F64>| {
-            contested.refine(&mut refined, lanes, z);
-        };
+        let labels = winners::candidates(&best, &contested, n_labels, convergence.error);
+        let mut refined = vec![(0, f64::NEG_INFINITY); contested.len()];
+        let choose = |pass: &Pass<f64, WIDTH_F64>| winners::refine(&contested, &mut refined, pass);
         for_each_pass(&a, &b, &labels, iterations, choose);
-        for (&point, &(label, _)) in contested.points.iter().zip(&refined) {
+        for (&point, &(label, _)) in contested.iter().zip(&refined) {
             best[point as usize].labels[0] = label;
         }
-        convergence.refined = contested.points.len();
+        convergence.refined = contested.len();
     }
-    let best_of = best.par_iter().with_min_len(BLOCK);
-    let labels = best_of.clone().map(|best| best.labels[0]).collect();
-    let confidence = best_of.map(Best::confidence).collect();
+    let best = best.par_iter().with_min_len(ROWS_A_TASK);
     Ok(Diffused {
-        labels,
-        confidence,
+        labels: best.clone().map(|best| best.labels[0]).collect(),
+        confidence: best.map(Best::confidence).collect(),
         convergence,
     })
 }
@@ -136,10 +93,10 @@ pub fn likelihoods(
     check(a, b, n_labels)?;
     let mut all = vec![0.0; a.len() * n_labels];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let write = |lanes: &[Lane], z: &Values<f32, WIDTH_F32>| {
-        for (i, row) in all.chunks_mut(n_labels).enumerate() {
-            for (label, lane) in labels_of(lanes) {
-                row[label as usize] = z.get(i, lane);
+    let write = |pass: &Pass<f32, WIDTH_F32>| {
+        for (label, group, lane) in pass.labels() {
+            for (row, values) in all.chunks_mut(n_labels).zip(group) {
+                row[label as usize] = values[lane];
             }
         }
     };
@@ -147,51 +104,43 @@ pub fn likelihoods(
     Ok((all, convergence))
 }
 
-/// Refuses seeds that do not fit the graph or the labels.
-pub(crate) fn check(a: &PointGraph, b: &PixelLabels, n_labels: usize) -> Result<()> {
-    let mismatch = |problem: String| {
-        Err(Error::Mismatch {
-            name: "pixel_labels",
-            problem,
-        })
-    };
-    if b.rows() != a.len() {
-        return mismatch(format!("{} rows, the graph has {}", b.rows(), a.len()));
-    }
-    match b.labels.iter().find(|&&label| label as usize >= n_labels) {
-        Some(label) => mismatch(format!("label {label}, expected labels below {n_labels}")),
-        None => Ok(()),
-    }
-}
-
-/// Calls `done` with the lanes of each pass and their values at all points.
+/// Calls `done` with each pass over the graph that `labels` take.
 fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     b: &PixelLabels<T>,
     labels: &[u32],
     iterations: Option<usize>,
-    mut done: impl FnMut(&[Lane], &Values<T, WIDTH>),
+    mut done: impl FnMut(&Pass<T, WIDTH>),
 ) -> Convergence {
-    let tolerance = if WIDTH == WIDTH_F64 {
-        TOLERANCE_F64
-    } else {
-        TOLERANCE_F32
-    };
-    let mut scheme = Scheme::choose(a, iterations, tolerance);
-    let rows = Rows::new(a);
+    let mut series = Series::of_graph(a, iterations, T::TOLERANCE);
+    let schedule = Schedule::new(a);
     let mut convergence = Convergence::default();
-    let probe = WIDTH == WIDTH_F32;
-    for lanes in plan(b, labels, WIDTH, probe) {
-        let seeds = LaneSeeds::new(b, &lanes);
-        let mut pass = scheme.run(&rows, &seeds);
-        if !matches!(scheme, Scheme::Products(_)) && !pass.is_sound(&lanes, largest_overlap(b)) {
-            scheme = iterations.map_or(Scheme::UntilConverged, Scheme::Products);
-            pass = scheme.run(&rows, &seeds);
+    for lanes in plan(b, labels, WIDTH, T::PROBED) {
+        let seeds = Seeds::new(b, lanes);
+        let mut pass = Pass::run(a, &schedule, &seeds, series.as_ref(), iterations);
+        if series.is_some() && !pass.is_sound(largest_overlap(b)) {
+            series = None;
+            drop(pass);
+            pass = Pass::run(a, &schedule, &seeds, None, iterations);
         }
-        done(&lanes, &pass.z);
-        convergence.merge(pass.convergence());
+        done(&pass);
+        convergence.merge(pass.convergence);
     }
     convergence
+}
+
+/// Most labels that a pixel edge counts for, taken over a window: what the likelihoods of a point may sum to.
+fn largest_overlap<T: Real>(b: &PixelLabels<T>) -> f64 {
+    let overlap = |i: usize| {
+        let mass = b.mass[i].to_f64();
+        let weights: f64 = b.row(i).map(|(_, weight)| weight.to_f64()).sum();
+        if mass > 0.0 {
+            weights / mass
+        } else {
+            f64::INFINITY
+        }
+    };
+    (0..b.rows()).map(overlap).fold(1.0, f64::max)
 }
 
 #[cfg(test)]

@@ -1,18 +1,17 @@
-//! The products z <- A z + b as they stand, one after another, for whoever wants to see z on the way (method, step 5).
+//! The products z <- A z + b as they stand, one after another, with z after each of them (method, step 5).
 //!
 //! [`crate::diffuse`] comes to the same labels with fewer sweeps, but has no z in between. Here all labels are kept at
 //! all points, in double precision: the rounding of hundreds of products then is lost in that of the single precision
 //! in which likelihoods are handed out.
 
-use super::check;
-use super::pass::{CONVERGED, MOST_SWEEPS};
+use super::convergence::{CONVERGED, MOST_SWEEPS};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::{Real, Result};
+use crate::{Error, Real, Result};
 use rayon::prelude::*;
 
 /// Rows handled by one task of the thread pool.
-const BLOCK: usize = 1024;
+const ROWS_A_TASK: usize = 1024;
 
 /// A diffusion that is run some products at a time.
 #[derive(Debug, Clone)]
@@ -66,7 +65,7 @@ impl Products {
         }
     }
 
-    /// Whether all products asked for are done; without a number, whether the last changed no likelihood by more
+    /// True if all products asked for are done; without a number, if the last changed no likelihood by more
     /// than 1e-5 or 20,000 are done.
     pub fn is_finished(&self) -> bool {
         match self.iterations {
@@ -82,7 +81,7 @@ impl Products {
 
     /// The likelihoods after the products done, row by row.
     pub fn likelihoods(&self) -> Vec<f32> {
-        let values = self.z.par_iter().with_min_len(BLOCK);
+        let values = self.z.par_iter().with_min_len(ROWS_A_TASK);
         values.map(|&value| f32::from_f64(value)).collect()
     }
 
@@ -90,7 +89,7 @@ impl Products {
         let (a, b, z, n_labels) = (&self.a, &self.b, &self.z, self.n_labels);
         let rows = self.next.par_chunks_mut(n_labels.max(1)).enumerate();
         // one row, one thread: sums keep their order, so results do too
-        rows.with_min_len(BLOCK).for_each(|(i, row)| {
+        rows.with_min_len(ROWS_A_TASK).for_each(|(i, row)| {
             row.fill(0.0);
             for (label, weight) in b.row(i) {
                 row[label] += weight.to_f64();
@@ -111,9 +110,26 @@ impl Products {
 
     /// Largest change of any likelihood by the last product.
     fn last_change(&self) -> f64 {
-        let pairs = self.z.par_iter().zip(&self.next).with_min_len(BLOCK);
+        let pairs = self.z.par_iter().zip(&self.next).with_min_len(ROWS_A_TASK);
         let changes = pairs.map(|(after, before)| (after - before).abs());
         changes.reduce(|| 0.0, f64::max)
+    }
+}
+
+/// Refuses seeds that do not fit the graph or the labels.
+pub(super) fn check(a: &PointGraph, b: &PixelLabels, n_labels: usize) -> Result<()> {
+    let mismatch = |problem: String| {
+        Err(Error::Mismatch {
+            name: "pixel_labels",
+            problem,
+        })
+    };
+    if b.rows() != a.len() {
+        return mismatch(format!("{} rows, the graph has {}", b.rows(), a.len()));
+    }
+    match b.labels.iter().find(|&&label| label as usize >= n_labels) {
+        Some(label) => mismatch(format!("label {label}, expected labels below {n_labels}")),
+        None => Ok(()),
     }
 }
 

@@ -4,35 +4,47 @@
 //! yield (1 - x)^(-1). Where the spectrum of A lies near a real interval, a Chebyshev series on that
 //! interval comes as near to p(A) b with far fewer products.
 
+use super::convergence::MOST_SWEEPS;
+use crate::Real;
+use crate::graph::PointGraph;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// A real interval that holds the spectrum of a matrix.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
+/// Rows handled by one task of the thread pool.
+const ROWS_A_TASK: usize = 2048;
 
 /// `c_0 T_0 + c_1 T_1 + ...` on an interval.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
-    /// The interval, mapped to [-1, 1].
-    pub interval: Interval,
+pub(super) struct Series {
+    /// Mean of the ends of the interval.
+    pub(super) middle: f64,
+    /// Half the distance of the ends.
+    pub(super) half_width: f64,
     /// `c_0`, `c_1` and so on; the degree is one less than their number.
-    pub coefficients: Vec<f64>,
+    pub(super) coefficients: Vec<f64>,
     /// Sum of the magnitudes of the coefficients left out.
-    pub tail: f64,
+    pub(super) tail: f64,
 }
 
-/// What is left out of a series may sum to this share of the largest value of the function.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tolerance(pub f64);
-
 impl Series {
+    /// The series that stands for so many products with `a`, `None` for endlessly many, and leaves out at most the share
+    /// `tolerance` of the largest value; none where it cannot be trusted or takes no fewer sweeps.
+    pub(super) fn of_graph<T: Real>(
+        a: &PointGraph<T>,
+        iterations: Option<usize>,
+        tolerance: f64,
+    ) -> Option<Self> {
+        let [low, high] =
+            gershgorin(a).filter(|&[low, high]| -1.0 <= low && low < high && high <= 1.0)?;
+        match iterations {
+            Some(products) => Some(Self::of_geometric_sum(products, [low, high], tolerance))
+                .filter(|series| series.degree() + 1 < products),
+            None => (high < 1.0).then(|| Self::of_resolvent([low, high], tolerance, MOST_SWEEPS)),
+        }
+    }
+
     /// The series of 1 + x + ... + x^(`terms` - 1).
-    pub fn of_geometric_sum(terms: usize, interval: Interval, tolerance: Tolerance) -> Self {
+    fn of_geometric_sum(terms: usize, interval: [f64; 2], tolerance: f64) -> Self {
         let sum = |x: f64| {
             let complement = 1.0 - x;
             // the closed form loses its digits near 1, where terms are nearly equal
@@ -48,13 +60,14 @@ impl Series {
             // the sum is a polynomial of degree `terms` - 1: beyond it there is rounding and nothing else
             coefficients.truncate(terms);
             let all = coefficients.len() == terms;
-            let degree = degree_within(&coefficients, tolerance.0 * sum(interval.high));
+            let degree = degree_within(&coefficients, tolerance * sum(interval[1]));
             // far from the last coefficient: those that were cut off are smaller still
             if all || 4 * degree < 3 * coefficients.len() || nodes >= 1 << 14 {
                 let (kept, rest) = coefficients.split_at(degree + 1);
                 let tail = rest.iter().map(|c| c.abs()).sum();
                 return Self {
-                    interval,
+                    middle: middle(interval),
+                    half_width: half_width(interval),
                     coefficients: kept.to_vec(),
                     tail,
                 };
@@ -64,13 +77,13 @@ impl Series {
     }
 
     /// The series of 1 / (1 - x), for an interval below 1; at most of degree `most`.
-    pub fn of_resolvent(interval: Interval, tolerance: Tolerance, most: usize) -> Self {
+    fn of_resolvent(interval: [f64; 2], tolerance: f64, most: usize) -> Self {
         // 1 / (a - t) = 2 / sqrt(a^2 - 1) * (1/2 + r T_1(t) + r^2 T_2(t) + ...), r = a - sqrt(a^2 - 1)
-        let half_width = interval.half_width();
-        let a = (1.0 - interval.middle()) / half_width;
+        let half_width = half_width(interval);
+        let a = (1.0 - middle(interval)) / half_width;
         let root = ((a - 1.0) * (a + 1.0)).sqrt();
         let ratio = 1.0 / (a + root);
-        let degree = (tolerance.0.ln() / ratio.ln()).ceil();
+        let degree = (tolerance.ln() / ratio.ln()).ceil();
         let degree = if degree < most as f64 {
             degree as usize
         } else {
@@ -82,39 +95,57 @@ impl Series {
         coefficients[0] /= 2.0;
         let tail = scale * ratio.powi(degree as i32 + 1) / (1.0 - ratio);
         Self {
-            interval,
+            middle: middle(interval),
+            half_width,
             coefficients,
             tail,
         }
     }
 
     /// Highest k of `T_k`.
-    pub fn degree(&self) -> usize {
+    pub(super) fn degree(&self) -> usize {
         self.coefficients.len() - 1
     }
 }
 
-impl Interval {
-    /// Half the distance of the ends.
-    pub fn half_width(&self) -> f64 {
-        (self.high - self.low) / 2.0
-    }
+fn middle([low, high]: [f64; 2]) -> f64 {
+    f64::midpoint(high, low)
+}
 
-    /// Mean of the ends.
-    pub fn middle(&self) -> f64 {
-        f64::midpoint(self.high, self.low)
-    }
+fn half_width([low, high]: [f64; 2]) -> f64 {
+    (high - low) / 2.0
+}
+
+/// An interval on which the real parts of all eigenvalues lie, if no weight is negative.
+fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
+    let row = |i: usize| {
+        let (mut sum, mut diagonal) = (0.0, 0.0);
+        for (j, weight) in a.row(i) {
+            if weight < T::default() {
+                return None;
+            }
+            sum += weight.to_f64();
+            diagonal += if i == j { weight.to_f64() } else { 0.0 };
+        }
+        Some([2.0 * diagonal - sum, sum])
+    };
+    let hull = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+    let rows = (0..a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
+    rows.map(row).try_reduce(
+        || [f64::INFINITY, f64::NEG_INFINITY],
+        |a, b| Some(hull(a, b)),
+    )
 }
 
 /// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes; the
 /// upper half would be aliases of higher terms.
-fn interpolate(function: impl Fn(f64) -> f64, interval: Interval, nodes: usize) -> Vec<f64> {
+fn interpolate(function: impl Fn(f64) -> f64, interval: [f64; 2], nodes: usize) -> Vec<f64> {
     let t: Vec<f64> = (0..nodes)
         .map(|j| ((j as f64 + 0.5) * PI / nodes as f64).cos())
         .collect();
     let x = t
         .iter()
-        .map(|t| interval.middle() + interval.half_width() * t);
+        .map(|t| middle(interval) + half_width(interval) * t);
     let values: Vec<f64> = x.map(function).collect();
     // T_0 and T_1 at the nodes; T_(k + 1) = 2 t T_k - T_(k - 1)
     let (mut current, mut next) = (vec![1.0; nodes], t.clone());
@@ -149,26 +180,23 @@ fn degree_within(coefficients: &[f64], remainder: f64) -> usize {
 mod tests {
     use super::*;
 
-    const INTERVAL: Interval = Interval {
-        low: -0.8,
-        high: 0.998,
-    };
+    const INTERVAL: [f64; 2] = [-0.8, 0.998];
 
     fn evaluate(series: &Series, x: f64) -> f64 {
-        let t = (x - series.interval.middle()) / series.interval.half_width();
+        let t = (x - series.middle) / series.half_width;
         let terms = series.coefficients.iter().enumerate();
         terms.map(|(k, c)| c * (k as f64 * t.acos()).cos()).sum()
     }
 
     fn points() -> impl Iterator<Item = f64> {
-        (0..=1000).map(|i| INTERVAL.low + f64::from(i) / 1000.0 * 2.0 * INTERVAL.half_width())
+        (0..=1000).map(|i| INTERVAL[0] + f64::from(i) / 1000.0 * (INTERVAL[1] - INTERVAL[0]))
     }
 
     #[test]
     fn a_series_equals_the_sum_of_powers() {
         for (terms, most) in [(1, 0), (2, 1), (7, 6), (200, 64), (5000, 700)] {
-            let series = Series::of_geometric_sum(terms, INTERVAL, Tolerance(1e-7));
-            let largest: f64 = (0..terms).map(|k| INTERVAL.high.powi(k as i32)).sum();
+            let series = Series::of_geometric_sum(terms, INTERVAL, 1e-7);
+            let largest: f64 = (0..terms).map(|k| INTERVAL[1].powi(k as i32)).sum();
             for x in points() {
                 let sum: f64 = (0..terms).map(|k| x.powi(k as i32)).sum();
                 assert!(
@@ -186,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_series_equals_the_resolvent() {
-        let series = Series::of_resolvent(INTERVAL, Tolerance(1e-9), 10_000);
+        let series = Series::of_resolvent(INTERVAL, 1e-9, 10_000);
         for x in points() {
             let expected = 1.0 / (1.0 - x);
             assert!(
@@ -195,9 +223,6 @@ mod tests {
             );
         }
         assert!(series.degree() < 500);
-        assert_eq!(
-            Series::of_resolvent(INTERVAL, Tolerance(1e-9), 10).degree(),
-            10
-        );
+        assert_eq!(Series::of_resolvent(INTERVAL, 1e-9, 10).degree(), 10);
     }
 }

@@ -1,126 +1,56 @@
 //! The values of all lanes at all points, which threads read while others write other rows of them.
 //!
-//! Which thread may touch which rows when is the business of [`super::tiles`], which orders the steps of tiles of rows.
+//! They are kept group by group, `Vec<Vec<[T; WIDTH]>>`: where a group holds nothing but zeros, a sweep leaves it out
+//! and does not touch its memory.
 
-use super::lanes::MOST_GROUPS;
+use super::seeds::MOST_GROUPS;
 use crate::Real;
 use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Bytes at which the rows of a group are aligned, so that none lies in two lines of the cache.
-const ALIGNMENT: usize = 32;
-
-/// Values of all lanes at all points, group by group: where one holds nothing but zeros, a sweep leaves it out and
-/// does not touch its memory.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Values<T, const WIDTH: usize>(Vec<GroupValues<T, WIDTH>>);
-
-/// Values of one group of lanes at all points.
-#[derive(Debug, Clone)]
-struct GroupValues<T, const WIDTH: usize> {
-    /// Not a vector of rows: zeroed memory of plain numbers comes from the system as it is, page by page when used.
-    buffer: Vec<T>,
-    /// Where the first row begins.
-    start: usize,
+/// Zeros of `groups` groups at `points` points.
+pub(super) fn zeros<T: Real, const WIDTH: usize>(
     points: usize,
+    groups: usize,
+) -> Vec<Vec<[T; WIDTH]>> {
+    // threads share out what the allocator has to clear
+    let group = |_| vec![[T::default(); WIDTH]; points];
+    (0..groups).into_par_iter().map(group).collect()
 }
 
-impl<T: Real, const WIDTH: usize> GroupValues<T, WIDTH> {
-    /// From zeros in `buffer`, of which there are as many as `length_for` says.
-    fn new(buffer: Vec<T>, points: usize) -> Self {
-        let start = buffer.as_ptr().align_offset(ALIGNMENT).min(Self::SPARE);
-        Self {
-            buffer,
-            start,
-            points,
-        }
-    }
-
-    /// Values beyond those of the rows, so that rows can begin where memory is aligned.
-    const SPARE: usize = ALIGNMENT / size_of::<T>();
-
-    fn length_for(points: usize) -> usize {
-        points * WIDTH + Self::SPARE
-    }
-
-    #[inline(always)]
-    fn rows(&self) -> &[[T; WIDTH]] {
-        &self.buffer[self.start..].as_chunks().0[..self.points]
-    }
-
-    #[inline(always)]
-    fn rows_mut(&mut self) -> &mut [[T; WIDTH]] {
-        &mut self.buffer[self.start..].as_chunks_mut().0[..self.points]
-    }
-}
-
-impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
-    /// Zeros at `points` points.
-    pub(crate) fn zero(points: usize, groups: usize) -> Self {
-        let length = GroupValues::<T, WIDTH>::length_for(points);
-        let buffers = (0..groups)
-            .into_par_iter()
-            .map(|_| vec![T::default(); length]);
-        let group = |buffer| GroupValues::new(buffer, points);
-        Self(buffers.map(group).collect())
-    }
-
-    /// The values of `group` at all points.
-    #[inline(always)]
-    pub(crate) fn group(&self, group: usize) -> &[[T; WIDTH]] {
-        self.0[group].rows()
-    }
-
-    /// The same to write.
-    #[inline(always)]
-    pub(crate) fn group_mut(&mut self, group: usize) -> &mut [[T; WIDTH]] {
-        self.0[group].rows_mut()
-    }
-
-    /// The value of `lane` at point `i`.
-    #[inline(always)]
-    pub(crate) fn get(&self, i: usize, lane: usize) -> T {
-        self.group(lane / WIDTH)[i][lane % WIDTH]
-    }
-
-    /// Number of points.
-    pub(crate) fn points(&self) -> usize {
-        self.0.first().map_or(0, |group| group.points)
-    }
-
-    /// Number of lanes.
-    pub(crate) fn lanes(&self) -> usize {
-        self.0.len() * WIDTH
-    }
-}
-
-/// The values of all lanes at all points, borrowed for as long as threads share them.
+/// Values of all lanes at all points, borrowed for as long as threads share them.
 #[derive(Debug)]
-pub(crate) struct SharedValues<'a, T, const WIDTH: usize> {
+pub(super) struct SharedValues<'a, T, const WIDTH: usize> {
     groups: [*mut [T; WIDTH]; MOST_GROUPS],
     count: usize,
     points: usize,
-    borrowed: PhantomData<&'a mut Values<T, WIDTH>>,
+    borrowed: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: what lies behind the pointers is plain numbers; a `Window`, the only way to them, is promised by who makes
-// it to be the only one to write its rows, with none to read them
+// SAFETY: behind the pointers are plain numbers; callers of `rows` and `rows_mut` promise that nobody writes a row that
+// another reads or writes
 #[expect(unsafe_code, reason = "threads share values by rows")]
 unsafe impl<T: Send, const WIDTH: usize> Sync for SharedValues<'_, T, WIDTH> {}
 
+#[expect(unsafe_code, reason = "threads share values by rows")]
 impl<'a, T: Real, const WIDTH: usize> SharedValues<'a, T, WIDTH> {
-    pub(crate) fn new(values: &'a mut Values<T, WIDTH>) -> Self {
+    pub(super) fn new(values: &'a mut [Vec<[T; WIDTH]>]) -> Self {
         let mut groups = [std::ptr::null_mut(); MOST_GROUPS];
-        for (shared, group) in groups.iter_mut().zip(&mut values.0) {
-            *shared = group.rows_mut().as_mut_ptr();
+        for (shared, group) in groups.iter_mut().zip(values.iter_mut()) {
+            *shared = group.as_mut_ptr();
         }
         Self {
             groups,
-            count: values.0.len(),
-            points: values.points(),
+            count: values.len(),
+            points: values.first().map_or(0, Vec::len),
             borrowed: PhantomData,
         }
+    }
+
+    /// Number of groups.
+    pub(super) fn groups(&self) -> usize {
+        self.count
     }
 
     /// Where `rows` of `group` begin.
@@ -130,105 +60,34 @@ impl<'a, T: Real, const WIDTH: usize> SharedValues<'a, T, WIDTH> {
         assert!(group < self.count && within, "rows of the values");
         self.groups[group].wrapping_add(rows.start)
     }
-}
 
-/// What one thread computes of a step: some rows of the values after it, from the values before it.
-#[derive(Debug)]
-pub(crate) struct Window<'a, T, const WIDTH: usize> {
-    z: &'a SharedValues<'a, T, WIDTH>,
-    next: &'a SharedValues<'a, T, WIDTH>,
-    rows: Range<usize>,
-}
-
-#[expect(unsafe_code, reason = "threads share values by rows")]
-impl<'a, T: Real, const WIDTH: usize> Window<'a, T, WIDTH> {
-    /// `rows` of `next`, to be computed from `z`.
+    /// `rows` of `group`, to read.
     ///
     /// # Safety
-    /// While the window lives, no other one holds any of these rows of `next` as its own or reads them as `z`, and
-    /// none has as its own a row of `z` that lies in `rows` or that is read with [`Source::at`].
-    pub(crate) unsafe fn new(
-        z: &'a SharedValues<'a, T, WIDTH>,
-        next: &'a SharedValues<'a, T, WIDTH>,
-        rows: Range<usize>,
-    ) -> Self {
-        assert!(rows.end <= next.points, "rows of the values");
-        Self { z, next, rows }
-    }
-
-    /// The rows of the window.
-    pub(crate) fn rows(&self) -> Range<usize> {
-        self.rows.clone()
-    }
-
-    /// Number of groups.
-    pub(crate) fn groups(&self) -> usize {
-        self.next.count
-    }
-
-    /// `rows`, some of those of the window, of two different groups of the values to compute, and of those before.
+    /// Nobody writes them meanwhile.
     #[inline(always)]
-    pub(crate) fn pair(
-        &mut self,
-        groups: [usize; 2],
+    pub(super) unsafe fn rows(&self, group: usize, rows: &Range<usize>) -> &'a [[T; WIDTH]] {
+        // SAFETY: the rows are there (`begin` checks it), and the caller promises the rest
+        unsafe { std::slice::from_raw_parts(self.begin(group, rows), rows.len()) }
+    }
+
+    /// The same, to write.
+    ///
+    /// # Safety
+    /// Nobody else reads or writes them meanwhile.
+    #[inline(always)]
+    pub(super) unsafe fn rows_mut(
+        &self,
+        group: usize,
         rows: &Range<usize>,
-    ) -> [Part<'_, T, WIDTH>; 2] {
-        assert!(groups[0] != groups[1], "two groups");
-        groups.map(|group| self.part(group, rows))
+    ) -> &'a mut [[T; WIDTH]] {
+        // SAFETY: the rows are there (`begin` checks it), and the caller promises the rest
+        unsafe { std::slice::from_raw_parts_mut(self.begin(group, rows), rows.len()) }
     }
 
-    /// The same of one group.
+    /// Where the values of `group` begin, that of point 0 first.
     #[inline(always)]
-    pub(crate) fn one(&mut self, group: usize, rows: &Range<usize>) -> Part<'_, T, WIDTH> {
-        self.part(group, rows)
-    }
-
-    #[inline(always)]
-    fn part<'b>(&self, group: usize, rows: &Range<usize>) -> Part<'b, T, WIDTH> {
-        assert!(
-            self.rows.start <= rows.start && rows.end <= self.rows.end,
-            "rows of the window"
-        );
-        let (next, own) = (self.next.begin(group, rows), self.z.begin(group, rows));
-        // SAFETY: the rows lie within both (`begin` checks it), are the window's alone, and the callers, which
-        // borrow it mutably, ask for no two parts of one group
-        unsafe {
-            Part {
-                next: std::slice::from_raw_parts_mut(next, rows.len()),
-                own: std::slice::from_raw_parts(own, rows.len()),
-                z: Source(self.z.groups[group], PhantomData),
-            }
-        }
-    }
-}
-
-/// Some rows of one group of lanes.
-#[derive(Debug)]
-pub(crate) struct Part<'a, T, const WIDTH: usize> {
-    /// Their values after the step before last, in place of which come those after the step.
-    pub(crate) next: &'a mut [[T; WIDTH]],
-    /// Their values after the step before.
-    pub(crate) own: &'a [[T; WIDTH]],
-    /// The values of all rows after the step before.
-    pub(crate) z: Source<'a, T, WIDTH>,
-}
-
-/// The values of one group at all points.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Source<'a, T, const WIDTH: usize>(*const [T; WIDTH], PhantomData<&'a [T; WIDTH]>);
-
-impl<'a, T: Real, const WIDTH: usize> Source<'a, T, WIDTH> {
-    /// The values at point `i`.
-    ///
-    /// # Safety
-    /// There is a point `i`, and a row of the window has an edge from it.
-    #[inline(always)]
-    #[expect(
-        unsafe_code,
-        reason = "the check of every column takes a sixth of the time of a sweep"
-    )]
-    pub(crate) unsafe fn at(self, i: u32) -> &'a [T; WIDTH] {
-        // SAFETY: the caller promises that the row exists; nobody writes it while the window lives
-        unsafe { &*self.0.add(i as usize) }
+    pub(super) fn source(&self, group: usize) -> *const [T; WIDTH] {
+        self.begin(group, &(0..0))
     }
 }

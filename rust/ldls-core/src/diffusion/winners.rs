@@ -1,20 +1,19 @@
-//! Which label wins at each point, and where single precision does not tell.
+//! The label that wins at each point, and the points at which single precision cannot decide.
 
-use super::lanes::Lane;
-use super::pass::{label_values, labels_of};
-use super::values::Values;
+use super::pass::Pass;
+use super::sweep::Sweep;
 use rayon::prelude::*;
 
 /// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
 const ROUNDING: f32 = 2.5e-5;
 /// Rows handled by one task of the thread pool.
-const BLOCK: usize = 2048;
+pub(super) const ROWS_A_TASK: usize = 2048;
 
 /// The best labels of a point so far.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Best {
+pub(super) struct Best {
     /// The winner and the one behind it; of equal ones the lowest first.
-    pub(crate) labels: [u32; 2],
+    pub(super) labels: [u32; 2],
     /// Their values and that of the third.
     values: [f32; 3],
     sum: f32,
@@ -40,13 +39,13 @@ impl Best {
         }
     }
 
-    /// Whether the value at `rank` may really be the largest, where each may be off by `error`.
+    /// True if the value at `rank` may really be the largest, where each may be off by `error`.
     fn may_win(&self, rank: usize, error: f64) -> bool {
         let behind = f64::from(self.values[0] - self.values[rank]);
         self.values[rank] > 0.0 && behind <= f64::from(ROUNDING * self.values[0]) + 2.0 * error
     }
 
-    pub(crate) fn confidence(&self) -> f32 {
+    pub(super) fn confidence(&self) -> f32 {
         if self.sum > 0.0 {
             (self.values[0] / self.sum).min(1.0)
         } else {
@@ -55,76 +54,107 @@ impl Best {
     }
 }
 
-/// The points at which single precision does not tell the winner.
-pub(crate) struct Contested {
-    pub(crate) points: Vec<u32>,
-    /// Error of the values in single precision.
-    error: f64,
+/// Offers the values of a pass to the best labels of all points.
+pub(super) fn update<const WIDTH: usize>(best: &mut [Best], pass: &Pass<f32, WIDTH>)
+where
+    f32: Sweep<WIDTH>,
+{
+    let labels: Vec<_> = pass.labels().collect();
+    let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
+    points.for_each(|(i, best)| {
+        for (label, group, lane) in &labels {
+            best.offer(*label, group[i][*lane]);
+        }
+    });
 }
 
-impl Contested {
-    pub(crate) fn among(best: &[Best], error: f64) -> Self {
-        let contested = best
-            .iter()
-            .enumerate()
-            .filter(|(_, best)| best.may_win(1, error));
-        Self {
-            points: contested.map(|(point, _)| point as u32).collect(),
-            error,
-        }
-    }
+/// The points at which single precision cannot decide, where each value may be off by `error`.
+pub(super) fn contested(best: &[Best], error: f64) -> Vec<u32> {
+    let points = (0..best.len()).filter(|&point| best[point].may_win(1, error));
+    points.map(|point| point as u32).collect()
+}
 
-    /// The labels that may win at any of the points, ascending.
-    pub(crate) fn labels(&self, best: &[Best], n_labels: usize) -> Vec<u32> {
-        let at = |&point: &u32| &best[point as usize];
-        if self
-            .points
-            .iter()
-            .map(at)
-            .any(|best| best.may_win(2, self.error))
-        {
-            return (0..n_labels as u32).collect();
-        }
-        let mut labels: Vec<u32> = self
-            .points
-            .iter()
-            .flat_map(|point| at(point).labels)
-            .collect();
-        labels.sort_unstable();
-        labels.dedup();
-        labels
+/// The labels that may win at any of `points`, ascending.
+pub(super) fn candidates(best: &[Best], points: &[u32], n_labels: usize, error: f64) -> Vec<u32> {
+    let at = |&point: &u32| &best[point as usize];
+    if points.iter().any(|point| at(point).may_win(2, error)) {
+        return (0..n_labels as u32).collect();
     }
+    let mut labels: Vec<u32> = points.iter().flat_map(|point| at(point).labels).collect();
+    labels.sort_unstable();
+    labels.dedup();
+    labels
+}
 
-    /// Keeps the best label of each point and its value in `refined`.
-    pub(crate) fn refine<const WIDTH: usize>(
-        &self,
-        refined: &mut [(u32, f64)],
-        lanes: &[Lane],
-        z: &Values<f64, WIDTH>,
-    ) {
-        for (&point, best) in self.points.iter().zip(refined) {
-            for (label, lane) in labels_of(lanes) {
-                let value = z.get(point as usize, lane);
-                if value > best.1 || (value == best.1 && label < best.0) {
-                    *best = (label, value);
-                }
+/// Keeps in `refined` the best label of each of `points` and its value.
+pub(super) fn refine<const WIDTH: usize>(
+    points: &[u32],
+    refined: &mut [(u32, f64)],
+    pass: &Pass<f64, WIDTH>,
+) where
+    f64: Sweep<WIDTH>,
+{
+    for (&point, best) in points.iter().zip(refined) {
+        for (label, group, lane) in pass.labels() {
+            let value = group[point as usize][lane];
+            if value > best.1 || (value == best.1 && label < best.0) {
+                *best = (label, value);
             }
         }
     }
 }
 
-pub(crate) fn update<const WIDTH: usize>(
-    best: &mut [Best],
-    lanes: &[Lane],
-    z: &Values<f32, WIDTH>,
-) {
-    let lanes = label_values(lanes, z);
-    best.par_iter_mut()
-        .enumerate()
-        .with_min_len(BLOCK)
-        .for_each(|(i, best)| {
-            for (label, values) in &lanes {
-                best.offer(*label, values.at(i));
-            }
-        });
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn best(values: &[(u32, f32)]) -> Best {
+        let mut best = Best::default();
+        for &(label, value) in values {
+            best.offer(label, value);
+        }
+        best
+    }
+
+    #[test]
+    fn of_equal_values_the_lowest_label_wins_in_any_order() {
+        for values in [
+            [(0, 0.5), (3, 0.5), (7, 0.25)],
+            [(7, 0.25), (3, 0.5), (0, 0.5)],
+        ] {
+            assert_eq!(best(&values).labels, [0, 3]);
+        }
+    }
+
+    #[test]
+    fn a_point_is_contested_within_twice_the_error_of_the_values() {
+        let points = [
+            best(&[(1, 0.500), (2, 0.499)]),
+            best(&[(1, 0.5), (2, 0.25)]),
+        ];
+        assert!(
+            contested(&points, 0.0).is_empty(),
+            "far more than rounding apart"
+        );
+        assert_eq!(contested(&points, 0.001), [0]);
+        assert_eq!(contested(&points, 0.2), [0, 1]);
+        assert_eq!(contested(&[best(&[(1, 0.5), (2, 0.5)])], 0.0), [0]);
+    }
+
+    #[test]
+    fn a_label_that_nothing_reached_is_no_candidate() {
+        assert!(contested(&[best(&[(1, 0.5)])], 1.0).is_empty());
+        assert!(contested(&[Best::default()], 1.0).is_empty());
+    }
+
+    #[test]
+    fn where_a_third_label_may_win_all_are_candidates() {
+        let two = best(&[(1, 0.5), (4, 0.5), (6, 0.1)]);
+        let three = best(&[(1, 0.5), (4, 0.5), (6, 0.5)]);
+        assert_eq!(candidates(&[two], &[0], 9, 0.0), [1, 4]);
+        assert_eq!(candidates(&[two, three], &[0], 9, 0.0), [1, 4]);
+        let all: Vec<u32> = (0..9).collect();
+        assert_eq!(candidates(&[two, three], &[0, 1], 9, 0.0), all);
+        assert_eq!(candidates(&[two], &[0], 9, 0.2), all);
+    }
 }

@@ -1,0 +1,286 @@
+//! The order in which the rows of a graph take their steps, and where labels flow from.
+//!
+//! A step of a row needs the step before it of the rows that it has edges from, and of no others. Rows go in blocks,
+//! blocks in tiles. Where all values fit into the cache, all tiles take a step before any takes the next. A larger
+//! cloud would be fetched from memory for every step; it is divided into regions that fit, and each takes several steps
+//! at a time. Tiles at the border of a region that is still to come are left to that one, a ring of tiles more with
+//! every step ("sparse tiling": Strout et al., Int. J. High Performance Computing Applications 18(1), 2004). The values
+//! do not depend on it.
+
+use crate::Real;
+use crate::graph::PointGraph;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
+
+/// Rows of a block.
+pub(super) const BLOCK: usize = 16;
+/// Rows of a tile.
+const TILE: usize = 4 * BLOCK;
+/// Fewest tiles for a task of the thread pool.
+const TILES_A_TASK: usize = 4;
+/// Tiles of a region: some 16 MB of values and edges.
+const REGION: usize = 32768 / TILE;
+/// Steps that a region takes at a time.
+const ROUND: usize = 12;
+
+/// Blocks of consecutive rows, the blocks that labels flow from to each, and when each tile takes which step.
+#[derive(Debug)]
+pub(super) struct Schedule {
+    rows: usize,
+    /// Sources of block i at `source_offsets[i]..source_offsets[i + 1]`.
+    source_offsets: Vec<u32>,
+    sources: Vec<u32>,
+    /// Steps after which the order repeats itself.
+    round: usize,
+    /// Region after region and step after step of a round, the tiles that take it then.
+    order: Vec<u32>,
+    /// Where in `order` each step of each region begins.
+    offsets: Vec<usize>,
+}
+
+impl Schedule {
+    pub(super) fn new<T: Real>(a: &PointGraph<T>) -> Self {
+        Self::in_regions(a, REGION)
+    }
+
+    /// Regions of `size` tiles each.
+    fn in_regions<T: Real>(a: &PointGraph<T>, size: usize) -> Self {
+        let (source_offsets, sources) = sources(a);
+        let mut schedule = Self {
+            rows: a.len(),
+            source_offsets,
+            sources,
+            round: 1,
+            order: Vec::new(),
+            offsets: Vec::new(),
+        };
+        let tiles = a.len().div_ceil(TILE);
+        if tiles > size {
+            schedule.round = ROUND;
+        }
+        // the region of each tile in each step: what must wait for a later region is left to that one
+        let mut regions: Vec<u32> = (0..tiles).map(|tile| (tile / size) as u32).collect();
+        if schedule.round > 1 {
+            let edges = schedule.tile_edges();
+            for step in 1..schedule.round {
+                regions.extend_from_within((step - 1) * tiles..);
+                let (before, after) = regions.split_at_mut(step * tiles);
+                let before = &before[(step - 1) * tiles..];
+                for &[a, b] in &edges {
+                    let [a, b] = [a as usize, b as usize];
+                    after[a] = after[a].max(before[b]);
+                    after[b] = after[b].max(before[a]);
+                }
+            }
+        }
+        schedule.sort(&regions, tiles, size);
+        schedule
+    }
+
+    /// Sorts the tiles by region and step.
+    fn sort(&mut self, regions: &[u32], tiles: usize, size: usize) {
+        let place = |at: usize| regions[at] as usize * self.round + at / tiles;
+        let mut offsets = vec![0; tiles.div_ceil(size) * self.round + 1];
+        (0..regions.len()).for_each(|at| offsets[place(at) + 1] += 1);
+        for at in 1..offsets.len() {
+            offsets[at] += offsets[at - 1];
+        }
+        let mut order = vec![0; regions.len()];
+        for at in 0..regions.len() {
+            let next = &mut offsets[place(at)];
+            order[*next] = (at % tiles) as u32;
+            *next += 1;
+        }
+        // each place now begins where it ended
+        offsets.rotate_right(1);
+        offsets[0] = 0;
+        (self.order, self.offsets) = (order, offsets);
+    }
+
+    /// The pairs of different tiles with edges from one to the other, some of them twice.
+    fn tile_edges(&self) -> Vec<[u32; 2]> {
+        let mut edges = Vec::new();
+        // at which tile each was last met
+        let mut met = vec![u32::MAX; self.rows.div_ceil(TILE)];
+        for block in 0..self.rows.div_ceil(BLOCK) {
+            let tile = (block * BLOCK / TILE) as u32;
+            met[tile as usize] = tile;
+            for &source in self.sources(block) {
+                let other = source / (TILE / BLOCK) as u32;
+                if std::mem::replace(&mut met[other as usize], tile) != tile {
+                    edges.push([tile, other]);
+                }
+            }
+        }
+        edges
+    }
+
+    /// The blocks other than `block` with a row that a row of `block` has an edge from.
+    #[inline(always)]
+    fn sources(&self, block: usize) -> &[u32] {
+        let [start, end] = [block, block + 1].map(|at| self.source_offsets[at] as usize);
+        &self.sources[start..end]
+    }
+
+    /// Calls `work(rows, step)` for steps 0 to `steps` - 1 of every tile of rows, on all threads of the pool.
+    ///
+    /// At that time every tile next to it has taken steps 0 to `step` - 1, none has begun with `step` + 1, and what
+    /// was written for those is visible.
+    pub(super) fn run(&self, steps: usize, work: impl Fn(Range<usize>, usize) + Sync) {
+        for first in (0..steps).step_by(self.round) {
+            for (place, range) in self.offsets.windows(2).enumerate() {
+                let step = first + place % self.round;
+                if step < steps {
+                    let tiles = self.order[range[0]..range[1]].par_iter();
+                    tiles.with_min_len(TILES_A_TASK).for_each(|&tile| {
+                        let start = tile as usize * TILE;
+                        work(start..self.rows.min(start + TILE), step);
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// Offsets and sources of all blocks: the other blocks that each has edges from.
+fn sources<T: Real>(a: &PointGraph<T>) -> (Vec<u32>, Vec<u32>) {
+    let count = a.len().div_ceil(BLOCK);
+    // few tasks: each marks the blocks that it has met in an array of its own
+    let size = count.div_ceil(4 * rayon::current_num_threads()).max(1);
+    let of_task = |task: usize| {
+        let (mut sources, mut ends) = (Vec::new(), Vec::with_capacity(size));
+        // at which block each was last met
+        let mut met = vec![u32::MAX; count];
+        for block in task * size..count.min((task + 1) * size) {
+            met[block] = block as u32;
+            for &column in a.slices(block * BLOCK..a.len().min((block + 1) * BLOCK)).0 {
+                let source = column / BLOCK as u32;
+                if std::mem::replace(&mut met[source as usize], block as u32) != block as u32 {
+                    sources.push(source);
+                }
+            }
+            ends.push(sources.len() as u32);
+        }
+        (sources, ends)
+    };
+    let tasks = (0..count.div_ceil(size)).into_par_iter();
+    let parts: Vec<(Vec<u32>, Vec<u32>)> = tasks.map(of_task).collect();
+    let mut offsets = vec![0];
+    let mut all = Vec::with_capacity(parts.iter().map(|(sources, _)| sources.len()).sum());
+    for (sources, ends) in parts {
+        let start = all.len() as u32;
+        offsets.extend(ends.iter().map(|end| start + end));
+        all.extend(sources);
+    }
+    (offsets, all)
+}
+
+/// The groups of lanes of each block that hold anything but zeros; bit g of a block stands for group g.
+///
+/// Labels spread from the seeds by one edge a step, so at first most groups of most blocks are zero and are left out,
+/// at no loss. Once set, a bit stays.
+#[derive(Debug)]
+pub(super) struct Activity<'a> {
+    schedule: &'a Schedule,
+    filled: Vec<AtomicU8>,
+    /// All groups.
+    all: u8,
+}
+
+impl<'a> Activity<'a> {
+    /// Of so many groups of each block, those that are `seeded`.
+    pub(super) fn new(schedule: &'a Schedule, seeded: Vec<u8>, groups: usize) -> Self {
+        Self {
+            schedule,
+            filled: seeded.into_iter().map(AtomicU8::new).collect(),
+            all: u8::MAX >> (u8::BITS as usize - groups),
+        }
+    }
+
+    /// Groups of `block` that a step may fill: those filled in it or in a block that labels flow from.
+    #[inline(always)]
+    pub(super) fn active(&self, block: usize) -> u8 {
+        let mut active = self.filled(block);
+        for &source in self.schedule.sources(block) {
+            if active == self.all {
+                break;
+            }
+            active |= self.filled(source as usize);
+        }
+        active
+    }
+
+    /// Groups of `block` that hold values.
+    #[inline(always)]
+    pub(super) fn filled(&self, block: usize) -> u8 {
+        // threads may see values of a step that they are not in yet, and so compute zeros in vain, but no wrong ones
+        self.filled[block].load(Relaxed)
+    }
+
+    /// Notes that `groups` of `block` hold values.
+    #[inline(always)]
+    pub(super) fn fill(&self, block: usize, groups: u8) {
+        self.filled[block].fetch_or(groups, Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::PointGraph;
+    use proptest::prelude::*;
+    use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+
+    /// A graph in which each row has edges from itself and from the two rows `reaches` away from it.
+    fn graph(rows: usize, reaches: &[usize]) -> PointGraph {
+        let columns = (0..rows).flat_map(|i| {
+            let reach = reaches[i % reaches.len()];
+            [i, (i + reach) % rows, (i + rows - reach % rows) % rows].map(|j| j as u32)
+        });
+        let offsets = (0..=rows).map(|i| 3 * i).collect();
+        PointGraph::from_csr(offsets, columns.collect(), vec![0.25; 3 * rows]).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn every_tile_takes_every_step_once_all_next_to_it_are_ready(
+            rows in 1_usize..6000,
+            reaches in proptest::collection::vec(prop_oneof![0_usize..80, 0_usize..6000], 1..40),
+            region in 1_usize..20,
+            steps in 0_usize..30,
+        ) {
+            let schedule = Schedule::in_regions(&graph(rows, &reaches), region);
+            let count = rows.div_ceil(TILE);
+            let edges = schedule.tile_edges();
+            let taken: Vec<AtomicUsize> = (0..count).map(|_| AtomicUsize::new(0)).collect();
+            let violations = AtomicUsize::new(0);
+            schedule.run(steps, |rows, step| {
+                let tile = rows.start / TILE;
+                let of_tile = edges.iter().filter(|edge| edge.contains(&(tile as u32)));
+                let ready = of_tile.flatten().all(|&other| {
+                    // this step at most: it may be about to take it, or have taken it
+                    [step, step + 1].contains(&taken[other as usize].load(SeqCst))
+                });
+                if !ready || taken[tile].fetch_add(1, SeqCst) != step {
+                    violations.fetch_add(1, SeqCst);
+                }
+            });
+            prop_assert_eq!(violations.into_inner(), 0);
+            prop_assert!(taken.into_iter().all(|taken| taken.into_inner() == steps));
+        }
+    }
+
+    #[test]
+    fn a_large_cloud_is_divided_and_most_of_a_region_takes_all_steps_of_a_round_at_once() {
+        let rows = 4 * REGION * TILE;
+        let schedule = Schedule::new(&graph(rows, &[1]));
+        assert_eq!(
+            (schedule.round, schedule.offsets.len() - 1),
+            (ROUND, 4 * ROUND)
+        );
+        let last = schedule.offsets.windows(2).nth(ROUND - 1).unwrap();
+        assert!(last[1] - last[0] > REGION / 2);
+    }
+}
