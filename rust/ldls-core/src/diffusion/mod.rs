@@ -20,16 +20,21 @@ pub use products::Products;
 
 use self::pass::Pass;
 use self::products::check;
-use self::schedule::Schedule;
+use self::schedule::{ROWS_A_TASK, Schedule};
 use self::seeds::{Seeds, plan};
 use self::series::Series;
-use self::sweep::{Sweep, WIDTH_F32, WIDTH_F64};
-use self::winners::{Best, ROWS_A_TASK};
+use self::sweep::{WIDTH_F32, WIDTH_F64};
+use self::winners::Best;
 use crate::Real;
 use crate::Result;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use rayon::prelude::*;
+
+/// Share of the largest likelihood that a series in single precision may leave out.
+const TOLERANCE_F32: f64 = 1e-7;
+/// The same in double precision.
+const TOLERANCE_F64: f64 = 1e-13;
 
 /// The winning label of every point.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,17 +110,20 @@ pub fn likelihoods(
 }
 
 /// Calls `done` with each pass over the graph that `labels` take.
-fn for_each_pass<T: Sweep<WIDTH>, const WIDTH: usize>(
+fn for_each_pass<T: Real, const WIDTH: usize>(
     a: &PointGraph<T>,
     b: &PixelLabels<T>,
     labels: &[u32],
     iterations: Option<usize>,
     mut done: impl FnMut(&Pass<T, WIDTH>),
 ) -> Convergence {
-    let mut series = Series::of_graph(a, iterations, T::TOLERANCE);
+    // in single precision, a probe shows how large the terms left out may be
+    let probed = WIDTH == WIDTH_F32;
+    let tolerance = if probed { TOLERANCE_F32 } else { TOLERANCE_F64 };
+    let mut series = Series::of_graph(a, iterations, tolerance);
     let schedule = Schedule::new(a);
     let mut convergence = Convergence::default();
-    for lanes in plan(b, labels, WIDTH, T::PROBED) {
+    for lanes in plan(b, labels, WIDTH, probed) {
         let seeds = Seeds::new(b, lanes);
         let mut pass = Pass::run(a, &schedule, &seeds, series.as_ref(), iterations);
         if series.is_some() && !pass.is_sound(largest_overlap(b)) {

@@ -1,10 +1,10 @@
 //! One pass over the graph: the values of some labels at all points.
 
 use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
-use super::schedule::{Activity, Schedule};
+use super::schedule::{Activity, ROWS_A_TASK, Schedule};
 use super::seeds::{BACKGROUND_LANE, Seeds};
 use super::series::Series;
-use super::sweep::{Step, Sweep};
+use super::sweep::{Step, sweep};
 use super::values::{SharedValues, zeros};
 use crate::Real;
 use crate::graph::PointGraph;
@@ -14,8 +14,6 @@ use rayon::prelude::*;
 const LARGEST_ERROR: f64 = 1e-3;
 /// How far likelihoods may leave [0, 1], and their sum what the seeds allow.
 const SLACK: f64 = 1e-3;
-/// Rows handled by one task of the thread pool.
-const ROWS_A_TASK: usize = 2048;
 
 /// The values of the lanes of one pass at all points, and how far they have come.
 pub(super) struct Pass<'a, T, const WIDTH: usize> {
@@ -30,7 +28,7 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     pub(super) convergence: Convergence,
 }
 
-impl<'a, T: Sweep<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
+impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
     /// Runs `iterations` products, endlessly many for `None`, or the `series` that stands for them.
     pub(super) fn run(
         a: &'a PointGraph<T>,
@@ -117,7 +115,7 @@ impl<'a, T: Sweep<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             // SAFETY: nobody else is in these rows, and what they have edges from lies in them or in tiles next to
             // them, which neither are behind `step`, so have its z, nor ahead of the step after it, so have not lost it
             unsafe {
-                T::sweep(
+                sweep(
                     self.a,
                     self.seeds,
                     steps[step],

@@ -5,13 +5,11 @@
 //! in which likelihoods are handed out.
 
 use super::convergence::{CONVERGED, MOST_SWEEPS};
+use super::schedule::ROWS_A_TASK;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::{Error, Real, Result};
 use rayon::prelude::*;
-
-/// Rows handled by one task of the thread pool.
-const ROWS_A_TASK: usize = 1024;
 
 /// A diffusion that is run some products at a time.
 #[derive(Debug, Clone)]

@@ -13,6 +13,8 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
 
+/// Fewest rows for a task of the thread pool.
+pub(super) const ROWS_A_TASK: usize = 2048;
 /// Rows of a block.
 pub(super) const BLOCK: usize = 16;
 /// Rows of a tile.

@@ -1,6 +1,6 @@
 //! The seeds of the labels that share a pass over the graph, by the lane of each label.
 
-use super::schedule::BLOCK;
+use super::schedule::{BLOCK, ROWS_A_TASK};
 use crate::Real;
 use crate::masks::PixelLabels;
 use rayon::prelude::*;
@@ -14,8 +14,6 @@ const MOST_GROUPS_OF_MANY: usize = 3;
 const MANY_POINTS: usize = 1 << 20;
 /// Lane of the background in the pass that has it.
 pub(super) const BACKGROUND_LANE: usize = 0;
-/// Rows handled by one task of the thread pool.
-const ROWS_A_TASK: usize = 4096;
 
 /// The label of each lane of each pass over the graph; `None` is the lane of the probe.
 ///

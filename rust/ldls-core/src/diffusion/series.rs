@@ -5,13 +5,11 @@
 //! interval comes as near to p(A) b with far fewer products.
 
 use super::convergence::MOST_SWEEPS;
+use super::schedule::ROWS_A_TASK;
 use crate::Real;
 use crate::graph::PointGraph;
 use rayon::prelude::*;
 use std::f64::consts::PI;
-
-/// Rows handled by one task of the thread pool.
-const ROWS_A_TASK: usize = 2048;
 
 /// `c_0 T_0 + c_1 T_1 + ...` on an interval.
 #[derive(Debug, Clone, PartialEq)]

@@ -25,97 +25,15 @@ pub(super) struct Step<T> {
     pub(super) back: T,
 }
 
-/// A precision for which sweeps are compiled, with so many lanes a group.
-pub(super) trait Sweep<const WIDTH: usize>: Real {
-    /// Share of the largest likelihood that a series may leave out.
-    const TOLERANCE: f64;
-    /// True if a probe shows how large the terms left out may be.
-    const PROBED: bool;
-
-    /// Computes the active groups of `rows`, which are whole blocks, of `next` from `z`.
-    ///
-    /// # Safety
-    /// Meanwhile nobody else touches `rows` of `next` or writes `rows` of `z`, or a row of `z` that `rows` have an edge
-    /// from.
-    #[expect(unsafe_code, reason = "threads share values by rows")]
-    unsafe fn sweep(
-        a: &PointGraph<Self>,
-        seeds: &Seeds<Self>,
-        step: Step<Self>,
-        activity: &Activity,
-        values: [&SharedValues<Self, WIDTH>; 2],
-        rows: Range<usize>,
-    );
-}
-
-#[expect(unsafe_code, reason = "threads share values by rows")]
-impl Sweep<WIDTH_F32> for f32 {
-    const TOLERANCE: f64 = 1e-7;
-    const PROBED: bool = true;
-
-    unsafe fn sweep(
-        a: &PointGraph<Self>,
-        seeds: &Seeds<Self>,
-        step: Step<Self>,
-        activity: &Activity,
-        values: [&SharedValues<Self, WIDTH_F32>; 2],
-        rows: Range<usize>,
-    ) {
-        // SAFETY: as the caller promises
-        unsafe { sweep_f32(a, seeds, step, activity, values, rows) };
-    }
-}
-
-#[expect(unsafe_code, reason = "threads share values by rows")]
-impl Sweep<WIDTH_F64> for f64 {
-    const TOLERANCE: f64 = 1e-13;
-    const PROBED: bool = false;
-
-    unsafe fn sweep(
-        a: &PointGraph<Self>,
-        seeds: &Seeds<Self>,
-        step: Step<Self>,
-        activity: &Activity,
-        values: [&SharedValues<Self, WIDTH_F64>; 2],
-        rows: Range<usize>,
-    ) {
-        // SAFETY: as the caller promises
-        unsafe { sweep_f64(a, seeds, step, activity, values, rows) };
-    }
-}
-
+/// Computes the active groups of the rows in `all`, which are whole blocks, of the second values from the first.
+///
+/// # Safety
+/// Meanwhile nobody else touches these rows of the second values, or writes a row of the first that lies in `all` or that
+/// a row in `all` has an edge from.
 // without fused multiply-add, which is not faster here, results are the same bits on every processor
 #[multiversion(targets("x86_64+avx2"))]
 #[expect(unsafe_code, reason = "threads share values by rows")]
-unsafe fn sweep_f32(
-    a: &PointGraph<f32>,
-    seeds: &Seeds<f32>,
-    step: Step<f32>,
-    activity: &Activity,
-    values: [&SharedValues<f32, WIDTH_F32>; 2],
-    rows: Range<usize>,
-) {
-    // SAFETY: as the caller promises
-    unsafe { sweep_blocks(a, seeds, step, activity, values, rows) };
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-#[expect(unsafe_code, reason = "threads share values by rows")]
-unsafe fn sweep_f64(
-    a: &PointGraph<f64>,
-    seeds: &Seeds<f64>,
-    step: Step<f64>,
-    activity: &Activity,
-    values: [&SharedValues<f64, WIDTH_F64>; 2],
-    rows: Range<usize>,
-) {
-    // SAFETY: as the caller promises
-    unsafe { sweep_blocks(a, seeds, step, activity, values, rows) };
-}
-
-#[inline(always)]
-#[expect(unsafe_code, reason = "threads share values by rows")]
-unsafe fn sweep_blocks<T: Real, const WIDTH: usize>(
+pub(super) unsafe fn sweep<T: Real, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,
@@ -131,34 +49,21 @@ unsafe fn sweep_blocks<T: Real, const WIDTH: usize>(
         while let Some(group) = groups.next() {
             let background = group == BACKGROUND_LANE / WIDTH;
             // two groups at a time share what they read of the graph
+            let pair = groups.next().map(|other| [group, other]);
             // SAFETY: as the caller promises; groups differ
             unsafe {
-                match (groups.next(), background) {
-                    (Some(other), true) => {
-                        step_groups::<T, WIDTH, 2, true>(
-                            a,
-                            seeds,
-                            step,
-                            [group, other],
-                            values,
-                            &rows,
-                        );
+                match (pair, background) {
+                    (Some(pair), true) => {
+                        step_rows::<_, _, 2, true>(a, seeds, step, pair, values, &rows);
                     }
-                    (Some(other), false) => {
-                        step_groups::<T, WIDTH, 2, false>(
-                            a,
-                            seeds,
-                            step,
-                            [group, other],
-                            values,
-                            &rows,
-                        );
+                    (Some(pair), false) => {
+                        step_rows::<_, _, 2, false>(a, seeds, step, pair, values, &rows);
                     }
                     (None, true) => {
-                        step_groups::<T, WIDTH, 1, true>(a, seeds, step, [group], values, &rows);
+                        step_rows::<_, _, 1, true>(a, seeds, step, [group], values, &rows);
                     }
                     (None, false) => {
-                        step_groups::<T, WIDTH, 1, false>(a, seeds, step, [group], values, &rows);
+                        step_rows::<_, _, 1, false>(a, seeds, step, [group], values, &rows);
                     }
                 }
             }
@@ -186,10 +91,10 @@ fn in_use<T: Real, const WIDTH: usize>(rows: &[[T; WIDTH]]) -> bool {
 /// Computes `GROUPS` different groups of `rows`; the background lies in the first, if `BACKGROUND`.
 ///
 /// # Safety
-/// As of [`Sweep::sweep`].
+/// As of [`sweep`].
 #[inline(always)]
 #[expect(unsafe_code, reason = "threads share values by rows")]
-unsafe fn step_groups<T: Real, const WIDTH: usize, const GROUPS: usize, const BACKGROUND: bool>(
+unsafe fn step_rows<T: Real, const WIDTH: usize, const GROUPS: usize, const BACKGROUND: bool>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,

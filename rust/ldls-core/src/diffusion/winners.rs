@@ -1,13 +1,11 @@
 //! The label that wins at each point, and the points at which single precision cannot decide.
 
 use super::pass::Pass;
-use super::sweep::Sweep;
+use super::schedule::ROWS_A_TASK;
 use rayon::prelude::*;
 
 /// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
 const ROUNDING: f32 = 2.5e-5;
-/// Rows handled by one task of the thread pool.
-pub(super) const ROWS_A_TASK: usize = 2048;
 
 /// The best labels of a point so far.
 #[derive(Debug, Clone, Copy, Default)]
@@ -55,10 +53,7 @@ impl Best {
 }
 
 /// Offers the values of a pass to the best labels of all points.
-pub(super) fn update<const WIDTH: usize>(best: &mut [Best], pass: &Pass<f32, WIDTH>)
-where
-    f32: Sweep<WIDTH>,
-{
+pub(super) fn update<const WIDTH: usize>(best: &mut [Best], pass: &Pass<f32, WIDTH>) {
     let labels: Vec<_> = pass.labels().collect();
     let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
     points.for_each(|(i, best)| {
@@ -91,9 +86,7 @@ pub(super) fn refine<const WIDTH: usize>(
     points: &[u32],
     refined: &mut [(u32, f64)],
     pass: &Pass<f64, WIDTH>,
-) where
-    f64: Sweep<WIDTH>,
-{
+) {
     for (&point, best) in points.iter().zip(refined) {
         for (label, group, lane) in pass.labels() {
             let value = group[point as usize][lane];
