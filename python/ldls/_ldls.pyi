@@ -28,7 +28,6 @@ __all__ = [
     "point_graph",
     "project",
     "segment",
-    "segment_ring",
 ]
 
 __version__: str
@@ -100,21 +99,15 @@ class SegmentationArrays:
     @property
     def in_view(self) -> NDArray[np.int64]: ...
     @property
-    def pixels(self) -> NDArray[np.float64]: ...
+    def sightings(self) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]: ...
+    @property
+    def objects(self) -> list[list[tuple[int, int]]]: ...
     @property
     def report(self) -> dict[str, Any]: ...
     @property
     def timings(self) -> dict[str, float]: ...
 
 def segment(
-    points: _Points,
-    masks: Masks,
-    camera: Camera,
-    params: _Params,
-    keep_origin: bool,
-    threads: int | None,
-) -> SegmentationArrays: ...
-def segment_ring(
     points: _Points,
     masks: list[Masks],
     categories: list[list[int]],
@@ -123,7 +116,7 @@ def segment_ring(
     params: _Params,
     keep_origin: bool,
     threads: int | None,
-) -> tuple[SegmentationArrays, list[tuple[NDArray[np.int64], NDArray[np.float64]]], list[list[tuple[int, int]]]]: ...
+) -> SegmentationArrays: ...
 def check_params(params: _Params, threads: int | None) -> None: ...
 def default_threads() -> int: ...
 def panic_in_worker() -> None: ...

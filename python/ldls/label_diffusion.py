@@ -155,44 +155,7 @@ def _segment(
     _check_nonfinite(cloud, nonfinite)
     if not 0 < same_object <= 1:
         raise ParameterError(f"same_object: got {same_object!r}, expected more than 0 and at most 1")
-    if len(views) == 1:
-        arrays, seen, instances = _one_camera(cloud, views[0], params, keep_origin)
-    else:
-        arrays, seen, instances = _ring(cloud, views, params, keep_origin, same_object)
-    _warn(cloud, arrays.report)
-    return Segmentation(
-        labels=arrays.labels,
-        diffused_labels=arrays.diffused_labels,
-        confidence=arrays.confidence,
-        in_view=arrays.in_view,
-        instances=instances,
-        views=seen,
-        report=_report(arrays, views, instances),
-        timings=arrays.timings,
-        points=cloud,
-        params=params,
-    )
-
-
-_Outcome = tuple[_ldls.SegmentationArrays, tuple[SeenView, ...], tuple[Instance, ...]]
-
-
-def _one_camera(cloud: Points, view: View, params: Params, keep_origin: bool) -> _Outcome:
-    arrays = _ldls.segment(cloud, view.masks.core, view.camera.core, params.as_tuple(), keep_origin, params.threads)
-    labels = np.arange(1, len(view.masks) + 1, dtype=np.int32)
-    seen = SeenView(view=view, in_view=arrays.in_view, pixels=arrays.pixels, labels=labels)
-    instances = tuple(_instance(label, [(0, label - 1)], (view,)) for label in labels.tolist())
-    return arrays, (seen,), instances
-
-
-def _ring(
-    cloud: Points,
-    views: tuple[View, ...],
-    params: Params,
-    keep_origin: bool,
-    same_object: float,
-) -> _Outcome:
-    arrays, sightings, objects = _ldls.segment_ring(
+    arrays = _ldls.segment(
         cloud,
         [view.masks.core for view in views],
         [view.masks.categories.tolist() for view in views],
@@ -202,30 +165,49 @@ def _ring(
         keep_origin,
         params.threads,
     )
-    sources = [[(number, mask - 1) for number, mask in parts] for parts in objects]
-    instances = tuple(_instance(label, parts, views) for label, parts in enumerate(sources, start=1))
+    instances = tuple(_instance(label, parts, views) for label, parts in enumerate(arrays.objects, start=1))
+    _warn(cloud, arrays.report)
+    return Segmentation(
+        labels=arrays.labels,
+        diffused_labels=arrays.diffused_labels,
+        confidence=arrays.confidence,
+        in_view=arrays.in_view,
+        instances=instances,
+        views=_seen(views, arrays.sightings, instances),
+        report=_report(arrays, views, instances),
+        timings=arrays.timings,
+        points=cloud,
+        params=params,
+    )
+
+
+def _instance(label: int, parts: Sequence[tuple[int, int]], views: tuple[View, ...]) -> Instance:
+    """Return the instance that the core's parts, numbers of a view and of a mask from 1, are one object of."""
+    sources = tuple((number, mask - 1) for number, mask in parts)
+    number, first = sources[0]
+    masks = views[number].masks
+    category = int(masks.categories[first])
+    return Instance(
+        label=label,
+        category=category,
+        name=masks.names[category],
+        score=max(float(views[number].masks.scores[mask]) for number, mask in sources),
+        sources=sources,
+    )
+
+
+def _seen(
+    views: tuple[View, ...],
+    sightings: Sequence[tuple[NDArray[np.int64], NDArray[np.float64]]],
+    instances: tuple[Instance, ...],
+) -> tuple[SeenView, ...]:
     labels = [np.zeros(len(view.masks), np.int32) for view in views]
     for instance in instances:
         for number, mask in instance.sources:
             labels[number][mask] = instance.label
-    seen = tuple(
-        SeenView(view=view, in_view=arrays.in_view[at], pixels=pixels, labels=own)
-        for view, (at, pixels), own in zip(views, sightings, labels, strict=True)
-    )
-    return arrays, seen, instances
-
-
-def _instance(label: int, sources: Sequence[tuple[int, int]], views: tuple[View, ...]) -> Instance:
-    masks = [views[number].masks for number, _ in sources]
-    number, first = sources[0]
-    category = int(views[number].masks.categories[first])
-    scores = (float(own.scores[mask]) for own, (_, mask) in zip(masks, sources, strict=True))
-    return Instance(
-        label=label,
-        category=category,
-        name=masks[0].names[category],
-        score=max(scores),
-        sources=tuple(sources),
+    return tuple(
+        SeenView(view=view, in_view=rows, pixels=pixels, labels=own)
+        for view, (rows, pixels), own in zip(views, sightings, labels, strict=True)
     )
 
 

@@ -2,8 +2,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use ldls_core::{
-    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, diffuse,
-    keep_largest_components, segment,
+    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, View, diffuse,
+    keep_largest_components, project, segment,
 };
 use std::hint::black_box;
 
@@ -58,23 +58,30 @@ fn masks() -> InstanceMasks {
 
 fn stages(criterion: &mut Criterion) {
     let (camera, masks, params) = (camera(), masks(), Params::paper());
+    let view = View {
+        masks: &masks,
+        categories: &[0; INSTANCES],
+        camera: &camera,
+    };
     for n in SIZES {
         let values = street(n);
         let cloud = Cloud::F32 {
             values: &values,
             columns: 3,
         };
-        let view = camera.view(cloud, HEIGHT, WIDTH, false).expect("a view");
+        let images = [(&camera, [HEIGHT, WIDTH])];
+        let in_view = project(cloud, &images, false).expect("points in view");
+        let (points, uv) = (&in_view.points, &in_view.sightings[0].uv);
         let mut labels = masks
-            .pixel_labels(&view.uv, params.window, params.pixel_weight)
+            .pixel_labels(uv, params.window, params.pixel_weight)
             .expect("labels");
-        let neighbors = Neighbors::search(&view.points, params.neighbors);
-        let mut graph = PointGraph::<f32>::from_neighbors(&view.points, &neighbors, params.sigma)
-            .expect("a graph");
+        let neighbors = Neighbors::search(points, params.neighbors);
+        let mut graph =
+            PointGraph::<f32>::from_neighbors(points, &neighbors, params.sigma).expect("a graph");
         graph.normalize_rows(&mut labels).expect("rows");
         let exact = || {
-            let mut a = PointGraph::<f64>::from_neighbors(&view.points, &neighbors, params.sigma)?;
-            let mut b = masks.pixel_labels(&view.uv, params.window, params.pixel_weight)?;
+            let mut a = PointGraph::<f64>::from_neighbors(points, &neighbors, params.sigma)?;
+            let mut b = masks.pixel_labels(uv, params.window, params.pixel_weight)?;
             a.normalize_rows(&mut b)?;
             Ok((a, b))
         };
@@ -83,23 +90,21 @@ fn stages(criterion: &mut Criterion) {
 
         let mut group = criterion.benchmark_group("stage");
         group
-            .throughput(Throughput::Elements(view.points.len() as u64))
+            .throughput(Throughput::Elements(points.len() as u64))
             .sample_size(10);
         group.bench_function(BenchmarkId::new("project", n), |b| {
-            b.iter(|| black_box(camera.view(cloud, HEIGHT, WIDTH, false)));
+            b.iter(|| black_box(project(cloud, &images, false)));
         });
         group.bench_function(BenchmarkId::new("pixel labels", n), |b| {
-            b.iter(|| {
-                black_box(masks.pixel_labels::<f32>(&view.uv, params.window, params.pixel_weight))
-            });
+            b.iter(|| black_box(masks.pixel_labels::<f32>(uv, params.window, params.pixel_weight)));
         });
         group.bench_function(BenchmarkId::new("neighbors", n), |b| {
-            b.iter(|| black_box(Neighbors::search(&view.points, params.neighbors)));
+            b.iter(|| black_box(Neighbors::search(points, params.neighbors)));
         });
         group.bench_function(BenchmarkId::new("graph", n), |b| {
             b.iter(|| {
                 black_box(PointGraph::<f32>::from_neighbors(
-                    &view.points,
+                    points,
                     &neighbors,
                     params.sigma,
                 ))
@@ -120,7 +125,7 @@ fn stages(criterion: &mut Criterion) {
             b.iter(|| black_box(keep_largest_components(&graph, &diffused.labels)));
         });
         group.bench_function(BenchmarkId::new("whole frame", n), |b| {
-            b.iter(|| black_box(segment(cloud, &masks, &camera, &params, false)));
+            b.iter(|| black_box(segment(cloud, &[view], 0.5, &params, false)));
         });
         group.finish();
     }

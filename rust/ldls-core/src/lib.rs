@@ -15,6 +15,7 @@ mod neighbors;
 mod params;
 mod projection;
 mod real;
+mod report;
 mod ring;
 mod segment;
 #[cfg(test)]
@@ -26,10 +27,11 @@ pub use graph::{PointGraph, keep_largest_components};
 pub use masks::{InstanceMasks, PixelLabels, Rle};
 pub use neighbors::Neighbors;
 pub use params::Params;
-pub use projection::{Camera, Cloud, Distortion, View, ViewCounts};
+pub use projection::{Camera, Cloud, Counts, Distortion, InView, Sighting, project};
 pub use real::Real;
-pub use ring::{RingSegmentation, RingView, Sighting, segment_ring};
-pub use segment::{Report, Segmentation, Timings, segment};
+pub use report::{Report, Timings};
+pub use ring::{Objects, View};
+pub use segment::{Segmentation, segment};
 
 /// Result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;

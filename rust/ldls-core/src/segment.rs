@@ -1,14 +1,15 @@
-//! The method on one screen: points, masks and a camera in, one label a point out.
+//! The method on one screen: points, masks and cameras in, one label a point out.
 
-use crate::diffusion::{Convergence, diffuse};
+use crate::diffusion::diffuse;
 use crate::graph::{PointGraph, keep_largest_by_index};
-use crate::masks::{InstanceMasks, PixelLabels};
-use crate::neighbors::{Adjacency, KdTree, arrange};
-use crate::projection::{Camera, Cloud, View, ViewCounts};
+use crate::masks::PixelLabels;
+use crate::neighbors::{Adjacency, arrange};
+use crate::projection::{Cloud, Sighting};
+use crate::report::{Report, Timings, timed};
+use crate::ring::{Images, Objects, View};
 use crate::{Error, Params, Real, Result};
-use std::time::{Duration, Instant};
 
-/// Label of points that the image does not see.
+/// Label of points that no image sees.
 const OUT_OF_VIEW: i32 = -1;
 /// Most edges of a graph: what 32 bits index.
 const MAX_EDGES: u64 = u32::MAX as u64;
@@ -16,177 +17,80 @@ const MAX_EDGES: u64 = u32::MAX as u64;
 /// Labels of all points of a cloud.
 #[derive(Debug, Clone)]
 pub struct Segmentation {
-    /// Label of every point: -1 out of view, 0 background, m instance m.
+    /// Label of every point: -1 out of view, 0 background, l object l.
     pub labels: Vec<i32>,
-    /// The same before outlier removal.
+    /// Labels before outlier removal.
     pub diffused_labels: Vec<i32>,
     /// Share of the winner in the values of all labels at a point; 0 out of view.
     pub confidence: Vec<f32>,
-    /// Points in view: their rows, coordinates and pixels.
-    pub view: View,
-    /// What was noticed on the way.
+    /// Rows of the points in view, ascending.
+    pub in_view: Vec<u32>,
+    /// The points in view that each image sees.
+    pub sightings: Vec<Sighting>,
+    /// The objects that labels stand for; those of a single image are its instances.
+    pub objects: Objects,
+    /// Findings about the input and the run.
     pub report: Report,
-    /// How long each step took.
+    /// Time of each step.
     pub timings: Timings,
 }
 
-/// What a caller should know about the input and the run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Report {
-    /// Points left out, and why.
-    pub counts: ViewCounts,
-    /// Points in view that share their place with another one in view.
-    pub duplicates: usize,
-    /// Whether every point has more than K copies, so that the graph falls into islands.
-    pub only_islands: bool,
-    /// Neighbours a point really has.
-    pub k_effective: usize,
-    /// How far the diffusion came.
-    pub convergence: Convergence,
-}
-
-/// Time of each step.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Timings {
-    /// Projection to pixels.
-    pub project: Duration,
-    /// K nearest neighbours, and the order of their tree.
-    pub neighbors: Duration,
-    /// Labels of the pixels around each point.
-    pub pixel_labels: Duration,
-    /// Point graph and row sums.
-    pub graph: Duration,
-    /// Diffusion and argmax.
-    pub diffusion: Duration,
-    /// Outlier removal.
-    pub components: Duration,
-}
-
-/// Segments `cloud` by the instance masks of the image that `camera` took.
+/// Segments `cloud` by the instance masks of the images that one camera or several took at one moment.
 ///
-/// Points at exactly (0, 0, 0) are taken for missing returns unless `keep_origin` is set.
+/// Instances of two images become one object if, of the points that both see and that fall on one of the two masks, at
+/// least the share `same_object` falls on both. Points at exactly (0, 0, 0) are taken for missing returns unless
+/// `keep_origin` is set.
 ///
 /// # Errors
-/// Whatever [`Params::check`] and [`Camera::view`] refuse, and [`Error::TooManyPoints`].
+/// Whatever [`Params::check`] and [`crate::project`] refuse, [`Error::TooManyPoints`], and [`Error::Mismatch`] where a view has
+/// not one category a mask.
 pub fn segment(
     cloud: Cloud,
-    masks: &InstanceMasks,
-    camera: &Camera,
+    views: &[View],
+    same_object: f64,
     params: &Params,
     keep_origin: bool,
 ) -> Result<Segmentation> {
+    check(cloud, views, params)?;
+    let mut t = Timings::default();
+    let (in_view, images) = timed(&mut t.project, || {
+        Images::project(cloud, views, same_object, keep_origin)
+    })?;
+    let k = params.neighbors;
+    let nearest = timed(&mut t.neighbors, || Adjacency::search(in_view.points, k));
+    let order = &nearest.order;
+    let pixels = timed(&mut t.pixel_labels, || images.pixel_labels(order, params))?;
+    let (a, b) = timed(&mut t.graph, || normalize(&nearest, pixels, params))?;
+    let exact = || normalize(&nearest, images.pixel_labels(order, params)?, params);
+    let diffused = timed(&mut t.diffusion, || {
+        diffuse(&a, &b, images.n_labels(), params.iterations, exact)
+    })?;
+    let kept = timed(&mut t.components, || {
+        remove_outliers(&a, &diffused.labels, order, params)
+    })?;
+
+    // back to the rows of the cloud
+    let rows = arrange(order, &in_view.indices);
+    Ok(Segmentation {
+        labels: labels_of_cloud(cloud.len(), &rows, &kept),
+        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels),
+        confidence: scatter(cloud.len(), &rows, 0.0, diffused.confidence),
+        report: Report::new(in_view.counts, &nearest, diffused.convergence),
+        in_view: in_view.indices,
+        sightings: images.sightings,
+        objects: images.objects,
+        timings: t,
+    })
+}
+
+/// Refuses parameters out of range, clouds too large and views without categories.
+fn check(cloud: Cloud, views: &[View], params: &Params) -> Result<()> {
     params.check()?;
     check_edges(cloud.len(), params.neighbors)?;
-    let clock = Stopwatch::start();
-    let mut view = camera.view(cloud, masks.height(), masks.width(), keep_origin)?;
-    let uv = std::mem::take(&mut view.uv);
-    let seeds = OneImage { masks, uv: &uv };
-    let mut segmentation = label_points(cloud.len(), view, &seeds, params, clock)?;
-    segmentation.view.uv = uv;
-    Ok(segmentation)
+    views.iter().try_for_each(View::check)
 }
 
-/// The pixel edges of the points in view, from which labels spread.
-pub(crate) trait Seeds: Sync {
-    /// Number of labels, the background counted.
-    fn labels(&self) -> usize;
-
-    /// The pixel edges of the points in `order`.
-    fn pixel_labels<T: Real>(&self, order: &[u32], params: &Params) -> Result<PixelLabels<T>>;
-}
-
-/// The pixels of one image, and where each point in view falls on it.
-struct OneImage<'a> {
-    masks: &'a InstanceMasks,
-    uv: &'a [[f64; 2]],
-}
-
-impl Seeds for OneImage<'_> {
-    fn labels(&self) -> usize {
-        self.masks.len() + 1
-    }
-
-    fn pixel_labels<T: Real>(&self, order: &[u32], params: &Params) -> Result<PixelLabels<T>> {
-        let uv = arrange(order, self.uv);
-        let labels = self
-            .masks
-            .pixel_labels(&uv, params.window, params.pixel_weight)?;
-        Ok(labels)
-    }
-}
-
-/// Labels the points of `view`, of a cloud of `n` points; `clock` has run since the call began.
-pub(crate) fn label_points(
-    n: usize,
-    mut view: View,
-    seeds: &impl Seeds,
-    params: &Params,
-    mut clock: Stopwatch,
-) -> Result<Segmentation> {
-    let project = clock.lap();
-    // from here on, rows are in the order of the tree: near points are near in memory
-    let tree = KdTree::new(&view.points);
-    let points = arrange(&tree.order, &std::mem::take(&mut view.points));
-    let adjacency = Adjacency::search(&tree, &points, params.neighbors);
-    let order = tree.into_order();
-    let neighbors = clock.lap();
-    let pixels = seeds.pixel_labels(&order, params)?;
-    let pixel_labels = clock.lap();
-    let (a, b) = normalized_graph::<f32>(&points, &adjacency, pixels, params)?;
-    let graph = clock.lap();
-    let exact = || {
-        let pixels = seeds.pixel_labels(&order, params)?;
-        normalized_graph::<f64>(&points, &adjacency, pixels, params)
-    };
-    let diffused = diffuse(&a, &b, seeds.labels(), params.iterations, exact)?;
-    let diffusion = clock.lap();
-    let kept = if params.remove_outliers {
-        Some(keep_largest_by_index(&a, &diffused.labels, &order)?)
-    } else {
-        None
-    };
-    let components = clock.lap();
-
-    let rows = arrange(&order, &view.indices);
-    let whole_cloud =
-        |labels: &[u32]| scatter(n, &rows, OUT_OF_VIEW, labels.iter().map(|&m| m as i32));
-    let segmentation = Segmentation {
-        labels: whole_cloud(kept.as_ref().unwrap_or(&diffused.labels)),
-        diffused_labels: whole_cloud(&diffused.labels),
-        confidence: scatter(n, &rows, 0.0, diffused.confidence.iter().copied()),
-        report: Report {
-            counts: view.counts,
-            duplicates: adjacency.duplicates(&points),
-            only_islands: adjacency.only_islands(&points),
-            k_effective: adjacency.degree - 1,
-            convergence: diffused.convergence,
-        },
-        timings: Timings {
-            project,
-            neighbors,
-            pixel_labels,
-            graph,
-            diffusion,
-            components,
-        },
-        view,
-    };
-    Ok(segmentation)
-}
-
-/// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
-fn normalized_graph<T: Real>(
-    points: &[[f64; 3]],
-    adjacency: &Adjacency,
-    mut pixels: PixelLabels<T>,
-    params: &Params,
-) -> Result<(PointGraph<T>, PixelLabels<T>)> {
-    let mut graph = PointGraph::from_adjacency(points, adjacency, params.sigma);
-    graph.normalize_rows(&mut pixels)?;
-    Ok((graph, pixels))
-}
-
-pub(crate) fn check_edges(points: usize, neighbors: usize) -> Result<()> {
+fn check_edges(points: usize, neighbors: usize) -> Result<()> {
     if (points as u64).saturating_mul(neighbors as u64 + 1) <= MAX_EDGES {
         return Ok(());
     }
@@ -198,12 +102,41 @@ pub(crate) fn check_edges(points: usize, neighbors: usize) -> Result<()> {
     })
 }
 
-/// `values` laid out over the whole cloud, each in its row.
+/// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
+fn normalize<T: Real>(
+    nearest: &Adjacency,
+    mut b: PixelLabels<T>,
+    params: &Params,
+) -> Result<(PointGraph<T>, PixelLabels<T>)> {
+    let mut a = PointGraph::from_adjacency(nearest, params.sigma);
+    a.normalize_rows(&mut b)?;
+    Ok((a, b))
+}
+
+/// The labels of the largest component of each instance, where the parameters ask for it.
+fn remove_outliers(
+    a: &PointGraph,
+    labels: &[u32],
+    order: &[u32],
+    params: &Params,
+) -> Result<Vec<u32>> {
+    if params.remove_outliers {
+        return keep_largest_by_index(a, labels, order);
+    }
+    Ok(labels.to_vec())
+}
+
+fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32]) -> Vec<i32> {
+    let signed = labels.iter().map(|&label| label as i32);
+    scatter(n, rows, OUT_OF_VIEW, signed)
+}
+
+/// `values` laid out over a cloud of `n` points, each in its row.
 fn scatter<T: Copy>(
     n: usize,
     rows: &[u32],
     elsewhere: T,
-    values: impl Iterator<Item = T>,
+    values: impl IntoIterator<Item = T>,
 ) -> Vec<T> {
     let mut all = vec![elsewhere; n];
     for (&row, value) in rows.iter().zip(values) {
@@ -212,17 +145,42 @@ fn scatter<T: Copy>(
     all
 }
 
-/// Measures one step after the other.
-pub(crate) struct Stopwatch(Instant);
+#[cfg(test)]
+mod tests {
+    use super::{MAX_EDGES, View, check_edges};
+    use crate::test_support::{camera, looking_back, masks, segment};
 
-impl Stopwatch {
-    pub(crate) fn start() -> Self {
-        Self(Instant::now())
+    #[test]
+    fn a_graph_has_at_most_as_many_edges_as_32_bits_index() {
+        // 2^32 - 1 = 5 * 858,993,459
+        let most = (MAX_EDGES / 5) as usize;
+        assert!(check_edges(most, 4).is_ok());
+        assert!(check_edges(most + 1, 4).is_err());
+        assert!(check_edges(usize::MAX, 255).is_err());
     }
 
-    /// Time since the start or the last lap.
-    fn lap(&mut self) -> Duration {
-        let now = Instant::now();
-        now - std::mem::replace(&mut self.0, now)
+    #[test]
+    fn a_second_image_that_sees_nothing_changes_no_label() {
+        let (masks, camera) = (masks(&[[5, 5, 10, 12], [8, 20, 12, 9]]), camera(20.0));
+        let mut turned = View {
+            masks: &masks,
+            categories: &[1, 1],
+            camera: &camera,
+        };
+        let alone = segment(&[turned]);
+        let beside = looking_back();
+        turned.camera = &beside;
+        let both = segment(&[
+            View {
+                camera: &camera,
+                ..turned
+            },
+            turned,
+        ]);
+        assert_eq!(both.labels, alone.labels);
+        assert_eq!(both.confidence, alone.confidence);
+        assert_eq!(both.sightings[0], alone.sightings[0]);
+        assert_eq!(alone.objects, [[(0, 1)], [(0, 2)]]);
+        assert_eq!(alone.sightings[0].seen.len(), alone.in_view.len());
     }
 }

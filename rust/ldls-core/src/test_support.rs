@@ -1,15 +1,25 @@
-//! A wall of points before cameras whose masks are rectangles: what the tests of rings segment.
+//! A wall of points before cameras whose masks are rectangles, for the tests of several images.
 
-use crate::{Camera, Cloud, InstanceMasks, Params, RingSegmentation, RingView, Rle, segment_ring};
+use crate::{Camera, Cloud, InstanceMasks, Params, Rle, Segmentation, View};
 
 const IDENTITY: [f64; 16] = [
     1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
 ];
 
+const PROJECTION: [f64; 12] = [20., 0., 20., 0., 0., 20., 15., 0., 0., 0., 1., 0.];
+
 /// A camera whose image begins `left` pixels to the left of the axis, 40 x 30 pixels.
 pub(crate) fn camera(left: f64) -> Camera {
-    let projection = [20., 0., left, 0., 0., 20., 15., 0., 0., 0., 1., 0.];
+    let mut projection = PROJECTION;
+    projection[2] = left;
     Camera::new(&projection, &IDENTITY, 0.1).unwrap()
+}
+
+/// A camera that looks away from the wall.
+pub(crate) fn looking_back() -> Camera {
+    let mut turned = IDENTITY;
+    (turned[0], turned[10]) = (-1.0, -1.0);
+    Camera::new(&PROJECTION, &turned, 0.1).unwrap()
 }
 
 pub(crate) fn masks(rectangles: &[[usize; 4]]) -> InstanceMasks {
@@ -33,11 +43,11 @@ pub(crate) fn wall() -> Vec<f64> {
         .collect()
 }
 
-pub(crate) fn segment(views: &[RingView]) -> RingSegmentation {
+pub(crate) fn segment(views: &[View]) -> Segmentation {
     let values = wall();
     let cloud = Cloud::F64 {
         values: &values,
         columns: 3,
     };
-    segment_ring(cloud, views, 0.5, &Params::paper(), false).unwrap()
+    crate::segment(cloud, views, 0.5, &Params::paper(), false).unwrap()
 }

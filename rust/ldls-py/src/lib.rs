@@ -28,7 +28,7 @@ mod _ldls {
     #[pymodule_export]
     use crate::products::Products;
     #[pymodule_export]
-    use crate::segment::{SegmentationArrays, check_params, segment, segment_ring};
+    use crate::segment::{SegmentationArrays, check_params, segment};
     #[pymodule_export]
     use crate::stages::{
         diffuse, direct_labels, largest_components, neighbors, normalize_rows, pixel_labels,

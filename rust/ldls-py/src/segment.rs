@@ -4,7 +4,7 @@ use crate::arrays::{Points, matrix};
 use crate::call::{checked_threads, run, run_at_once};
 use crate::camera::Camera;
 use crate::masks::Masks;
-use ldls_core::{Params, RingView, Timings};
+use ldls_core::{Params, Timings, View};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -26,52 +26,31 @@ impl ParamsTuple {
     }
 }
 
-/// Everything that the core says of a cloud.
+/// The points that one image sees: rows of the cloud, and pixels.
+type SightingArrays = (Py<PyArray1<i64>>, Py<PyArray2<f64>>);
+
+/// The result of the core.
 #[pyclass(frozen, get_all, module = "ldls._ldls")]
 pub struct SegmentationArrays {
     labels: Py<PyArray1<i32>>,
     diffused_labels: Py<PyArray1<i32>>,
     confidence: Py<PyArray1<f32>>,
     in_view: Py<PyArray1<i64>>,
-    pixels: Py<PyArray2<f64>>,
+    sightings: Vec<SightingArrays>,
+    /// Image and instance, the latter from 1, of each part of each object.
+    objects: ldls_core::Objects,
     report: Py<PyDict>,
     timings: Py<PyDict>,
 }
 
-/// Segments points by the masks of the image that the camera took.
-#[pyfunction]
-#[pyo3(signature = (points, masks, camera, params, keep_origin, threads))]
-pub fn segment(
-    py: Python<'_>,
-    points: Points<'_>,
-    masks: &Masks,
-    camera: &Camera,
-    params: ParamsTuple,
-    keep_origin: bool,
-    threads: Option<usize>,
-) -> PyResult<SegmentationArrays> {
-    let cloud = points.cloud(py)?;
-    let params = params.params();
-    let mut found = run(py, threads, || {
-        ldls_core::segment(cloud, &masks.0, &camera.0, &params, keep_origin)
-    })?;
-    let pixels = matrix(py, std::mem::take(&mut found.view.uv).into_flattened(), 2)?;
-    arrays(py, found, pixels)
-}
-
-/// What each camera of a ring sees: positions among the points in view, and pixels.
-type SightingArrays = Vec<(Py<PyArray1<i64>>, Py<PyArray2<f64>>)>;
-/// Camera and instance of each part of each object.
-type ObjectParts = Vec<Vec<(usize, u32)>>;
-
-/// Segments points by the masks of the images that several cameras took.
+/// Segments points by the masks of the images that one camera or several took.
 #[pyfunction]
 #[pyo3(signature = (points, masks, categories, cameras, same_object, params, keep_origin, threads))]
 #[expect(
     clippy::too_many_arguments,
     reason = "the face in Python has few; here each is one extraction"
 )]
-pub fn segment_ring(
+pub fn segment(
     py: Python<'_>,
     points: Points<'_>,
     masks: Vec<PyRef<'_, Masks>>,
@@ -81,58 +60,35 @@ pub fn segment_ring(
     params: ParamsTuple,
     keep_origin: bool,
     threads: Option<usize>,
-) -> PyResult<(SegmentationArrays, SightingArrays, ObjectParts)> {
+) -> PyResult<SegmentationArrays> {
     let cloud = points.cloud(py)?;
     let params = params.params();
-    let views: Vec<RingView> = masks
-        .iter()
-        .zip(&categories)
-        .zip(&cameras)
-        .map(|((masks, categories), camera)| RingView {
+    let views = masks.iter().zip(&categories).zip(&cameras);
+    let views: Vec<View> = views
+        .map(|((masks, categories), camera)| View {
             masks: &masks.0,
             categories,
             camera: &camera.0,
         })
         .collect();
-    let found = run(py, threads, || {
-        ldls_core::segment_ring(cloud, &views, same_object, &params, keep_origin)
+    let segmentation = run(py, threads, || {
+        ldls_core::segment(cloud, &views, same_object, &params, keep_origin)
     })?;
-    let sightings = found
-        .sightings
-        .into_iter()
-        .map(|sighting| {
-            let seen: Vec<i64> = sighting.seen.iter().map(|&at| i64::from(at)).collect();
-            let pixels = matrix(py, sighting.uv.into_flattened(), 2)?;
-            Ok((seen.into_pyarray(py).unbind(), pixels))
-        })
-        .collect::<PyResult<SightingArrays>>()?;
-    let pixels = PyArray2::zeros(py, [0, 2], false).unbind();
-    Ok((
-        arrays(py, found.segmentation, pixels)?,
-        sightings,
-        found.objects,
-    ))
-}
-
-fn arrays(
-    py: Python<'_>,
-    found: ldls_core::Segmentation,
-    pixels: Py<PyArray2<f64>>,
-) -> PyResult<SegmentationArrays> {
-    let in_view: Vec<i64> = found
-        .view
-        .indices
-        .iter()
-        .map(|&index| i64::from(index))
-        .collect();
+    let in_view: Vec<i64> = segmentation.in_view.iter().map(|&i| i.into()).collect();
+    let sightings = segmentation.sightings.into_iter().map(|sighting| {
+        let rows = sighting.seen.iter().map(|&at| in_view[at as usize]);
+        let rows = PyArray1::from_vec(py, rows.collect()).unbind();
+        Ok((rows, matrix(py, sighting.uv.into_flattened(), 2)?))
+    });
     Ok(SegmentationArrays {
-        report: report(py, &found.report)?,
-        timings: timings(py, &found.timings)?,
-        labels: found.labels.into_pyarray(py).unbind(),
-        diffused_labels: found.diffused_labels.into_pyarray(py).unbind(),
-        confidence: found.confidence.into_pyarray(py).unbind(),
+        labels: segmentation.labels.into_pyarray(py).unbind(),
+        diffused_labels: segmentation.diffused_labels.into_pyarray(py).unbind(),
+        confidence: segmentation.confidence.into_pyarray(py).unbind(),
+        sightings: sightings.collect::<PyResult<_>>()?,
         in_view: in_view.into_pyarray(py).unbind(),
-        pixels,
+        objects: segmentation.objects,
+        report: report(py, &segmentation.report)?,
+        timings: timings(py, &segmentation.timings)?,
     })
 }
 

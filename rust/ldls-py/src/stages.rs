@@ -32,13 +32,14 @@ pub fn project(
     threads: Option<usize>,
 ) -> PyResult<ViewArrays> {
     let cloud = points.cloud(py)?;
-    let view = run(py, threads, || {
-        camera.0.view(cloud, height, width, keep_origin)
+    let mut in_view = run(py, threads, || {
+        ldls_core::project(cloud, &[(&camera.0, [height, width])], keep_origin)
     })?;
-    let indices: Vec<i64> = view.indices.iter().map(|&index| i64::from(index)).collect();
+    let indices: Vec<i64> = in_view.indices.iter().map(|&i| i.into()).collect();
+    let uv = in_view.sightings.swap_remove(0).uv;
     Ok((
         indices.into_pyarray(py).unbind(),
-        matrix(py, view.uv.into_flattened(), 2)?,
+        matrix(py, uv.into_flattened(), 2)?,
     ))
 }
 

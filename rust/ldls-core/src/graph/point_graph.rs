@@ -66,8 +66,9 @@ impl<T: Real> PointGraph<T> {
         };
         let columns = (0..n).flat_map(row).collect();
         Ok(Self::from_adjacency(
-            points,
             &Adjacency {
+                order: (0..n as u32).collect(),
+                points: points.to_vec(),
                 degree: k + 1,
                 columns: Arc::new(columns),
             },
@@ -75,8 +76,9 @@ impl<T: Real> PointGraph<T> {
         ))
     }
 
-    /// The same from rows that begin with the point itself.
-    pub(crate) fn from_adjacency(points: &[[f64; 3]], adjacency: &Adjacency, sigma: f64) -> Self {
+    /// The same graph from rows that begin with the point itself.
+    pub(crate) fn from_adjacency(adjacency: &Adjacency, sigma: f64) -> Self {
+        let points = &adjacency.points;
         let (count, degree) = (points.len(), adjacency.degree);
         let mut weights = vec![T::default(); count * degree];
         let rows = weights

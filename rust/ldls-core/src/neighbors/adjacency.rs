@@ -1,7 +1,7 @@
-//! Each point and its nearest neighbours as one row, by their positions in the order of a tree. The weights of
-//! these edges are the business of [`crate::graph`].
+//! The rows of the point graph: each point and its nearest neighbours, in an order in which near points are near in
+//! memory.
 
-use super::kdtree::{FAN, KdTree};
+use super::kdtree::{FAN, KdTree, arrange};
 use super::leaf_search::search_leaf;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -11,9 +11,13 @@ const LEAVES_A_TASK: usize = 16;
 /// Places of a list beyond the neighbours and the point itself.
 const SPARE: usize = 4;
 
-/// The points themselves and their nearest neighbours, as positions in the order of a tree.
+/// Points in the order of a tree, and the nearest neighbours of each, by their positions in that order.
 #[derive(Debug, Clone)]
 pub(crate) struct Adjacency {
+    /// Index of the point at each position.
+    pub(crate) order: Vec<u32>,
+    /// Coordinates of the points in this order, in metres.
+    pub(crate) points: Vec<[f64; 3]>,
     /// Length of a row: the neighbours and the point itself.
     pub(crate) degree: usize,
     /// Row after row, each the point itself first, then its neighbours, the nearest first.
@@ -21,8 +25,10 @@ pub(crate) struct Adjacency {
 }
 
 impl Adjacency {
-    /// The `k` nearest neighbours of `points`, which are in the order of their `tree`.
-    pub(crate) fn search(tree: &KdTree, points: &[[f64; 3]], k: usize) -> Self {
+    /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; all others where there are fewer.
+    pub(crate) fn search(points: Vec<[f64; 3]>, k: usize) -> Self {
+        let tree = KdTree::new(&points);
+        let points = arrange(&tree.order, &{ points });
         let degree = k.min(points.len().saturating_sub(1)) + 1;
         let mut columns = vec![0; points.len() * degree];
         let tasks = columns
@@ -35,39 +41,39 @@ impl Adjacency {
                     row[0] = position as u32;
                 }
                 if degree > 1 {
-                    places = search_leaf(tree, points, degree, leaf, places, rows);
+                    places = search_leaf(&tree, &points, degree, leaf, places, rows);
                 }
             }
         });
         Self {
+            order: tree.order,
+            points,
             degree,
             columns: Arc::new(columns),
         }
     }
 
-    /// Number of `points` that share their place with another one.
-    pub(crate) fn duplicates(&self, points: &[[f64; 3]]) -> usize {
-        self.coincident(points, 1)
-            .filter(|&coincident| coincident)
-            .count()
+    /// Number of points that share their place with another one.
+    pub(crate) fn duplicates(&self) -> usize {
+        self.coincident(1).filter(|&coincident| coincident).count()
     }
 
-    /// Whether all neighbours of every one of `points` share its place, so that the graph falls into islands.
-    pub(crate) fn only_islands(&self, points: &[[f64; 3]]) -> bool {
+    /// True if all neighbours of every point share its place, so that the graph falls into islands.
+    pub(crate) fn only_islands(&self) -> bool {
         self.degree > 1
             && self
-                .coincident(points, self.degree - 1)
+                .coincident(self.degree - 1)
                 .all(|coincident| coincident)
     }
 
-    /// Whether the neighbour of each point at `rank` lies where the point lies; empty where there is none.
-    fn coincident(&self, points: &[[f64; 3]], rank: usize) -> impl Iterator<Item = bool> {
+    /// For each point, true if its neighbour at `rank` lies at the same place; empty where there is none.
+    fn coincident(&self, rank: usize) -> impl Iterator<Item = bool> {
         let rows = self
             .columns
             .chunks(self.degree)
             .filter(move |row| row.len() > rank);
-        rows.zip(points)
-            .map(move |(row, point)| *point == points[row[rank] as usize])
+        rows.zip(&self.points)
+            .map(move |(row, point)| *point == self.points[row[rank] as usize])
     }
 }
 
@@ -78,9 +84,8 @@ mod tests {
     #[test]
     fn coincident_points_are_duplicates_and_islands() {
         let points = vec![[1.0, 2.0, 3.0]; 120_000];
-        let tree = KdTree::new(&points);
-        let adjacency = Adjacency::search(&tree, &points, 10);
-        assert_eq!(adjacency.duplicates(&points), 120_000);
-        assert!(adjacency.only_islands(&points));
+        let adjacency = Adjacency::search(points, 10);
+        assert_eq!(adjacency.duplicates(), 120_000);
+        assert!(adjacency.only_islands());
     }
 }

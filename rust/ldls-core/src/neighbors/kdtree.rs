@@ -76,11 +76,6 @@ impl KdTree {
         }
     }
 
-    /// The order alone.
-    pub(crate) fn into_order(self) -> Vec<u32> {
-        self.order
-    }
-
     /// Number of points.
     pub(crate) fn len(&self) -> usize {
         self.order.len()
@@ -88,7 +83,7 @@ impl KdTree {
 }
 
 /// `values` in the order of the tree.
-pub(crate) fn arrange<T: Copy + Send + Sync + 'static>(order: &[u32], values: &[T]) -> Vec<T> {
+pub(crate) fn arrange<T: Copy + Send + Sync>(order: &[u32], values: &[T]) -> Vec<T> {
     let value = |&index: &u32| values[index as usize];
     order.par_iter().with_min_len(PARALLEL).map(value).collect()
 }

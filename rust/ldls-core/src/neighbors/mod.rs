@@ -11,7 +11,7 @@ mod lone_search;
 
 pub(crate) use adjacency::Adjacency;
 pub(crate) use candidates::squared_distance;
-pub(crate) use kdtree::{KdTree, arrange};
+pub(crate) use kdtree::arrange;
 
 use rayon::prelude::*;
 
@@ -28,15 +28,14 @@ impl Neighbors {
     /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; the point itself is none
     /// of them.
     pub fn search(points: &[[f64; 3]], k: usize) -> Self {
-        let tree = KdTree::new(points);
-        let found = Adjacency::search(&tree, &arrange(&tree.order, points), k);
-        let k = found.degree - 1;
+        let adjacency = Adjacency::search(points.to_vec(), k);
+        let (order, k) = (&adjacency.order, adjacency.degree - 1);
         let mut indices = vec![0; points.len() * k];
         if k > 0 {
-            for (&index, row) in tree.order.iter().zip(found.columns.chunks(found.degree)) {
+            for (&index, row) in order.iter().zip(adjacency.columns.chunks(adjacency.degree)) {
                 let slots = &mut indices[index as usize * k..][..k];
                 for (slot, &position) in slots.iter_mut().zip(&row[1..]) {
-                    *slot = tree.order[position as usize];
+                    *slot = order[position as usize];
                 }
             }
         }

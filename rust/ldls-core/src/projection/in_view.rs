@@ -1,38 +1,48 @@
-//! The part of a cloud that the image of a camera sees, and what became of the rest.
+//! The part of a cloud that images see, and how many of the other points are left out for which reason.
 
 use super::camera::{Camera, Sight};
 use super::cloud::Cloud;
 use crate::{Error, Result};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Largest magnitude of a coordinate, in metres: beyond it squared distances lose their meaning.
 const COORDINATE_LIMIT_M: f64 = 1e7;
 /// Points handled by one task of the thread pool.
-const BLOCK: usize = 8192;
+const POINTS_A_TASK: usize = 8192;
 
-/// The points that the image sees, in the order of the cloud.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct View {
+/// The points that at least one image sees, in the order of the cloud.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InView {
     /// Rows of the cloud, ascending.
     pub indices: Vec<u32>,
-    /// Their coordinates in the lidar frame, in metres.
+    /// Coordinates in the lidar frame, in metres.
     pub points: Vec<[f64; 3]>,
-    /// Where they fall: u (right), v (down), in pixels.
-    pub uv: Vec<[f64; 2]>,
-    /// What became of the other points.
-    pub counts: ViewCounts,
+    /// The points that each image sees.
+    pub sightings: Vec<Sighting>,
+    /// Numbers of the other points.
+    pub counts: Counts,
 }
 
-/// Why points are not in view, and how far the usable ones reach.
+/// The points that one image sees.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Sighting {
+    /// Positions in the list of the points in view, ascending.
+    pub seen: Vec<u32>,
+    /// Pixels: u (right), v (down).
+    pub uv: Vec<[f64; 2]>,
+}
+
+/// Numbers of points that are not in view, by reason, and the extent of the usable ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ViewCounts {
+pub struct Counts {
     /// Points with a coordinate that is not finite.
     pub nonfinite: usize,
     /// Points at exactly (0, 0, 0), which sensors write where there was no return.
     pub origin: usize,
-    /// Points at or behind the smallest depth.
+    /// Points at or behind the smallest depth of every camera.
     pub behind: usize,
-    /// Points in front of the camera, beside the image.
+    /// Points in front of a camera, beside every image.
     pub outside: usize,
     /// Smallest finite x, y, z, in metres; infinite where there is none.
     pub min: [f64; 3],
@@ -40,7 +50,120 @@ pub struct ViewCounts {
     pub max: [f64; 3],
 }
 
-impl Default for ViewCounts {
+/// The points of `cloud` whose nearest pixel lies in at least one image, of cameras with height and width of their
+/// images in pixels.
+///
+/// A point at exactly (0, 0, 0) counts as no return unless `keep_origin` is set.
+///
+/// # Errors
+/// [`Error::CoordinateOutOfRange`] and [`Error::TooManyPoints`].
+pub fn project(
+    cloud: Cloud,
+    images: &[(&Camera, [usize; 2])],
+    keep_origin: bool,
+) -> Result<InView> {
+    let n = cloud.len();
+    check_points(n)?;
+    let starts: Vec<usize> = (0..n).step_by(POINTS_A_TASK).collect();
+    let parts: Vec<Result<InView>> = starts
+        .into_par_iter()
+        .map(|start| {
+            project_rows(
+                cloud,
+                start..n.min(start + POINTS_A_TASK),
+                images,
+                keep_origin,
+            )
+        })
+        .collect();
+    // taken in order, so that the first bad row is the one reported
+    let parts = parts.into_iter().collect::<Result<Vec<InView>>>()?;
+    Ok(InView::concatenate(&parts, images.len()))
+}
+
+/// Refuses clouds with more points than labels have rows for.
+fn check_points(points: usize) -> Result<()> {
+    if i32::try_from(points).is_ok() {
+        return Ok(());
+    }
+    Err(Error::TooManyPoints {
+        points,
+        neighbors: 0,
+        limit: i32::MAX as u64,
+        of: "points",
+    })
+}
+
+fn project_rows(
+    cloud: Cloud,
+    rows: Range<usize>,
+    images: &[(&Camera, [usize; 2])],
+    keep_origin: bool,
+) -> Result<InView> {
+    let mut part = InView::empty(images.len(), 0);
+    for row in rows {
+        let Some(xyz) = part.counts.usable(cloud, row, keep_origin)? else {
+            continue;
+        };
+        let (mut seen, mut in_front) = (false, false);
+        for (sighting, (camera, [height, width])) in part.sightings.iter_mut().zip(images) {
+            match camera.sight(&xyz, *height, *width) {
+                Sight::Behind => {}
+                Sight::Outside => in_front = true,
+                Sight::Seen(uv) => {
+                    seen = true;
+                    sighting.seen.push(part.indices.len() as u32);
+                    sighting.uv.push(uv);
+                }
+            }
+        }
+        if seen {
+            part.indices.push(row as u32);
+            part.points.push(xyz);
+        } else {
+            part.counts.outside += usize::from(in_front);
+            part.counts.behind += usize::from(!in_front);
+        }
+    }
+    Ok(part)
+}
+
+impl InView {
+    /// No point of `images` images, with room for `points`.
+    fn empty(images: usize, points: usize) -> Self {
+        Self {
+            indices: Vec::with_capacity(points),
+            points: Vec::with_capacity(points),
+            sightings: vec![Sighting::default(); images],
+            counts: Counts::default(),
+        }
+    }
+
+    fn concatenate(parts: &[Self], images: usize) -> Self {
+        let mut all = Self::empty(images, parts.iter().map(|part| part.indices.len()).sum());
+        for (image, sighting) in all.sightings.iter_mut().enumerate() {
+            let seen = parts
+                .iter()
+                .map(|part| part.sightings[image].seen.len())
+                .sum();
+            sighting.seen.reserve_exact(seen);
+            sighting.uv.reserve_exact(seen);
+        }
+        for part in parts {
+            let before = all.indices.len() as u32;
+            for (sighting, own) in all.sightings.iter_mut().zip(&part.sightings) {
+                sighting.seen.extend(own.seen.iter().map(|at| before + at));
+                sighting.uv.extend_from_slice(&own.uv);
+            }
+            all.indices.extend_from_slice(&part.indices);
+            all.points.extend_from_slice(&part.points);
+            all.counts.merge(&part.counts);
+        }
+        all
+    }
+}
+
+impl Default for Counts {
     fn default() -> Self {
         Self {
             nonfinite: 0,
@@ -53,81 +176,9 @@ impl Default for ViewCounts {
     }
 }
 
-impl Camera {
-    /// The points of `cloud` whose nearest pixel lies in an image of `height` x `width` pixels.
-    ///
-    /// A point at exactly (0, 0, 0) counts as no return unless `keep_origin` is set.
-    ///
-    /// # Errors
-    /// [`Error::CoordinateOutOfRange`] and [`Error::TooManyPoints`].
-    pub fn view(
-        &self,
-        cloud: Cloud,
-        height: usize,
-        width: usize,
-        keep_origin: bool,
-    ) -> Result<View> {
-        let n = cloud.len();
-        check_points(n)?;
-        let count = n.div_ceil(BLOCK);
-        let rows = |block: usize| block * BLOCK..n.min((block + 1) * BLOCK);
-        let blocks: Vec<Result<View>> = (0..count)
-            .into_par_iter()
-            .map(|block| self.view_rows(cloud, rows(block), [height, width], keep_origin))
-            .collect();
-        // taken in order, so that the first bad row is the one reported
-        let blocks = blocks.into_iter().collect::<Result<Vec<View>>>()?;
-        Ok(concatenate(&blocks))
-    }
-
-    /// The view of some rows.
-    fn view_rows(
-        &self,
-        cloud: Cloud,
-        rows: std::ops::Range<usize>,
-        [height, width]: [usize; 2],
-        keep_origin: bool,
-    ) -> Result<View> {
-        let mut view = View::default();
-        for row in rows {
-            let Some(xyz) = view.counts.usable(cloud, row, keep_origin)? else {
-                continue;
-            };
-            match self.sight(&xyz, height, width) {
-                Sight::Behind => view.counts.behind += 1,
-                Sight::Outside => view.counts.outside += 1,
-                Sight::Seen(uv) => {
-                    view.indices.push(row as u32);
-                    view.points.push(xyz);
-                    view.uv.push(uv);
-                }
-            }
-        }
-        Ok(view)
-    }
-}
-
-/// Refuses clouds with more points than labels have rows for.
-pub(crate) fn check_points(points: usize) -> Result<()> {
-    if i32::try_from(points).is_ok() {
-        return Ok(());
-    }
-    Err(Error::TooManyPoints {
-        points,
-        neighbors: 0,
-        limit: i32::MAX as u64,
-        of: "points",
-    })
-}
-
-impl ViewCounts {
-    /// The point of a row, if it has one; counts it otherwise.
-    pub(crate) fn usable(
-        &mut self,
-        cloud: Cloud,
-        row: usize,
-        keep_origin: bool,
-    ) -> Result<Option<[f64; 3]>> {
+impl Counts {
+    /// The point of a row, if it is usable; counts it otherwise.
+    fn usable(&mut self, cloud: Cloud, row: usize, keep_origin: bool) -> Result<Option<[f64; 3]>> {
         let xyz = cloud.xyz(row);
         if !xyz.iter().all(|c| c.is_finite()) {
             self.nonfinite += 1;
@@ -140,7 +191,10 @@ impl ViewCounts {
                 limit: COORDINATE_LIMIT_M,
             });
         }
-        self.extend(&xyz);
+        for (axis, &c) in xyz.iter().enumerate() {
+            self.min[axis] = self.min[axis].min(c);
+            self.max[axis] = self.max[axis].max(c);
+        }
         if xyz == [0.0; 3] && !keep_origin {
             self.origin += 1;
             return Ok(None);
@@ -148,14 +202,7 @@ impl ViewCounts {
         Ok(Some(xyz))
     }
 
-    fn extend(&mut self, xyz: &[f64; 3]) {
-        for (axis, &c) in xyz.iter().enumerate() {
-            self.min[axis] = self.min[axis].min(c);
-            self.max[axis] = self.max[axis].max(c);
-        }
-    }
-
-    pub(crate) fn merge(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         self.nonfinite += other.nonfinite;
         self.origin += other.origin;
         self.behind += other.behind;
@@ -167,23 +214,6 @@ impl ViewCounts {
     }
 }
 
-fn concatenate(blocks: &[View]) -> View {
-    let n = blocks.iter().map(|block| block.indices.len()).sum();
-    let mut view = View {
-        indices: Vec::with_capacity(n),
-        points: Vec::with_capacity(n),
-        uv: Vec::with_capacity(n),
-        counts: ViewCounts::default(),
-    };
-    for block in blocks {
-        view.indices.extend_from_slice(&block.indices);
-        view.points.extend_from_slice(&block.points);
-        view.uv.extend_from_slice(&block.uv);
-        view.counts.merge(&block.counts);
-    }
-    view
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -193,59 +223,77 @@ mod tests {
     ];
     const PROJECTION: [f64; 12] = [100., 0., 50., 0., 0., 100., 40., 0., 0., 0., 1., 0.];
 
-    fn camera() -> Camera {
-        Camera::new(&PROJECTION, &IDENTITY, 0.1).unwrap()
-    }
-
-    fn view(points: &[f32]) -> View {
-        camera()
-            .view(
-                Cloud::F32 {
-                    values: points,
-                    columns: 3,
-                },
-                80,
-                100,
-                false,
-            )
-            .unwrap()
+    /// What an image of 80 x 100 pixels sees of points given in single precision.
+    fn in_view(points: &[f32]) -> Result<InView> {
+        let camera = Camera::new(&PROJECTION, &IDENTITY, 0.125).unwrap();
+        let cloud = Cloud::F32 {
+            values: points,
+            columns: 3,
+        };
+        project(cloud, &[(&camera, [80, 100])], false)
     }
 
     #[test]
     fn a_point_on_the_axis_falls_on_the_principal_point() {
-        let view = view(&[0., 0., 10.]);
-        assert_eq!(view.uv, [[50., 40.]]);
+        let in_view = in_view(&[0., 0., 10.]).unwrap();
+        assert_eq!(in_view.sightings[0].uv, [[50., 40.]]);
     }
 
     #[test]
     fn points_behind_beside_and_missing_are_counted_and_left_out() {
         let nan = f32::NAN;
-        let view = view(&[
+        let in_view = in_view(&[
             0., 0., -10., 0., 0., 1e-30, 100., 0., 1., nan, 0., 1., 0., 0., 0., 0., 0., 2.,
-        ]);
-        assert_eq!(view.indices, [5]);
-        let counts = view.counts;
-        assert_eq!(
-            (
-                counts.behind,
-                counts.outside,
-                counts.nonfinite,
-                counts.origin
-            ),
-            (2, 1, 1, 1)
-        );
+        ])
+        .unwrap();
+        assert_eq!(in_view.indices, [5]);
+        let Counts {
+            behind,
+            outside,
+            nonfinite,
+            origin,
+            ..
+        } = in_view.counts;
+        assert_eq!([behind, outside, nonfinite, origin], [2, 1, 1, 1]);
+    }
+
+    #[test]
+    fn a_point_at_the_smallest_depth_is_not_in_view() {
+        let in_view = in_view(&[0., 0., 0.125, 0., 0., 0.125_f32.next_up()]).unwrap();
+        assert_eq!((in_view.indices, in_view.counts.behind), (vec![1], 1));
     }
 
     #[test]
     fn a_coordinate_beyond_the_limit_names_its_row() {
-        let cloud = Cloud::F64 {
-            values: &[0., 0., 1., 0., 1e30, 1.],
-            columns: 3,
-        };
-        let error = camera().view(cloud, 10, 10, false).unwrap_err();
+        let limit = COORDINATE_LIMIT_M as f32;
+        assert_eq!(in_view(&[limit, -limit, 1.]).unwrap().counts.outside, 1);
+        let error = in_view(&[0., 0., 1., 0., limit.next_up(), 1.]).unwrap_err();
         assert!(
             matches!(error, Error::CoordinateOutOfRange { row: 1, .. }),
             "{error}"
         );
+    }
+
+    #[test]
+    fn there_are_at_most_as_many_points_as_labels_have_rows_for() {
+        let most = i32::MAX as usize;
+        assert!(check_points(most).is_ok() && check_points(most + 1).is_err());
+    }
+
+    #[test]
+    fn an_image_sees_points_by_their_positions_among_those_in_view() {
+        let forward = Camera::new(&PROJECTION, &IDENTITY, 0.125).unwrap();
+        let mut turned = IDENTITY;
+        (turned[0], turned[10]) = (-1.0, -1.0);
+        let backward = Camera::new(&PROJECTION, &turned, 0.125).unwrap();
+        let cloud = Cloud::F64 {
+            values: &[0., 0., 2., 0., 0., 0.1, 0., 0., -2.],
+            columns: 3,
+        };
+        let images = [(&forward, [80, 100]), (&backward, [80, 100])];
+        let in_view = project(cloud, &images, false).unwrap();
+        assert_eq!((in_view.indices, in_view.counts.behind), (vec![0, 2], 1));
+        assert_eq!(in_view.sightings[0].seen, [0]);
+        assert_eq!(in_view.sightings[1].seen, [1]);
     }
 }

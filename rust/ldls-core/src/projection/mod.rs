@@ -6,8 +6,7 @@ mod distortion;
 mod in_view;
 
 pub use camera::Camera;
-pub(crate) use camera::{Sight, nearest_pixel};
+pub(crate) use camera::nearest_pixel;
 pub use cloud::Cloud;
 pub use distortion::Distortion;
-pub(crate) use in_view::check_points;
-pub use in_view::{View, ViewCounts};
+pub use in_view::{Counts, InView, Sighting, project};

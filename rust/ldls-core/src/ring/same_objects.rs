@@ -1,39 +1,39 @@
-//! Which instances of several images show one object: those on which the points agree that both cameras see.
+//! Which instances of several images show one object: those on which the points agree that both images see.
 
-use super::RingView;
-use super::sightings::{Sighting, UNSEEN};
+use super::view::View;
 use crate::masks::InstanceMasks;
 use crate::projection::nearest_pixel;
 use std::collections::BTreeMap;
 
-/// The instances of all views, those that show one object together.
+/// The instances that object l = 1, 2, ... consists of, at position l - 1: image and instance, the latter from 1.
+pub type Objects = Vec<Vec<(usize, u32)>>;
+
+/// The instances of all views, those that show one object together. `shared` yields the pixels, in each of two images,
+/// of the points that both see.
 pub(crate) fn same_objects(
-    views: &[RingView],
-    sightings: &[Sighting],
-    slots: &[Vec<u32>],
+    views: &[View],
+    shared: impl Fn(usize, usize) -> Vec<[[f64; 2]; 2]>,
     same_object: f64,
-) -> Vec<Vec<(usize, u32)>> {
-    let mut groups: Vec<Vec<(usize, u32)>> = Vec::new();
+) -> Objects {
+    let mut groups: Objects = Vec::new();
     let mut group_of: Vec<Vec<usize>> = Vec::new();
-    for (camera, view) in views.iter().enumerate() {
+    for (image, view) in views.iter().enumerate() {
         let first = groups.len();
-        groups.extend((1..=view.masks.len() as u32).map(|m| vec![(camera, m)]));
+        groups.extend((1..=view.masks.len() as u32).map(|m| vec![(image, m)]));
         group_of.push((first..groups.len()).collect());
     }
-    for [one, other] in best_first(agreements(views, sightings, slots), same_object) {
-        let [kept, joined] = {
-            let mut pair = [one, other].map(|(camera, m)| group_of[camera][m as usize - 1]);
-            pair.sort_unstable();
-            pair
-        };
-        let cameras = |group: usize| groups[group].iter().map(|&(camera, _)| camera);
+    for pair in best_first(agreements(views, shared), same_object) {
+        let mut pair = pair.map(|(image, m)| group_of[image][m as usize - 1]);
+        pair.sort_unstable();
+        let [kept, joined] = pair;
+        let images = |group: usize| groups[group].iter().map(|&(image, _)| image);
         // two instances of one image are two objects
-        if kept == joined || cameras(kept).any(|camera| cameras(joined).any(|c| c == camera)) {
+        if kept == joined || images(kept).any(|image| images(joined).any(|other| other == image)) {
             continue;
         }
         let moved = std::mem::take(&mut groups[joined]);
-        for &(camera, m) in &moved {
-            group_of[camera][m as usize - 1] = kept;
+        for &(image, m) in &moved {
+            group_of[image][m as usize - 1] = kept;
         }
         groups[kept].extend(moved);
         groups[kept].sort_unstable();
@@ -57,30 +57,24 @@ type Pair = [(usize, u32); 2];
 fn best_first(agreements: BTreeMap<Pair, Agreement>, same_object: f64) -> Vec<Pair> {
     let mut pairs: Vec<(Pair, Agreement)> = agreements
         .into_iter()
-        .filter(|(_, found)| found.both as f64 >= same_object * found.either as f64)
+        .filter(|(_, agreement)| agreement.both as f64 >= same_object * agreement.either as f64)
         .collect();
     // a / b > c / d where a d > c b; the order of the map among equals
     pairs.sort_by(|(_, a), (_, b)| (b.both * a.either).cmp(&(a.both * b.either)));
     pairs.into_iter().map(|(pair, _)| pair).collect()
 }
 
-/// Agreement of each two instances of one category in two images on which a point falls that both cameras see.
+/// Agreement of each two instances of one category in two images on which a point falls that both images see.
 fn agreements(
-    views: &[RingView],
-    sightings: &[Sighting],
-    slots: &[Vec<u32>],
+    views: &[View],
+    shared: impl Fn(usize, usize) -> Vec<[[f64; 2]; 2]>,
 ) -> BTreeMap<Pair, Agreement> {
-    let mut found = BTreeMap::new();
+    let mut agreements = BTreeMap::new();
     for one in 0..views.len() {
         for other in one + 1..views.len() {
-            let shared: Vec<usize> = (0..slots[one].len())
-                .filter(|&point| slots[one][point] != UNSEEN && slots[other][point] != UNSEEN)
-                .collect();
-            let [here, there] = [one, other].map(|camera| {
-                let uv = shared
-                    .iter()
-                    .map(|&point| sightings[camera].uv[slots[camera][point] as usize]);
-                instances_at(views[camera].masks, uv)
+            let pixels = shared(one, other);
+            let [here, there] = [(one, 0), (other, 1)].map(|(image, side)| {
+                instances_at(views[image].masks, pixels.iter().map(|uv| uv[side]))
             });
             let totals = [&here, &there].map(|lists| count(lists.iter().flatten().copied()));
             let pairs = here.iter().zip(&there).flat_map(|(here, there)| {
@@ -88,15 +82,15 @@ fn agreements(
                     .flat_map(|&m| there.iter().map(move |&other| (m, other)))
             });
             for ((m, k), both) in count(pairs) {
-                let category = |camera: usize, m: u32| views[camera].categories[m as usize - 1];
+                let category = |image: usize, m: u32| views[image].categories[m as usize - 1];
                 if category(one, m) == category(other, k) {
                     let either = totals[0][&m] + totals[1][&k] - both;
-                    found.insert([(one, m), (other, k)], Agreement { both, either });
+                    agreements.insert([(one, m), (other, k)], Agreement { both, either });
                 }
             }
         }
     }
-    found
+    agreements
 }
 
 fn count<T: Ord>(values: impl Iterator<Item = T>) -> BTreeMap<T, usize> {
@@ -137,7 +131,7 @@ fn instances_at(masks: &InstanceMasks, uv: impl Iterator<Item = [f64; 2]>) -> Ve
 
 #[cfg(test)]
 mod tests {
-    use crate::RingView;
+    use super::*;
     use crate::test_support::{camera, masks, segment};
     use proptest::prelude::*;
 
@@ -147,7 +141,7 @@ mod tests {
         let (left, right) = (camera(40.0), camera(20.0));
         let first = masks(&[[5, 24, 12, 10], [5, 2, 8, 8]]);
         let second = masks(&[[5, 4, 12, 10], [5, 5, 12, 10], [5, 30, 8, 8]]);
-        let view = |masks, camera, categories| RingView {
+        let view = |masks, camera, categories| View {
             masks,
             categories,
             camera,
@@ -169,6 +163,22 @@ mod tests {
         );
     }
 
+    #[test]
+    fn instances_that_agree_on_exactly_the_share_asked_for_are_one_object() {
+        // of the points on either mask, which lie in the same places of both images, half are on both
+        let (first, second) = (masks(&[[5, 8, 6, 8]]), masks(&[[5, 8, 6, 4]]));
+        let camera = camera(20.0);
+        let view = |masks| View {
+            masks,
+            categories: &[1],
+            camera: &camera,
+        };
+        let views = [view(&first), view(&second)];
+        let pixels: Vec<[[f64; 2]; 2]> = (8..16).map(|u| [[f64::from(u), 7.0]; 2]).collect();
+        let objects = |same_object| same_objects(&views, |_, _| pixels.clone(), same_object).len();
+        assert_eq!((objects(0.5), objects(0.5_f64.next_up())), (1, 2));
+    }
+
     proptest! {
         #[test]
         fn every_instance_belongs_to_one_object(
@@ -180,7 +190,7 @@ mod tests {
             let parts = [masks(&rectangles[..split]), masks(&rectangles[split..])];
             let cameras = [camera(30.0), camera(20.0)];
             let categories = [1; 6];
-            let views: Vec<RingView> = parts.iter().zip(&cameras).map(|(masks, camera)| RingView {
+            let views: Vec<View> = parts.iter().zip(&cameras).map(|(masks, camera)| View {
                 masks, camera, categories: &categories[..masks.len()],
             }).collect();
             let found = segment(&views);
@@ -193,7 +203,7 @@ mod tests {
                 let cameras: std::collections::BTreeSet<usize> = group.iter().map(|&(camera, _)| camera).collect();
                 prop_assert_eq!(cameras.len(), group.len());
             }
-            let highest = found.segmentation.labels.iter().max().copied().unwrap_or(0);
+            let highest = found.labels.iter().max().copied().unwrap_or(0);
             prop_assert!(highest <= found.objects.len() as i32);
         }
     }
