@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import ldls
-from ldls import stages
+from ldls import _ldls, stages
 from ldls.explaining import rebuild
 
 
@@ -155,3 +155,20 @@ def test_points_without_labels_and_no_points_at_all():
     assert [z.shape for z in stages.diffuse(*nothing, iterations=4, every=2)] == [(0, 3)] * 2
     alone = csr_array(np.eye(2, dtype=np.float32)), csr_array((2, 3), dtype=np.float32)
     assert [z.any() for z in stages.diffuse(*alone, iterations=None, every=5)] == [False]
+
+
+def test_likelihoods_beyond_what_the_pixel_edges_allow_are_computed_by_plain_products():
+    # every pixel counts for two labels: likelihoods of a point sum to 2
+    n = 300
+    steps = np.arange(n)
+    graph = (
+        np.arange(n + 1) * 2,
+        np.stack([steps, (steps + 1) % n], axis=1).ravel().astype("i4"),
+        np.full(2 * n, 0.45, "f4"),
+    )
+    seeds = (np.arange(n + 1) * 2, np.tile([0, 1], n).astype("i4"), np.full(2 * n, 0.1, "f4"))
+    allowed = _ldls.diffuse(graph, seeds, np.full(n, 0.1, "f4"), 2, 200, 1)
+    beyond = _ldls.diffuse(graph, seeds, np.full(n, 0.2, "f4"), 2, 200, 1)
+    assert allowed[1] < 200 == beyond[1]
+    np.testing.assert_allclose(allowed[0], beyond[0], atol=1e-5)
+    np.testing.assert_allclose(beyond[0].sum(axis=1), 2, atol=1e-5)

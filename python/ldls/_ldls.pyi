@@ -149,6 +149,11 @@ def normalize_rows(
     point_graph: _Csr, labels: _Csr, mass: NDArray[np.float32]
 ) -> tuple[_Csr, tuple[_Csr, NDArray[np.float32]]]: ...
 def diffuse(
-    point_graph: _Csr, labels: _Csr, n_labels: int, iterations: int | None, threads: int | None
+    point_graph: _Csr,
+    labels: _Csr,
+    mass: NDArray[np.float32],
+    n_labels: int,
+    iterations: int | None,
+    threads: int | None,
 ) -> tuple[NDArray[np.float32], int, float | None]: ...
 def largest_components(point_graph: _Csr, labels: NDArray[np.uint32]) -> NDArray[np.int32]: ...

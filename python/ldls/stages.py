@@ -184,7 +184,9 @@ def diffuse(
     """
     Params(iterations=iterations, threads=threads)
     if every is None:
-        z, _, _ = _ldls.diffuse(_arrays(A), _arrays(b), b.shape[1], iterations, threads)
+        # the pixel edges of a point weigh what its point edges leave
+        mass = np.maximum(1.0 - A.astype(np.float64).sum(axis=1), 0.0).astype(np.float32)
+        z, _, _ = _ldls.diffuse(_arrays(A), _arrays(b), mass, b.shape[1], iterations, threads)
         return z
     check_whole_number("every", every)
     if every < 1:

@@ -136,19 +136,19 @@ pub fn normalize_rows(
     ))
 }
 
-/// Values of all labels at all points, the number of sweeps and the residual.
+/// Values of all labels at all points, the number of sweeps and the residual. `mass` bounds what values may sum to.
 #[pyfunction]
 pub fn diffuse(
     py: Python<'_>,
     point_graph: CsrArguments<'_>,
     labels: CsrArguments<'_>,
+    mass: PyReadonlyArray1<'_, f32>,
     n_labels: usize,
     iterations: Option<usize>,
     threads: Option<usize>,
 ) -> PyResult<(Py<PyArray2<f32>>, usize, Option<f64>)> {
     let a = graph(py, &point_graph)?;
-    let mass = vec![0.0; a.len()];
-    let b = labels_of(py, &labels, mass)?;
+    let b = labels_of(py, &labels, slice(py, "mass", &mass)?.to_vec())?;
     let (z, convergence) = run(py, threads, || {
         ldls_core::likelihoods(&a, &b, n_labels, iterations)
     })?;

@@ -198,3 +198,47 @@ fn step<T: Real>(seeds: f64, along: f64, stay: f64, back: f64) -> Step<T> {
         back,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::masks::PixelLabels;
+
+    /// Two points without neighbours whose seeds of labels 0 and 1 are what likelihoods are after one product.
+    fn pass_is_sound(likelihoods: [[f32; 2]; 2], error: f64, overlap: f64) -> bool {
+        let a = PointGraph::from_csr(vec![0, 1, 2], vec![0, 1], vec![0.5; 2]).unwrap();
+        let b = PixelLabels {
+            offsets: vec![0, 2, 4],
+            labels: vec![0, 1, 0, 1],
+            weights: likelihoods.concat(),
+            mass: vec![0.5; 2],
+        };
+        let schedule = Schedule::new(&a);
+        let seeds = Seeds::new(&b, vec![Some(0), Some(1)]);
+        let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1));
+        pass.convergence.error = error;
+        pass.is_sound(overlap)
+    }
+
+    #[test]
+    fn likelihoods_are_sound_within_their_bounds() {
+        assert!(pass_is_sound([[0.5, 0.5], [0.0, 1.0]], 0.0, 1.0));
+        assert!(pass_is_sound([[0.5, -0.0005], [0.0, 1.0]], 1e-3, 1.0));
+    }
+
+    #[test]
+    fn a_negative_likelihood_is_unsound() {
+        assert!(!pass_is_sound([[0.5, 0.5], [0.5, -0.01]], 0.0, 1.0));
+    }
+
+    #[test]
+    fn likelihoods_that_sum_to_more_than_their_pixel_edges_count_for_are_unsound() {
+        assert!(!pass_is_sound([[0.6, 0.6], [0.0, 1.0]], 0.0, 1.0));
+        assert!(pass_is_sound([[0.6, 0.6], [0.0, 1.0]], 0.0, 1.2));
+    }
+
+    #[test]
+    fn terms_left_out_that_may_be_large_are_unsound() {
+        assert!(!pass_is_sound([[0.5, 0.5], [0.0, 1.0]], 1.1e-3, 1.0));
+    }
+}
