@@ -19,7 +19,6 @@ pub use convergence::Convergence;
 pub use products::Products;
 
 use self::pass::Pass;
-use self::products::check;
 use self::schedule::{ROWS_A_TASK, Schedule};
 use self::seeds::{Seeds, plan};
 use self::series::Series;
@@ -60,7 +59,7 @@ pub fn diffuse(
     iterations: Option<usize>,
     exact: impl FnOnce() -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
 ) -> Result<Diffused> {
-    check(a, b, n_labels)?;
+    b.check(a.len(), n_labels)?;
     let mut best = vec![Best::default(); a.len()];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let choose = |pass: &Pass<f32, WIDTH_F32>| winners::update(&mut best, pass);
@@ -95,7 +94,7 @@ pub fn likelihoods(
     n_labels: usize,
     iterations: Option<usize>,
 ) -> Result<(Vec<f32>, Convergence)> {
-    check(a, b, n_labels)?;
+    b.check(a.len(), n_labels)?;
     let mut all = vec![0.0; a.len() * n_labels];
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let write = |pass: &Pass<f32, WIDTH_F32>| {
@@ -126,7 +125,7 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
     for lanes in plan(b, labels, WIDTH, probed) {
         let seeds = Seeds::new(b, lanes);
         let mut pass = Pass::run(a, &schedule, &seeds, series.as_ref(), iterations);
-        if series.is_some() && !pass.is_sound(largest_overlap(b)) {
+        if series.is_some() && !pass.is_sound(b.largest_overlap()) {
             series = None;
             drop(pass);
             pass = Pass::run(a, &schedule, &seeds, None, iterations);
@@ -135,20 +134,6 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
         convergence.merge(pass.convergence);
     }
     convergence
-}
-
-/// Most labels that a pixel edge counts for, taken over a window: what the likelihoods of a point may sum to.
-fn largest_overlap<T: Real>(b: &PixelLabels<T>) -> f64 {
-    let overlap = |i: usize| {
-        let mass = b.mass[i].to_f64();
-        let weights: f64 = b.row(i).map(|(_, weight)| weight.to_f64()).sum();
-        if mass > 0.0 {
-            weights / mass
-        } else {
-            f64::INFINITY
-        }
-    };
-    (0..b.rows()).map(overlap).fold(1.0, f64::max)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::convergence::{CONVERGED, MOST_SWEEPS};
 use super::schedule::ROWS_A_TASK;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::{Error, Real, Result};
+use crate::{Real, Result};
 use rayon::prelude::*;
 
 /// A diffusion that is run some products at a time.
@@ -39,7 +39,7 @@ impl Products {
         n_labels: usize,
         iterations: Option<usize>,
     ) -> Result<Self> {
-        check(&a, &b, n_labels)?;
+        b.check(a.len(), n_labels)?;
         let zeros = vec![0.0; a.len() * n_labels];
         Ok(Self {
             a,
@@ -111,23 +111,6 @@ impl Products {
         let pairs = self.z.par_iter().zip(&self.next).with_min_len(ROWS_A_TASK);
         let changes = pairs.map(|(after, before)| (after - before).abs());
         changes.reduce(|| 0.0, f64::max)
-    }
-}
-
-/// Refuses seeds that do not fit the graph or the labels.
-pub(super) fn check(a: &PointGraph, b: &PixelLabels, n_labels: usize) -> Result<()> {
-    let mismatch = |problem: String| {
-        Err(Error::Mismatch {
-            name: "pixel_labels",
-            problem,
-        })
-    };
-    if b.rows() != a.len() {
-        return mismatch(format!("{} rows, the graph has {}", b.rows(), a.len()));
-    }
-    match b.labels.iter().find(|&&label| label as usize >= n_labels) {
-        Some(label) => mismatch(format!("label {label}, expected labels below {n_labels}")),
-        None => Ok(()),
     }
 }
 

@@ -32,17 +32,20 @@ impl Series {
         iterations: Option<usize>,
         tolerance: f64,
     ) -> Option<Self> {
-        let [low, high] =
-            gershgorin(a).filter(|&[low, high]| -1.0 <= low && low < high && high <= 1.0)?;
-        match iterations {
-            Some(products) => Some(Self::of_geometric_sum(products, [low, high], tolerance))
-                .filter(|series| series.degree() + 1 < products),
-            None => (high < 1.0).then(|| Self::of_resolvent([low, high], tolerance, MOST_SWEEPS)),
-        }
+        let sound = |[low, high]: [f64; 2]| -1.0 <= low && low < high && high <= 1.0;
+        let [low, high] = gershgorin(a).filter(|ends| sound(*ends))?;
+        let (middle, half_width) = (f64::midpoint(high, low), (high - low) / 2.0);
+        let series = match iterations {
+            Some(products) => Self::of_geometric_sum(products, middle, half_width, tolerance),
+            None if high < 1.0 => Self::of_resolvent(middle, half_width, tolerance, MOST_SWEEPS),
+            None => return None,
+        };
+        let shorter = iterations.is_none_or(|products| series.degree() + 1 < products);
+        shorter.then_some(series)
     }
 
     /// The series of 1 + x + ... + x^(`terms` - 1).
-    fn of_geometric_sum(terms: usize, interval: [f64; 2], tolerance: f64) -> Self {
+    fn of_geometric_sum(terms: usize, middle: f64, half_width: f64, tolerance: f64) -> Self {
         let sum = |x: f64| {
             let complement = 1.0 - x;
             // the closed form loses its digits near 1, where terms are nearly equal
@@ -54,18 +57,18 @@ impl Series {
         };
         let mut nodes = 256;
         loop {
-            let mut coefficients = interpolate(sum, interval, nodes);
+            let mut coefficients = interpolate(sum, middle, half_width, nodes);
             // the sum is a polynomial of degree `terms` - 1: beyond it there is rounding and nothing else
             coefficients.truncate(terms);
             let all = coefficients.len() == terms;
-            let degree = degree_within(&coefficients, tolerance * sum(interval[1]));
+            let degree = degree_within(&coefficients, tolerance * sum(middle + half_width));
             // far from the last coefficient: those that were cut off are smaller still
             if all || 4 * degree < 3 * coefficients.len() || nodes >= 1 << 14 {
                 let (kept, rest) = coefficients.split_at(degree + 1);
                 let tail = rest.iter().map(|c| c.abs()).sum();
                 return Self {
-                    middle: middle(interval),
-                    half_width: half_width(interval),
+                    middle,
+                    half_width,
                     coefficients: kept.to_vec(),
                     tail,
                 };
@@ -75,10 +78,9 @@ impl Series {
     }
 
     /// The series of 1 / (1 - x), for an interval below 1; at most of degree `most`.
-    fn of_resolvent(interval: [f64; 2], tolerance: f64, most: usize) -> Self {
+    fn of_resolvent(middle: f64, half_width: f64, tolerance: f64, most: usize) -> Self {
         // 1 / (a - t) = 2 / sqrt(a^2 - 1) * (1/2 + r T_1(t) + r^2 T_2(t) + ...), r = a - sqrt(a^2 - 1)
-        let half_width = half_width(interval);
-        let a = (1.0 - middle(interval)) / half_width;
+        let a = (1.0 - middle) / half_width;
         let root = ((a - 1.0) * (a + 1.0)).sqrt();
         let ratio = 1.0 / (a + root);
         let degree = (tolerance.ln() / ratio.ln()).ceil();
@@ -93,7 +95,7 @@ impl Series {
         coefficients[0] /= 2.0;
         let tail = scale * ratio.powi(degree as i32 + 1) / (1.0 - ratio);
         Self {
-            middle: middle(interval),
+            middle,
             half_width,
             coefficients,
             tail,
@@ -104,14 +106,6 @@ impl Series {
     pub(super) fn degree(&self) -> usize {
         self.coefficients.len() - 1
     }
-}
-
-fn middle([low, high]: [f64; 2]) -> f64 {
-    f64::midpoint(high, low)
-}
-
-fn half_width([low, high]: [f64; 2]) -> f64 {
-    (high - low) / 2.0
 }
 
 /// An interval on which the real parts of all eigenvalues lie, if no weight is negative.
@@ -137,13 +131,16 @@ fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
 
 /// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes; the
 /// upper half would be aliases of higher terms.
-fn interpolate(function: impl Fn(f64) -> f64, interval: [f64; 2], nodes: usize) -> Vec<f64> {
+fn interpolate(
+    function: impl Fn(f64) -> f64,
+    middle: f64,
+    half_width: f64,
+    nodes: usize,
+) -> Vec<f64> {
     let t: Vec<f64> = (0..nodes)
         .map(|j| ((j as f64 + 0.5) * PI / nodes as f64).cos())
         .collect();
-    let x = t
-        .iter()
-        .map(|t| middle(interval) + half_width(interval) * t);
+    let x = t.iter().map(|t| middle + half_width * t);
     let values: Vec<f64> = x.map(function).collect();
     // T_0 and T_1 at the nodes; T_(k + 1) = 2 t T_k - T_(k - 1)
     let (mut current, mut next) = (vec![1.0; nodes], t.clone());
@@ -178,7 +175,10 @@ fn degree_within(coefficients: &[f64], remainder: f64) -> usize {
 mod tests {
     use super::*;
 
-    const INTERVAL: [f64; 2] = [-0.8, 0.998];
+    const LOW: f64 = -0.8;
+    const HIGH: f64 = 0.998;
+    const MIDDLE: f64 = f64::midpoint(HIGH, LOW);
+    const HALF_WIDTH: f64 = (HIGH - LOW) / 2.0;
 
     fn evaluate(series: &Series, x: f64) -> f64 {
         let t = (x - series.middle) / series.half_width;
@@ -187,14 +187,14 @@ mod tests {
     }
 
     fn points() -> impl Iterator<Item = f64> {
-        (0..=1000).map(|i| INTERVAL[0] + f64::from(i) / 1000.0 * (INTERVAL[1] - INTERVAL[0]))
+        (0..=1000).map(|i| LOW + f64::from(i) / 1000.0 * (HIGH - LOW))
     }
 
     #[test]
     fn a_series_equals_the_sum_of_powers() {
         for (terms, most) in [(1, 0), (2, 1), (7, 6), (200, 64), (5000, 700)] {
-            let series = Series::of_geometric_sum(terms, INTERVAL, 1e-7);
-            let largest: f64 = (0..terms).map(|k| INTERVAL[1].powi(k as i32)).sum();
+            let series = Series::of_geometric_sum(terms, MIDDLE, HALF_WIDTH, 1e-7);
+            let largest: f64 = (0..terms).map(|k| HIGH.powi(k as i32)).sum();
             for x in points() {
                 let sum: f64 = (0..terms).map(|k| x.powi(k as i32)).sum();
                 assert!(
@@ -212,7 +212,7 @@ mod tests {
 
     #[test]
     fn a_series_equals_the_resolvent() {
-        let series = Series::of_resolvent(INTERVAL, 1e-9, 10_000);
+        let series = Series::of_resolvent(MIDDLE, HALF_WIDTH, 1e-9, 10_000);
         for x in points() {
             let expected = 1.0 / (1.0 - x);
             assert!(
@@ -221,6 +221,9 @@ mod tests {
             );
         }
         assert!(series.degree() < 500);
-        assert_eq!(Series::of_resolvent(INTERVAL, 1e-9, 10).degree(), 10);
+        assert_eq!(
+            Series::of_resolvent(MIDDLE, HALF_WIDTH, 1e-9, 10).degree(),
+            10
+        );
     }
 }

@@ -1,11 +1,17 @@
 //! One step of the recurrence over some rows of the graph: the only place where time is spent in number crunching.
 
+#![expect(
+    unsafe_code,
+    reason = "threads share values by rows, and a check of every column takes a sixth of the time of a sweep"
+)]
+
 use super::schedule::{Activity, BLOCK};
 use super::seeds::{BACKGROUND_LANE, Seeds};
 use super::values::SharedValues;
 use crate::Real;
 use crate::graph::PointGraph;
 use multiversion::multiversion;
+use std::hint::black_box;
 use std::ops::Range;
 
 /// Edges of a point with the paper's parameters: 10 neighbours and itself.
@@ -32,7 +38,6 @@ pub(super) struct Step<T> {
 /// a row in `all` has an edge from.
 // without fused multiply-add, which is not faster here, results are the same bits on every processor
 #[multiversion(targets("x86_64+avx2"))]
-#[expect(unsafe_code, reason = "threads share values by rows")]
 pub(super) unsafe fn sweep<T: Real, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
@@ -41,30 +46,24 @@ pub(super) unsafe fn sweep<T: Real, const WIDTH: usize>(
     values: [&SharedValues<T, WIDTH>; 2],
     all: Range<usize>,
 ) {
+    // one where the background lies: its seed is added to all lanes at once, since a single lane would have to wait for
+    // the row to reach memory; a black box, since the compiler would take the lanes apart
+    let mut lanes = [T::default(); WIDTH];
+    lanes[BACKGROUND_LANE] = T::from_f64(1.0);
+    let lanes = &black_box(lanes);
     let next = values[1];
     for block in all.start / BLOCK..all.end.div_ceil(BLOCK) {
         let rows = block * BLOCK..all.end.min((block + 1) * BLOCK);
         let active = activity.active(block);
         let mut groups = (0..next.groups()).filter(|group| active >> group & 1 == 1);
         while let Some(group) = groups.next() {
-            let background = group == BACKGROUND_LANE / WIDTH;
-            // two groups at a time share what they read of the graph
-            let pair = groups.next().map(|other| [group, other]);
+            let pair = (group, groups.next());
             // SAFETY: as the caller promises; groups differ
             unsafe {
-                match (pair, background) {
-                    (Some(pair), true) => {
-                        step_rows::<_, _, 2, true>(a, seeds, step, pair, values, &rows);
-                    }
-                    (Some(pair), false) => {
-                        step_rows::<_, _, 2, false>(a, seeds, step, pair, values, &rows);
-                    }
-                    (None, true) => {
-                        step_rows::<_, _, 1, true>(a, seeds, step, [group], values, &rows);
-                    }
-                    (None, false) => {
-                        step_rows::<_, _, 1, false>(a, seeds, step, [group], values, &rows);
-                    }
+                if group == BACKGROUND_LANE / WIDTH {
+                    step_pair::<T, WIDTH, true>(a, seeds, step, pair, values, &rows, lanes);
+                } else {
+                    step_pair::<T, WIDTH, false>(a, seeds, step, pair, values, &rows, lanes);
                 }
             }
         }
@@ -88,58 +87,93 @@ fn in_use<T: Real, const WIDTH: usize>(rows: &[[T; WIDTH]]) -> bool {
     rows.iter().any(|row| *row != [T::default(); WIDTH])
 }
 
-/// Computes `GROUPS` different groups of `rows`; the background lies in the first, if `BACKGROUND`.
+/// Computes one group of `rows`, the one with the background if `BACKGROUND`.
 ///
 /// # Safety
 /// As of [`sweep`].
 #[inline(always)]
-#[expect(unsafe_code, reason = "threads share values by rows")]
-unsafe fn step_rows<T: Real, const WIDTH: usize, const GROUPS: usize, const BACKGROUND: bool>(
+unsafe fn step_rows<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,
-    groups: [usize; GROUPS],
+    group: usize,
     [z, next]: [&SharedValues<T, WIDTH>; 2],
     rows: &Range<usize>,
+    lanes: &[T; WIDTH],
 ) {
-    let sources = groups.map(|group| z.source(group));
-    // SAFETY: as the caller promises; groups differ
-    let own = groups.map(|group| unsafe { z.rows(group, rows) });
-    // SAFETY: the same
-    let mut next = groups.map(|group| unsafe { next.rows_mut(group, rows) });
-    let background = &seeds.background[rows.clone()];
-    let mut finish_row = |row: usize, sums: [[T; WIDTH]; GROUPS]| {
-        for group in 0..GROUPS {
-            let seed = (BACKGROUND && group == 0).then(|| background[row]);
-            let before = &mut next[group][row];
-            *before = finish(
-                step,
-                &sums[group],
-                &own[group][row],
-                before,
-                seed,
-                seeds.least,
-            );
-        }
-    };
+    let source = z.source(group);
+    // SAFETY: as the caller promises
+    let (own, next) = unsafe { (z.rows(group, rows), next.rows_mut(group, rows)) };
+    let points = next
+        .iter_mut()
+        .zip(own)
+        .zip(&seeds.background[rows.clone()]);
     if a.degree() == Some(PAPER_DEGREE) {
         // with a number of edges known beforehand there is no loop over them, and less to check
-        let (columns, weights) = a.slices(rows.clone());
-        let columns = columns.as_chunks::<PAPER_DEGREE>().0;
-        let edges = columns.iter().zip(weights.as_chunks::<PAPER_DEGREE>().0);
-        for (row, (columns, weights)) in edges.enumerate() {
-            finish_row(row, paper_sums(sources, columns, weights));
+        for (((row, own), &seed), (columns, weights)) in points.zip(paper_edges(a, rows)) {
+            let [sum] = paper_sums([source], columns, weights);
+            *row = finish::<T, WIDTH, BACKGROUND>(step, &sum, own, row, seed, lanes, seeds.least);
         }
     } else {
-        for (row, i) in rows.clone().enumerate() {
+        for (i, ((row, own), &seed)) in rows.clone().zip(points) {
             let (columns, weights) = a.slices(i..i + 1);
-            let mut sums = [[T::default(); WIDTH]; GROUPS];
+            let mut sum = [[T::default(); WIDTH]];
             for (&column, &weight) in columns.iter().zip(weights) {
-                add(&mut sums, sources, column, weight);
+                add(&mut sum, [source], column, weight);
             }
-            finish_row(row, sums);
+            *row =
+                finish::<T, WIDTH, BACKGROUND>(step, &sum[0], own, row, seed, lanes, seeds.least);
         }
     }
+}
+
+/// Computes a group of `rows`, and another one with it if there is one, which share what they read of the graph; the
+/// background lies in the first, if `BACKGROUND`.
+///
+/// # Safety
+/// As of [`sweep`].
+#[inline(always)]
+unsafe fn step_pair<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
+    a: &PointGraph<T>,
+    seeds: &Seeds<T>,
+    step: Step<T>,
+    (first, second): (usize, Option<usize>),
+    [z, next]: [&SharedValues<T, WIDTH>; 2],
+    rows: &Range<usize>,
+    lanes: &[T; WIDTH],
+) {
+    let Some(second) = second.filter(|_| a.degree() == Some(PAPER_DEGREE)) else {
+        // SAFETY: as the caller promises
+        unsafe {
+            step_rows::<T, WIDTH, BACKGROUND>(a, seeds, step, first, [z, next], rows, lanes);
+            if let Some(second) = second {
+                step_rows::<T, WIDTH, false>(a, seeds, step, second, [z, next], rows, lanes);
+            }
+        }
+        return;
+    };
+    let sources = [z.source(first), z.source(second)];
+    // SAFETY: as the caller promises; groups differ
+    let (own, other) = unsafe { (z.rows(first, rows), z.rows(second, rows)) };
+    // SAFETY: the same
+    let (one, two) = unsafe { (next.rows_mut(first, rows), next.rows_mut(second, rows)) };
+    let points = one.iter_mut().zip(two).zip(own.iter().zip(other));
+    let points = points.zip(&seeds.background[rows.clone()]);
+    for ((((one, two), own), &seed), (columns, weights)) in points.zip(paper_edges(a, rows)) {
+        let sums = paper_sums(sources, columns, weights);
+        *one = finish::<T, WIDTH, BACKGROUND>(step, &sums[0], own.0, one, seed, lanes, seeds.least);
+        *two = finish::<T, WIDTH, false>(step, &sums[1], own.1, two, seed, lanes, seeds.least);
+    }
+}
+
+/// Columns and weights of each of `rows`.
+#[inline(always)]
+fn paper_edges<'a, T: Real>(
+    a: &'a PointGraph<T>,
+    rows: &Range<usize>,
+) -> impl Iterator<Item = (&'a [u32; PAPER_DEGREE], &'a [T; PAPER_DEGREE])> {
+    let (columns, weights) = a.slices(rows.clone());
+    columns.as_chunks().0.iter().zip(weights.as_chunks().0)
 }
 
 /// Weighted sums, for each of `sources`, of the rows that `columns` name.
@@ -165,10 +199,6 @@ fn paper_sums<T: Real, const WIDTH: usize, const GROUPS: usize>(
 
 /// Adds to the sums of some groups what comes along one edge of a row.
 #[inline(always)]
-#[expect(
-    unsafe_code,
-    reason = "the check of every column takes a sixth of the time of a sweep"
-)]
 fn add<T: Real, const WIDTH: usize, const GROUPS: usize>(
     sums: &mut [[T; WIDTH]; GROUPS],
     sources: [*const [T; WIDTH]; GROUPS],
@@ -185,32 +215,29 @@ fn add<T: Real, const WIDTH: usize, const GROUPS: usize>(
     }
 }
 
-/// The values of a group after the step; those too small to matter become zero.
+/// The values of a group at a point after the step; those too small to matter become zero.
 #[inline(always)]
-fn finish<T: Real, const WIDTH: usize>(
+fn finish<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
     step: Step<T>,
     sum: &[T; WIDTH],
-    z: &[T; WIDTH],
+    own: &[T; WIDTH],
     before: &[T; WIDTH],
-    background: Option<T>,
+    background: T,
+    lanes: &[T; WIDTH],
     least: T,
 ) -> [T; WIDTH] {
-    // one where the background lies: its seed is added to all lanes at once, since a single lane would have to wait for
-    // the row to reach memory
-    let mut background_lanes = [T::default(); WIDTH];
-    background_lanes[BACKGROUND_LANE] = T::from_f64(1.0);
-    let background = background.map(|weight| step.seeds * weight);
-    let mut next = [T::default(); WIDTH];
+    let background = step.seeds * background;
+    let mut after = [T::default(); WIDTH];
     for lane in 0..WIDTH {
-        let mut value = step.along * sum[lane] - step.stay * z[lane] - step.back * before[lane];
-        if let Some(background) = background {
-            value += background * background_lanes[lane];
+        let mut value = step.along * sum[lane] - step.stay * own[lane] - step.back * before[lane];
+        if BACKGROUND {
+            value += background * lanes[lane];
         }
-        next[lane] = if value.abs() > least {
+        after[lane] = if value.abs() > least {
             value
         } else {
             T::default()
         };
     }
-    next
+    after
 }

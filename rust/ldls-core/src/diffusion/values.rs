@@ -3,6 +3,8 @@
 //! They are kept group by group, `Vec<Vec<[T; WIDTH]>>`: where a group holds nothing but zeros, a sweep leaves it out
 //! and does not touch its memory.
 
+#![expect(unsafe_code, reason = "threads share values by rows")]
+
 use super::seeds::MOST_GROUPS;
 use crate::Real;
 use rayon::prelude::*;
@@ -30,10 +32,8 @@ pub(super) struct SharedValues<'a, T, const WIDTH: usize> {
 
 // SAFETY: behind the pointers are plain numbers; callers of `rows` and `rows_mut` promise that nobody writes a row that
 // another reads or writes
-#[expect(unsafe_code, reason = "threads share values by rows")]
 unsafe impl<T: Send, const WIDTH: usize> Sync for SharedValues<'_, T, WIDTH> {}
 
-#[expect(unsafe_code, reason = "threads share values by rows")]
 impl<'a, T: Real, const WIDTH: usize> SharedValues<'a, T, WIDTH> {
     pub(super) fn new(values: &'a mut [Vec<[T; WIDTH]>]) -> Self {
         let mut groups = [std::ptr::null_mut(); MOST_GROUPS];

@@ -151,6 +151,40 @@ impl<T: Real> PixelLabels<T> {
         all
     }
 
+    /// Refuses labels of another number of points, and labels from `n_labels` on.
+    pub(crate) fn check(&self, points: usize, n_labels: usize) -> Result<()> {
+        let mismatch = |problem: String| {
+            Err(Error::Mismatch {
+                name: "pixel_labels",
+                problem,
+            })
+        };
+        if self.rows() != points {
+            return mismatch(format!("{} rows, the graph has {points}", self.rows()));
+        }
+        let highest = self
+            .labels
+            .iter()
+            .find(|&&label| label as usize >= n_labels);
+        highest.map_or(Ok(()), |label| {
+            mismatch(format!("label {label}, expected labels below {n_labels}"))
+        })
+    }
+
+    /// Most labels that the pixel edges of a point count for on average: 1 where masks do not overlap.
+    pub(crate) fn largest_overlap(&self) -> f64 {
+        let overlap = |i: usize| {
+            let mass = self.mass[i].to_f64();
+            let weights: f64 = self.row(i).map(|(_, weight)| weight.to_f64()).sum();
+            if mass > 0.0 {
+                weights / mass
+            } else {
+                f64::INFINITY
+            }
+        };
+        (0..self.rows()).map(overlap).fold(1.0, f64::max)
+    }
+
     /// Number of points.
     pub fn rows(&self) -> usize {
         self.mass.len()
