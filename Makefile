@@ -50,3 +50,7 @@ pictures: ## Make the pictures of the documentation anew, by the commands beside
 .PHONY: kills
 kills: ## Kill 200 runs of `ldls run` and hold what they leave, resumed, against an undisturbed one.
 	python tests/campaigns/kills.py
+
+.PHONY: sample
+sample: ## Make the frame of `ldls demo` anew, from its seed.
+	python tests/simulation/make_sample.py

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ldls
-from ldls.simulation import street_scene
+from ldls.simulation import sample_frame
 
 TILE_M = 100.0
 """Distance of the copies of a sweep in a tiled cloud: no copy touches another."""
@@ -79,7 +79,8 @@ def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Fra
 
 
 def _simulated() -> Frame:
-    scene = street_scene()
-    masks = ldls.InstanceMasks.from_array(scene.masks, categories=scene.categories, scores=scene.scores)
-    camera = ldls.Camera(projection=scene.projection, T_camera_lidar=scene.T_camera_lidar)
-    return Frame("simulated street (LDLS_TEST_DATA is not set)", scene.points, masks, camera)
+    sample = sample_frame()
+    (image,) = sample.images
+    assert image.masks is not None
+    points = np.asarray(sample.points, np.float32)
+    return Frame("simulated street (LDLS_TEST_DATA is not set)", points, image.masks, image.camera)

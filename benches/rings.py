@@ -41,5 +41,5 @@ def _simulated() -> tuple[str, Points, list[ldls.View]]:
     from ldls.simulation import make_rig, scene_frame
 
     frame = scene_frame(0, rig=make_rig(lidar="hdl-32e", camera="ring"))
-    views = [ldls.View(view.masks, view.camera, str(i)) for i, view in enumerate(frame.views)]
+    views = [ldls.View(image.masks, image.camera, image.name) for image in frame.images]
     return "simulated street, ring of six", frame.points, views

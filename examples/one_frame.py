@@ -2,7 +2,7 @@
 
     python examples/one_frame.py [OUT]
 
-The frame is simulated; with files of your own it begins with
+The frame is a simulated one that comes with ldls; with files of your own it begins with
 
     points = ldls.read_points("velodyne/000571.bin")
     masks = ldls.read_masks("masks/000571.json")
@@ -14,16 +14,15 @@ import sys
 from pathlib import Path
 
 import ldls
-from ldls.simulation import street_scene
+from ldls.simulation import sample_frame
 from ldls.viewing import save_pictures
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "one-frame")
 out.mkdir(parents=True, exist_ok=True)
 
-frame = street_scene(seed=3)
-points, image = frame.points, frame.image  # (N, 4) float32 in metres, (H, W, 3) uint8
-masks = ldls.InstanceMasks.from_array(frame.masks, categories=frame.categories, scores=frame.scores)
-camera = ldls.Camera(projection=frame.projection, T_camera_lidar=frame.T_camera_lidar)
+frame = sample_frame()
+points, (front,) = frame.points, frame.images  # (N, 4) float32 in metres
+masks, camera, image = front.masks, front.camera, front.read()  # the image is (H, W, 3) uint8
 
 result = ldls.segment(points, masks, camera)
 

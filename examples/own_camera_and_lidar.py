@@ -27,8 +27,8 @@ for number, frame in enumerate(frames):
     for folder in ("lidar", "front", "masks"):
         (out / folder).mkdir(parents=True, exist_ok=True)
     frame.points.tofile(out / "lidar" / f"{number:04}.bin")  # x y z intensity, float32, metres
-    Image.fromarray(frame.image).save(out / "front" / f"{number:04}.png")
-    ldls.save(frame.masks, out / "masks" / f"{number:04}.json")
+    Image.fromarray(frame.images[0].read()).save(out / "front" / f"{number:04}.png")
+    ldls.save(frame.images[0].masks, out / "masks" / f"{number:04}.json")
 
 # The calibration. T_camera_lidar takes lidar coordinates to camera coordinates (x right, y down, z forward). Most
 # sheets say the opposite, where the camera sits in the lidar's frame: turn that around, do not copy it.
@@ -63,8 +63,8 @@ for turn_deg in (0.0, 1.0, 2.0):
     aside = np.eye(4)
     aside[:3:2, :3:2] = [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
     camera = ldls.Camera(projection=K, T_camera_lidar=aside @ T_camera_lidar)
-    labels = ldls.segment(frames[0].points, frames[0].masks, camera).labels
-    right = ((labels > 0) == (frames[0].instances > 0))[labels >= 0]
+    labels = ldls.segment(frames[0].points, frames[0].images[0].masks, camera).labels
+    right = ((labels > 0) == (frames[0].truth.instances > 0))[labels >= 0]
     print(f"turned by {turn_deg:.0f} degrees: {100 * right.mean():.1f} % of the points in view are right")
 
 # From here on, everything works: ldls info, ldls run, ldls view, and Python.

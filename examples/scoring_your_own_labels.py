@@ -13,7 +13,7 @@ import numpy as np
 
 import ldls
 from ldls.evaluation import ClassSet, Labeling, evaluate, instance_table, semantic_table
-from ldls.simulation import SceneFrame, scene_frame
+from ldls.simulation import scene_frame
 
 NEAR_M = 3.0
 
@@ -29,26 +29,21 @@ def my_method(result: ldls.Segmentation) -> np.ndarray:
     return labels
 
 
-def truth_of(frame: SceneFrame) -> Labeling:
-    """True labels; `ldls.io.labels.read_labeling` reads those of KITTI, SemanticKITTI, nuScenes and others."""
-    names = [ldls.categories.COCO_NAMES[thing.category] for thing in frame.objects]
-    return Labeling.from_instance_labels(frame.instances, names)
-
-
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "scores")
 out.mkdir(parents=True, exist_ok=True)
 
 mine, ours, projected = [], [], []
 for seed in range(300, 304):
-    frame = scene_frame(seed)
-    result = ldls.segment(frame.points, frame.masks, frame.camera)
+    frame = scene_frame(seed)  # `ldls.io.labels.read_labeling` reads the truth of KITTI, SemanticKITTI, nuScenes, ...
+    (image,) = frame.images
+    result = ldls.segment(frame.points, image.masks, image.camera)
     names = np.array([instance.name for instance in result.instances])
     for pairs, labels in (
         (projected, result.direct_labels),
         (mine, my_method(result)),
         (ours, result.labels),
     ):
-        pairs.append((str(seed), Labeling.from_instance_labels(labels, names), truth_of(frame)))
+        pairs.append((frame.name, Labeling.from_instance_labels(labels, names), frame.truth))
 
 classes = ClassSet.kitti(("car", "person"))  # names of COCO, KITTI and other data sets are understood
 methods = {"direct projection": projected, "my method": mine, "ldls": ours}

@@ -12,26 +12,22 @@ from pathlib import Path
 import numpy as np
 
 import ldls
+from ldls.datasets import Frame
 from ldls.evaluation import ClassSet, Labeling, evaluate
-from ldls.simulation import SceneFrame, scene_frame
+from ldls.simulation import scene_frame
 
 SIGMAS = (0.01, 0.1, 1.0, 10.0)
 NEIGHBORS = (5, 10, 20)
 CLASSES = ClassSet.kitti(("car", "person"))  # names of COCO, KITTI and other data sets are understood
 
 
-def truth_of(frame: SceneFrame) -> Labeling:
-    """True labels of a simulated frame; yours may be read with `ldls.io.labels.read_labeling`."""
-    names = [ldls.categories.COCO_NAMES[thing.category] for thing in frame.objects]
-    return Labeling.from_instance_labels(frame.instances, names)
-
-
-def mean_iou(frames: list[SceneFrame], params: ldls.Params) -> float:
-    """Mean IoU of cars and persons, in percent."""
-    pairs = [
-        (str(number), Labeling.from_segmentation(ldls.segment(f.points, f.masks, f.camera, params=params)), truth_of(f))
-        for number, f in enumerate(frames)
-    ]
+def mean_iou(frames: list[Frame], params: ldls.Params) -> float:
+    """Mean IoU of cars and persons, in percent; frames of your own come from `ldls.datasets.open_source`."""
+    pairs = []
+    for frame in frames:
+        (image,) = frame.images
+        result = ldls.segment(frame.points, image.masks, image.camera, params=params)
+        pairs.append((frame.name, Labeling.from_segmentation(result), frame.truth))
     counts = evaluate(pairs, classes=CLASSES).semantic
     return 100 * float(np.mean([counts[name].iou for name in CLASSES.names]))
 

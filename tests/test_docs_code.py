@@ -60,7 +60,7 @@ def test_rings(run, capsys):
 
 def test_quick_start(own_demo, run, tmp_path, capsys):
     names = run("docs/quick-start.md")
-    assert "12 of 12 objects found" in capsys.readouterr().out
+    assert "15 of 15 objects found" in capsys.readouterr().out
     assert (tmp_path / "street.ply").stat().st_size > 12 * len(names["points"])
 
 
@@ -72,7 +72,7 @@ def test_own_sensors(own_demo, run, tmp_path):
     (recipe, _) = pages.recipes(pages.ROOT / "docs/own-sensors.md")
     (folder / "ldls.toml").write_text(recipe.commands.partition("<<'END'\n")[2].partition("END\n")[0])
     names = run("docs/own-sensors.md")
-    assert sum(found.n_points > 0 for found in names["result"].objects) == 12
+    assert sum(found.n_points > 0 for found in names["result"].objects) == 14
     # the page's transform is that of the demo, put together from a pose and a turn
     image = names["frame"].images[0]
     np.testing.assert_allclose(names["T_camera_lidar"], image.camera.T_camera_lidar, atol=1e-12)

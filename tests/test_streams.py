@@ -66,15 +66,14 @@ def test_a_stream_needs_no_more_memory_for_later_frames():
             """
 from pathlib import Path
 import numpy as np, ldls
-from ldls.simulation import street_scene
-scene = street_scene()
-masks = ldls.InstanceMasks.from_array(scene.masks)
-camera = ldls.Camera(projection=scene.projection, T_camera_lidar=scene.T_camera_lidar)
-stream = ldls.LabelDiffusion(camera, ldls.Params(threads=1))
-points = np.tile(scene.points, (5, 1)) + np.arange(5).repeat(len(scene.points))[:, None].astype(np.float32) * 1e-3
+from ldls.simulation import sample_frame
+frame = sample_frame()
+(image,) = frame.images
+stream = ldls.LabelDiffusion(image.camera, ldls.Params(threads=1))
+points = np.tile(frame.points, (5, 1)) + np.arange(5).repeat(len(frame.points))[:, None].astype(np.float32) * 1e-3
 def peak_kib(frames):
-    for frame in range(frames):
-        stream.segment(points[frame % 7 :], masks)
+    for number in range(frames):
+        stream.segment(points[number % 7 :], image.masks)
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmHWM:")[1].split()[0])
 print(peak_kib(3), peak_kib(40))
@@ -91,13 +90,12 @@ def test_frames_of_a_batch_run_one_a_thread():
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 import ldls
-from ldls.simulation import street_scene
-scene = street_scene()
-masks = ldls.InstanceMasks.from_array(scene.masks)
-camera = ldls.Camera(projection=scene.projection, T_camera_lidar=scene.T_camera_lidar)
-stream = ldls.LabelDiffusion(camera, ldls.Params(threads=1))
+from ldls.simulation import sample_frame
+frame = sample_frame()
+(image,) = frame.images
+stream = ldls.LabelDiffusion(image.camera, ldls.Params(threads=1))
 with ThreadPoolExecutor(3) as workers:
-    list(workers.map(lambda _: stream.segment(scene.points, masks), range(12)))
+    list(workers.map(lambda _: stream.segment(frame.points, image.masks), range(12)))
 print(*(task.joinpath("comm").read_text().strip() for task in Path("/proc/self/task").iterdir()))
 """,
         LDLS_NUM_THREADS="1",

@@ -28,9 +28,9 @@ def test_the_source_gives_back_what_was_simulated(drive_path):
     simulated = drive_frame(DRIVE, 2)
     frame = source[2]
     assert np.array_equal(frame.points, simulated.points)
-    assert np.array_equal(frame.images[0].read(), simulated.image)
-    assert frame.images[0].camera.projection == pytest.approx(simulated.camera.projection)
-    assert frame.images[0].camera.T_camera_lidar == pytest.approx(simulated.camera.T_camera_lidar, abs=1e-9)
+    assert np.array_equal(frame.images[0].read(), simulated.images[0].read())
+    assert frame.images[0].camera.projection == pytest.approx(simulated.images[0].camera.projection)
+    assert frame.images[0].camera.T_camera_lidar == pytest.approx(simulated.images[0].camera.T_camera_lidar, abs=1e-9)
     assert frame.stamp - frame.images[0].stamp == pytest.approx(DRIVE.sensors.delay_s, abs=1e-6)
     assert not check_stamps(source.names, source.stamps) and not inspect(source, 2).findings
 
@@ -41,7 +41,7 @@ def test_a_drive_scores_as_its_frames_do_singly(drive_path):
     singly = []
     for k, frame in enumerate(source):
         simulated = drive_frame(DRIVE, k)
-        result = ldls.segment(simulated.points, simulated.masks, simulated.camera)
+        result = ldls.segment(simulated.points, simulated.images[0].masks, simulated.images[0].camera)
         singly.append((frame.name, Labeling.from_segmentation(result), frame.truth))
     mean_through, mean_singly = _mean_iou(through), _mean_iou(singly)
     assert mean_through == pytest.approx(mean_singly, abs=1e-3)

@@ -44,4 +44,4 @@ def test_the_examples_run(own_demo, monkeypatch, capsys):
     printed = capsys.readouterr().out.splitlines()
     assert printed[0] == names["found"].verdict
     assert [line.split()[0] for line in printed[-4:]] == ["50", "100", "150", "200"]
-    assert printed[-1].split()[1] == "9"
+    assert printed[-1].split()[1] == "12"

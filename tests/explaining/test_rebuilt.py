@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 import ldls
 from ldls import stages
 from ldls.explaining import rebuild
-from ldls.simulation import street_scene
+from ldls.simulation import sample_frame
 from ring_samples import as_views, random_ring
 
 
@@ -18,10 +18,9 @@ def winners(result):
 
 
 def street():
-    frame = street_scene()
-    masks = ldls.InstanceMasks.from_array(frame.masks, categories=frame.categories, scores=frame.scores)
-    camera = ldls.Camera(projection=frame.projection, T_camera_lidar=frame.T_camera_lidar)
-    return ldls.segment(frame.points, masks, camera)
+    frame = sample_frame()
+    (image,) = frame.images
+    return ldls.segment(frame.points, image.masks, image.camera)
 
 
 def ring(seed):

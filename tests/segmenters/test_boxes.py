@@ -7,7 +7,7 @@ import ldls
 from ldls.errors import CorruptFileError, MaskError, ParameterError
 from ldls.segmenters import BoxSegmenter
 from ldls.segmenters.grabcut import cut, ellipse
-from ldls.simulation import street_scene
+from ldls.simulation import sample_frame
 
 IMAGE = np.zeros((40, 60, 3), np.uint8)
 LINE = "{name} 0.00 0 -1.5 {box} 1.5 1.6 3.9 1.0 1.7 20.0 -1.6{score}"
@@ -184,13 +184,14 @@ def test_grabcut_does_not_touch_the_image():
 
 
 def test_boxes_label_points():
-    frame = street_scene(3)
-    camera = ldls.Camera(projection=frame.projection, T_camera_lidar=frame.T_camera_lidar)
+    frame = sample_frame()
+    (image,) = frame.images
     boxes = []
-    for mask in ldls.InstanceMasks.from_array(frame.masks):
+    for mask in image.masks:
         top, left, height, width = mask.bounding_box
         boxes.append((left, top, left + width - 1, top + height - 1))
-    masks = BoxSegmenter(boxes, categories=frame.categories)(frame.image)
-    labels = ldls.segment(frame.points, masks, camera).labels
-    largest = np.argmax(np.bincount(frame.truth)[1:]) + 1
-    assert np.mean(labels[(frame.truth == largest) & (labels >= 0)] > 0) > 0.8
+    masks = BoxSegmenter(boxes, categories=image.masks.categories)(image.read())
+    labels = ldls.segment(frame.points, masks, image.camera).labels
+    truth = frame.truth.instances
+    largest = np.bincount(truth[labels >= 0])[1:].argmax() + 1
+    assert np.mean(labels[(truth == largest) & (labels >= 0)] > 0) > 0.8

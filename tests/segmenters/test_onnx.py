@@ -19,8 +19,7 @@ from ldls.errors import (
     UnsupportedFormatError,
 )
 from ldls.segmenters import OnnxSegmenter
-from ldls.simulation.demo.layout import street
-from ldls.simulation.demo.street import PROJECTION, T_CAMERA_LIDAR, photograph, scan
+from ldls.simulation import SegmenterErrors, SensorErrors, scene_frame
 from segmenters import graphs
 
 MIN_PIXELS, MIN_POINTS = 400, 100
@@ -29,11 +28,11 @@ MIN_PIXELS, MIN_POINTS = 400, 100
 class Street:
     """A street whose objects have flat colours of their own, and its truth."""
 
-    def __init__(self, seed=3):
-        rng = np.random.default_rng(seed)
-        solids, categories = street(rng)
-        self.points, self.truth = scan(solids, rng)
-        _, owners = photograph(solids)
+    def __init__(self, seed=4):
+        frame = scene_frame(seed, segmenter=SegmenterErrors.none(), sensors=SensorErrors.none())
+        (image,) = frame.images
+        self.points, self.truth, self.camera = frame.points, frame.truth.instances, image.camera
+        owners, categories = image.pixels.instances, image.pixels.categories
         sizes = np.bincount(owners.ravel(), minlength=len(categories) + 1)
         self.objects = [m for m in range(1, len(categories) + 1) if sizes[m] >= MIN_PIXELS]
         palette = np.random.default_rng(5).permutation(np.array(np.meshgrid(*[[60, 150, 240]] * 3)).reshape(3, -1).T)
@@ -44,7 +43,6 @@ class Street:
         self.categories = categories[np.array(self.objects) - 1]
         self.silhouettes = np.stack([owners == m for m in self.objects])
         self.scores = 0.95 - 0.01 * np.arange(len(self.objects))
-        self.camera = ldls.Camera(projection=PROJECTION, T_camera_lidar=T_CAMERA_LIDAR)
 
     @property
     def contiguous(self):

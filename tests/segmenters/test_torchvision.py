@@ -7,7 +7,7 @@ import pytest
 
 from ldls.errors import ParameterError
 from ldls.segmenters import OnnxSegmenter, TorchvisionSegmenter
-from ldls.simulation import street_scene
+from ldls.simulation import sample_frame
 
 torch = pytest.importorskip("torch")
 torchvision = pytest.importorskip("torchvision")
@@ -16,7 +16,7 @@ N = 10
 
 @pytest.fixture(scope="module")
 def image():
-    return np.ascontiguousarray(street_scene(0).image[100:220, 300:500])
+    return np.ascontiguousarray(sample_frame().images[0].read()[100:220, 300:500])
 
 
 @pytest.fixture(scope="module")

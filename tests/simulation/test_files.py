@@ -12,9 +12,10 @@ from ldls.errors import ParameterError
 from ldls.evaluation import ClassSet
 from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import (
-    SceneFrame,
+    FrameOrder,
     SegmenterErrors,
     SensorErrors,
+    SimulatedFrame,
     make_frames,
     make_rig,
     scene_frame,
@@ -23,14 +24,12 @@ from ldls.simulation import (
     write_kitti,
 )
 from ldls.simulation import suite as make_whole_suite
-from ldls.simulation.boxes import annotation_name
-from ldls.simulation.kitti_layout import is_whole
-from ldls.simulation.production import FrameOrder
+from ldls.simulation.scene_object import CLASS_NAMES
 from ldls.stages import project
 
 
 @pytest.fixture(scope="module")
-def frame() -> SceneFrame:
+def frame() -> SimulatedFrame:
     return scene_frame(21, kind="campus")
 
 
@@ -48,34 +47,35 @@ def test_points_come_back(frame, training):
 def test_the_calibration_comes_back(frame, training):
     for number in range(4):
         camera = ldls.read_camera(training / "calib/000021.txt", camera=number)
-        np.testing.assert_allclose(camera.projection, frame.camera.projection, atol=1e-9)
-        np.testing.assert_allclose(camera.T_camera_lidar, frame.camera.T_camera_lidar, atol=1e-9)
+        np.testing.assert_allclose(camera.projection, frame.images[0].camera.projection, atol=1e-9)
+        np.testing.assert_allclose(camera.T_camera_lidar, frame.images[0].camera.T_camera_lidar, atol=1e-9)
 
 
 def test_masks_come_back(frame, training):
     masks = ldls.read_masks(training / "masks/000021.json")
-    np.testing.assert_array_equal(masks.to_array(), frame.masks.to_array())
-    np.testing.assert_array_equal(masks.categories, frame.masks.categories)
-    np.testing.assert_allclose(masks.scores, frame.masks.scores, atol=1e-4)
+    np.testing.assert_array_equal(masks.to_array(), frame.images[0].masks.to_array())
+    np.testing.assert_array_equal(masks.categories, frame.images[0].masks.categories)
+    np.testing.assert_allclose(masks.scores, frame.images[0].masks.scores, atol=1e-4)
 
 
 def test_the_image_comes_back(frame, training):
     with Image.open(training / "image_2/000021.png") as image:
-        np.testing.assert_array_equal(np.asarray(image), frame.image)
+        np.testing.assert_array_equal(np.asarray(image), frame.images[0].read())
 
 
 def test_annotations_have_a_line_for_each_point(frame, training):
     truth = read_annotations(training / "annotations/000021.txt")
-    np.testing.assert_array_equal(truth.instances, frame.instances)
+    np.testing.assert_array_equal(truth.instances, frame.truth.instances)
     names = np.array(truth.names)[truth.classes]
     assert not truth.ignored.any()
-    assert set(names[frame.instances == 0]) == {"background"}
-    assert set(names[frame.categories == 1]) == {"Pedestrian"}
-    assert set(names[frame.categories == 3]) == {"Car"}
+    categories = np.array([0, *(o.category for o in frame.objects)])[frame.truth.instances]
+    assert set(names[frame.truth.instances == 0]) == {"background"}
+    assert set(names[categories == 1]) == {"Pedestrian"}
+    assert set(names[categories == 3]) == {"Car"}
 
 
 def test_names_are_those_that_evaluation_knows():
-    names = [annotation_name(category) for category in (1, 3, 8, 6, 64)]
+    names = [CLASS_NAMES[category] for category in (1, 3, 8, 6, 64)]
     assert names == ["Pedestrian", "Car", "Truck", "bus", "potted plant"]
     assert all(ClassSet.kitti().knows(name) for name in names)
 
@@ -85,11 +85,11 @@ def test_boxes_hold_the_points_of_their_objects(frame, training):
     assert {len(row) for row in rows} == {15}
     assert {row[0] for row in rows} <= {"Car", "Pedestrian", "Truck", "Misc"}
     boxes = np.array([row[1:] for row in rows], float)
-    transform = frame.camera.T_camera_lidar
+    transform = frame.images[0].camera.T_camera_lidar
     points = frame.points[:, :3].astype(float) @ transform[:3, :3].T + transform[:3, 3]
     checked = 0
     for m, thing in enumerate(frame.objects, start=1):
-        mine = points[frame.instances == m]
+        mine = points[frame.truth.instances == m]
         bottom = transform[:3, :3] @ (np.array(thing.centre_m) - (0, 0, thing.height_m / 2)) + transform[:3, 3]
         near = np.abs(boxes[:, 10:13] - bottom).max(axis=1) < 0.01
         if len(mine) < 20 or not near.any():
@@ -139,8 +139,8 @@ def test_a_ring_has_a_folder_for_each_camera(tmp_path):
     assert [mounted.model.focal_px for mounted in ring.cameras] == [809.2 if k == 3 else 1266.4 for k in range(6)]
     frame = scene_frame(0, rig=replace(ring, cameras=tuple(map(quarter, ring.cameras))))
     write_kitti(tmp_path, "000000", frame)
-    views = [project(frame.points, view.camera, image_size=(225, 400))[0] for view in frame.views]
-    assert len(np.unique(np.concatenate(views))) > 0.5 * len(frame.points)
+    in_view = [project(frame.points, image.camera, image_size=(225, 400))[0] for image in frame.images]
+    assert len(np.unique(np.concatenate(in_view))) > 0.5 * len(frame.points)
     for k in range(1, 6):
         camera = ldls.read_camera(tmp_path / f"training/calib_ring_{k}/000000.txt")
         assert camera.projection[0, 0] == pytest.approx((809.2 if k == 3 else 1266.4) / 4)
@@ -157,7 +157,7 @@ def test_whole_frames_are_kept_and_broken_ones_made_anew(tmp_path):
     first = list(make_frames(tmp_path, orders(2), processes=1))
     assert [s.name for s in first] == ["000000", "000001"]
     (tmp_path / "training/annotations/000001.txt").unlink()
-    assert not is_whole(tmp_path, "000001")
+    assert [order.is_whole(tmp_path) for order in orders(2)] == [True, False]
     again = list(make_frames(tmp_path, orders(2), processes=1))
     assert again[0] is None and again[1] == first[1]
 

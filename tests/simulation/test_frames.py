@@ -4,36 +4,46 @@ import numpy as np
 import pytest
 
 from ldls.errors import ParameterError
-from ldls.simulation import SceneFrame, SegmenterErrors, SensorErrors, make_rig, make_scene, scene_frame
+from ldls.simulation import SegmenterErrors, SensorErrors, SimulatedFrame, make_rig, make_scene, scene_frame
+from ldls.simulation.scene_object import CLASS_NAMES
 from ldls.stages import project
 
 PERFECT = {"segmenter": SegmenterErrors.none(), "sensors": SensorErrors.none()}
 
 
 @pytest.fixture(scope="module", params=["street", "campus"])
-def frame(request: pytest.FixtureRequest) -> SceneFrame:
+def frame(request: pytest.FixtureRequest) -> SimulatedFrame:
     return scene_frame(11, kind=request.param, **PERFECT)
 
 
-def pixel_instances(frame: SceneFrame) -> tuple[np.ndarray, np.ndarray]:
+def pixel_instances(frame: SimulatedFrame) -> tuple[np.ndarray, np.ndarray]:
     """Object of the pixel nearest to each point in view, and object of the point."""
-    in_view, pixels = project(frame.points, frame.camera, image_size=frame.image.shape[:2])
+    (image,) = frame.images
+    in_view, pixels = project(frame.points, image.camera, image_size=image.camera.image_size)
     column, row = np.floor(np.asarray(pixels) + 0.5).astype(int).T
-    return frame.views[0].pixels.instances[row, column], frame.instances[in_view]
+    return image.pixels.instances[row, column], frame.truth.instances[in_view]
 
 
 def test_arrays_have_the_documented_shapes(frame):
     n = len(frame.points)
     assert 100_000 < n < 64 * 2083
     assert frame.points.dtype == np.float32 and frame.points.shape == (n, 4)
-    assert frame.instances.shape == frame.categories.shape == frame.rings.shape == (n,)
-    assert frame.image.shape == (375, 1242, 3) and frame.image.dtype == np.uint8
+    assert frame.truth.instances.shape == frame.truth.classes.shape == frame.rings.shape == (n,)
+    image = frame.images[0].read()
+    assert image.shape == (375, 1242, 3) and image.dtype == np.uint8
     assert ((frame.points[:, 3] >= 0) & (frame.points[:, 3] <= 1)).all()
 
 
-def test_categories_are_those_of_the_objects(frame):
-    of_object = np.array([0, *(o.category for o in frame.objects)])
-    np.testing.assert_array_equal(frame.categories, of_object[frame.instances])
+def test_classes_are_those_of_the_objects(frame):
+    of_object = np.array(["background", *(CLASS_NAMES[o.category] for o in frame.objects)])
+    np.testing.assert_array_equal(np.array(frame.truth.names)[frame.truth.classes], of_object[frame.truth.instances])
+    assert not frame.truth.ignored.any()
+
+
+def test_an_image_is_read_anew_each_time(frame):
+    (image,) = frame.images
+    image.read()[:] = 0
+    assert image.read().any()
 
 
 def test_points_and_pixels_agree_on_their_objects(frame):
@@ -44,7 +54,7 @@ def test_points_and_pixels_agree_on_their_objects(frame):
 
 def test_points_of_an_object_lie_in_its_box(frame):
     for m, thing in enumerate(frame.objects, start=1):
-        offset = frame.points[frame.instances == m, :3] - np.array(thing.centre_m)
+        offset = frame.points[frame.truth.instances == m, :3] - np.array(thing.centre_m)
         c, s = np.cos(thing.yaw), np.sin(thing.yaw)
         local = np.abs(offset @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
         assert (local <= np.array([thing.length_m, thing.width_m, thing.height_m]) / 2 + 0.12).all()
@@ -67,21 +77,23 @@ def test_scenes_hold_ten_categories():
 def test_a_seed_is_a_frame():
     first, again, other = scene_frame(5), scene_frame(5), scene_frame(6)
     np.testing.assert_array_equal(first.points, again.points)
-    np.testing.assert_array_equal(first.image, again.image)
-    np.testing.assert_array_equal(first.masks.to_array(), again.masks.to_array())
-    np.testing.assert_array_equal(first.camera.T_camera_lidar, again.camera.T_camera_lidar)
+    one, same, another = (frame.images[0] for frame in (first, again, other))
+    np.testing.assert_array_equal(one.read(), same.read())
+    np.testing.assert_array_equal(one.masks.to_array(), same.masks.to_array())
+    np.testing.assert_array_equal(one.camera.T_camera_lidar, same.camera.T_camera_lidar)
     assert first.objects == again.objects
-    assert not np.array_equal(first.image, other.image)
+    assert not np.array_equal(one.read(), another.read())
 
 
 def test_perfect_sensors_give_the_true_calibration(frame):
-    np.testing.assert_allclose(frame.camera.T_camera_lidar, frame.views[0].true_camera.T_camera_lidar, atol=1e-12)
+    (image,) = frame.images
+    np.testing.assert_allclose(image.camera.T_camera_lidar, image.true_camera.T_camera_lidar, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_calibration_is_off_by_the_strengths(seed):
     errors = SensorErrors(rotation_deg=0.7, translation_m=0.05, delay_s=0)
-    error = errors.calibrated(np.eye(4), np.random.default_rng(seed))
+    error = errors.drift(seed)
     angle = np.degrees(np.arccos((np.trace(error[:3, :3]) - 1) / 2))
     assert angle == pytest.approx(0.7)
     assert np.linalg.norm(error[:3, 3]) == pytest.approx(0.05)
@@ -95,22 +107,17 @@ def test_delay_moves_what_moves_and_nothing_else():
         )
         for s in (0.0, 0.2)
     )
-    np.testing.assert_array_equal(still.image, late.image)
-    np.testing.assert_array_equal(still.views[0].pixels.instances, late.views[0].pixels.instances)
+    np.testing.assert_array_equal(still.images[0].read(), late.images[0].read())
+    np.testing.assert_array_equal(still.images[0].pixels.instances, late.images[0].pixels.instances)
+    assert (late.stamp, late.images[0].stamp) == (0.2, 0.0)
     for before, after in zip(still.objects, late.objects, strict=True):
         moved = np.subtract(after.centre_m, before.centre_m)
         np.testing.assert_allclose(moved, [*(0.2 * v for v in before.velocity_m_s), 0], atol=1e-9)
-    fast = (
-        max(range(len(still.objects)), key=lambda m: np.count_nonzero(still.instances == m + 1) * _speed(still, m)) + 1
-    )
-    shift = late.points[late.instances == fast, :3].mean(axis=0) - still.points[still.instances == fast, :3].mean(
-        axis=0
-    )
+    counts = np.bincount(still.truth.instances, minlength=len(still.objects) + 1)[1:]
+    fast = np.argmax(counts * [np.hypot(*o.velocity_m_s) for o in still.objects]) + 1
+    before, after = (f.points[f.truth.instances == fast, :3].mean(axis=0) for f in (still, late))
+    shift = after - before
     np.testing.assert_allclose(shift[:2], 0.2 * np.array(still.objects[fast - 1].velocity_m_s), atol=0.5)
-
-
-def _speed(frame, m):
-    return np.hypot(*frame.objects[m].velocity_m_s)
 
 
 def test_windows_let_a_laser_through(frame):
@@ -129,8 +136,8 @@ def test_windows_let_a_laser_through(frame):
 )
 def test_other_rigs(lidar, camera):
     frame = scene_frame(1, kind="campus", rig=make_rig(lidar=lidar, camera=camera), **PERFECT)
-    assert len(frame.views) == 1
-    assert frame.image.shape == (480, 640, 3)
+    assert len(frame.images) == 1
+    assert frame.images[0].read().shape == (480, 640, 3)
     seen, truth = pixel_instances(frame)
     assert (seen == truth).mean() > 0.9
 

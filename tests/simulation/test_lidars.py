@@ -7,9 +7,13 @@ import pytest
 
 from ldls.errors import ParameterError
 from ldls.simulation import LIDARS, make_rig
+from ldls.simulation.photograph import photograph
 from ldls.simulation.raycasting import RayCaster
+from ldls.simulation.rigs import CameraModel, MountedCamera
 from ldls.simulation.scanning import scan
-from ldls.simulation.scenes import make_scene
+from ldls.simulation.scenes import Scene, make_scene
+from ldls.simulation.shapes.primitives import box
+from ldls.simulation.shapes.shape import Material
 
 
 @pytest.mark.parametrize(
@@ -71,6 +75,58 @@ def test_far_returns_are_lost_first(street):
         for ring in ((2, 10), (20, 40))
     ]
     assert lost[1] > lost[0]
+
+
+WALL_M, GREY = 5.0, 0.5
+REFLECTANCE = 0.1 + 0.6 * GREY
+COSINE_BANDS = np.array([0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.0])
+
+
+def wall(material=Material.PLAIN):
+    """A long grey wall to the left of the lidar, seen ever more at a slant the farther along it a ray goes."""
+    shape = box((0, WALL_M + 0.5, 0), (400, 1, 400), (GREY, GREY, GREY), material)
+    return Scene(shape, np.zeros(len(shape.faces), np.int32), ())
+
+
+def sweep_of_the_wall(**changes):
+    """Points of many firings in one plane, and the cosine of the angle at which each meets the wall."""
+    exact = {"elevations_deg": (0.0,), "firings": 200_000, "range_noise_m": 0.0, "range_step_m": 0.0, "dropout": 0.0}
+    lidar = dataclasses.replace(LIDARS["vlp-16"], **exact, **changes)
+    scene = wall()
+    points = scan(scene, RayCaster(scene.shape), lidar, 1.0, np.random.default_rng(0)).points.astype(float)
+    return points, WALL_M / np.linalg.norm(points[:, :3], axis=1), lidar
+
+
+def test_intensity_falls_with_the_cosine_of_the_angle_of_incidence():
+    points, cosine, _ = sweep_of_the_wall(sensitivity=1e9)
+    bands = np.digitize(cosine, COSINE_BANDS)
+    for k in range(1, len(COSINE_BANDS)):
+        expected = REFLECTANCE * (0.35 + 0.65 * cosine[bands == k].mean())
+        assert points[bands == k, 3].mean() == pytest.approx(expected, rel=0.02)
+
+
+def test_grazed_surfaces_lose_returns_by_the_cosine():
+    _, cosine, lidar = sweep_of_the_wall(sensitivity=0.02)
+    seen = np.histogram(cosine, COSINE_BANDS)[0]
+    slant = np.abs(lidar.directions()[:, 1])  # the wall's normal is y
+    fired = (lidar.directions()[:, 1] > 0) & (WALL_M / np.maximum(slant, 1e-9) < lidar.max_range_m)
+    signal = lidar.sensitivity * REFLECTANCE * slant * (lidar.max_range_m * slant / WALL_M) ** 2
+    expected = np.histogram(slant[fired], COSINE_BANDS, weights=-np.expm1(-signal[fired]))[0]
+    np.testing.assert_allclose(seen, expected, rtol=0.06)
+    assert expected[0] < 0.1 * np.histogram(slant[fired], COSINE_BANDS)[0][0]
+
+
+def test_glass_reflects_the_sky_where_it_is_grazed():
+    camera = MountedCamera(CameraModel(400, 1, 120.0, (199.5, 0.0)), (0.0, 0.0, 0.0), yaw_deg=60.0)
+    slant = (camera.model.directions() @ camera.T_camera_lidar()[:3, :3])[:, 1]
+    brightness = {}
+    for material in (Material.PLAIN, Material.GLASS):
+        scene = wall(material)
+        image, _ = photograph(scene, RayCaster(scene.shape), camera, 1.0)
+        brightness[material] = image[0].mean(axis=1)
+    gain = brightness[Material.GLASS] - brightness[Material.PLAIN]
+    assert np.abs(gain[slant > 0.99]).max() < 1
+    assert gain[(slant > 0.1) & (slant < 0.25)].min() > 6
 
 
 def _in(points, near, far):

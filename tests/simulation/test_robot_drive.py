@@ -1,5 +1,6 @@
 """The simulated robot: its lens, its bag, and its sweeps through the source to labels and back."""
 
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -15,8 +16,8 @@ from ldls.errors import CalibrationError, ParameterError
 from ldls.io.labelled_bag import LabelledBag
 from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import SegmenterErrors, robot_drive, write_robot_drive
-from ldls.simulation.lenses import LensModel, distorted, undistorted
-from ldls.simulation.robot_drive import ROBOT
+from ldls.simulation.drives import ROBOT
+from ldls.simulation.rigs import CameraModel, distorted, undistorted
 from ldls.stages import project
 
 KINDS = {"rosbag1": "drive.bag", "rosbag2": "drive", "mcap": "drive"}
@@ -26,19 +27,19 @@ MODEL = ROBOT.cameras[0].model
 
 
 @pytest.fixture(scope="module")
-def moments():
+def simulated():
     return list(robot_drive(FRAMES, seed=SEED, segmenter=SegmenterErrors.none()))
 
 
 @pytest.fixture(scope="module", params=KINDS)
-def drive_folder(request, moments, tmp_path_factory) -> Path:
+def drive_folder(request, simulated, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp(request.param)
     kind = request.param
     options = {"seed": SEED, "segmenter": SegmenterErrors.none()}
 
     def simulated_once(frames, **asked):
         assert {key: asked[key] for key in options} == options
-        return iter(moments[:frames])
+        return iter(simulated[:frames])
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sys.modules[write_robot_drive.__module__], "robot_drive", simulated_once)
@@ -91,29 +92,29 @@ def test_undistorting_undoes_distorting(lens):
 )
 def test_lenses_that_cannot_be_simulated(lens, match):
     with pytest.raises(CalibrationError, match=match):
-        LensModel(64, 48, 40.0, (31.5, 23.5), lens).directions()
+        CameraModel(64, 48, 40.0, (31.5, 23.5), lens).directions()
 
 
-def test_the_bag_holds_what_was_simulated(drive_folder, moments):
+def test_the_bag_holds_what_was_simulated(drive_folder, simulated):
     bag = RosBag(next(drive_folder.glob("drive*")))
     assert len(bag) == FRAMES
     np.testing.assert_allclose(bag.offsets_s, 0.012)
-    for number, (frame, moment) in enumerate(zip(bag, moments, strict=True)):
-        np.testing.assert_array_equal(frame.points[:, :3], moment.sweep.points[:, :3])
-        np.testing.assert_array_equal(bag.cloud(number).fields["ring"], 15 - moment.sweep.rings)
+    for number, (frame, made) in enumerate(zip(bag, simulated, strict=True)):
+        np.testing.assert_array_equal(frame.points[:, :3], made.points[:, :3])
+        np.testing.assert_array_equal(bag.cloud(number).fields["ring"], 15 - made.rings)
         time = bag.cloud(number).fields["time"]
         assert time.min() >= 0 and time.max() <= 0.1
         (image,) = frame.images
-        np.testing.assert_array_equal(image.read(), moment.image)
-        assert image.camera.distortion == MODEL.distortion
+        np.testing.assert_array_equal(image.read(), made.images[0].read())
+        assert image.camera.distortion == made.images[0].camera.distortion == MODEL.distortion
         np.testing.assert_allclose(image.camera.T_camera_lidar, ROBOT.cameras[0].T_camera_lidar(), atol=1e-12)
         masks = ldls.read_masks(drive_folder / f"masks/{frame.name}.json")
-        np.testing.assert_array_equal(masks.to_array(), moment.masks.to_array())
+        np.testing.assert_array_equal(masks.to_array(), made.images[0].masks.to_array())
         truth = read_annotations(drive_folder / f"annotations/{frame.name}.txt")
-        np.testing.assert_array_equal(truth.instances, moment.sweep.instances)
+        np.testing.assert_array_equal(truth.instances, made.truth.instances)
 
 
-def test_from_bag_to_labelled_bag_and_back(drive_folder, moments, tmp_path):
+def test_from_bag_to_labelled_bag_and_back(drive_folder, simulated, tmp_path):
     source = RosBag(next(drive_folder.glob("drive*")))
     kind = next(k for k in KINDS if drive_folder.name.startswith(k))
     out = tmp_path / KINDS[kind]
@@ -125,39 +126,40 @@ def test_from_bag_to_labelled_bag_and_back(drive_folder, moments, tmp_path):
             results.append(ldls.segment(frame.points, masks, frame.images[0].camera))
             bag.write(results[-1], source.header(number))
     labelled = RosBag(out, points_topic="/points_labelled")
-    camera = ldls.Camera(
-        projection=MODEL.projection(), T_camera_lidar=ROBOT.cameras[0].T_camera_lidar(), distortion=MODEL.distortion
-    )
     by_bag, direct = [], []
-    for number, (result, moment) in enumerate(zip(results, moments, strict=True)):
+    for number, (result, made) in enumerate(zip(results, simulated, strict=True)):
+        (image,) = made.images
         fields = labelled.cloud(number).fields
         np.testing.assert_array_equal(fields["instance_id"], np.maximum(result.labels, 0))
         np.testing.assert_array_equal(fields["class_id"], result.categories)
         assert labelled.header(number) == source.header(number)
         labels = np.where(result.labels < 0, -1, fields["instance_id"].astype(int))
-        by_bag += ious(labels, moment.sweep.instances)
-        direct += ious(ldls.segment(moment.sweep.points, moment.masks, camera).labels, moment.sweep.instances)
+        by_bag += ious(labels, made.truth.instances)
+        direct += ious(ldls.segment(made.points, image.masks, image.camera).labels, made.truth.instances)
     assert len(by_bag) >= 30
     assert np.mean(by_bag) == pytest.approx(np.mean(direct), abs=0.01)
     assert np.mean(by_bag) > 0.8
 
 
-def test_without_its_distortion_the_lens_costs_accuracy(moments):
+def test_without_its_distortion_the_lens_costs_accuracy(simulated):
     true, pinhole = [], []
-    for moment in moments:
-        for found, lens in ((true, MODEL.distortion), (pinhole, ldls.Distortion())):
-            transform = ROBOT.cameras[0].T_camera_lidar()
-            camera = ldls.Camera(projection=MODEL.projection(), T_camera_lidar=transform, distortion=lens)
-            labels = ldls.segment(moment.sweep.points, moment.masks, camera).labels
-            found += ious(labels, moment.sweep.instances)
+    for made in simulated:
+        (image,) = made.images
+        for scores, lens in ((true, MODEL.distortion), (pinhole, ldls.Distortion())):
+            camera = dataclasses.replace(image.camera, distortion=lens)
+            labels = ldls.segment(made.points, image.masks, camera).labels
+            scores += ious(labels, made.truth.instances)
     assert np.mean(true) > np.mean(pinhole) + 0.05
 
 
-def test_the_robot_drives_and_objects_move(moments):
-    assert [m.travelled_m for m in moments] == pytest.approx([0, 0.12, 0.24, 0.36])
-    assert not np.array_equal(moments[0].image, moments[3].image)
+def test_the_robot_drives_and_objects_move(simulated):
+    assert [frame.stamp for frame in simulated] == pytest.approx([0, 0.1, 0.2, 0.3])
+    first, last = simulated[0].objects, simulated[3].objects
+    moved = [after.centre_m[0] - before.centre_m[0] for before, after in zip(first, last, strict=True)]
+    assert moved == pytest.approx([0.3 * (o.velocity_m_s[0] - 1.2) for o in first])
+    assert not np.array_equal(simulated[0].images[0].read(), simulated[3].images[0].read())
     again = next(robot_drive(1, seed=SEED, segmenter=SegmenterErrors.none()))
-    np.testing.assert_array_equal(again.sweep.points, moments[0].sweep.points)
+    np.testing.assert_array_equal(again.points, simulated[0].points)
 
 
 def test_bags_are_refused_before_anything_is_made(tmp_path):

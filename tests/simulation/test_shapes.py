@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from ldls.simulation.raycasting import RayCaster
-from ldls.simulation.shapes import cycles, figures, furniture, scenery, vehicles
+from ldls.simulation.shapes import figures, scenery, vehicles
 
 SIZES_M = {
     vehicles.car: ((3.6, 5.0), (1.6, 1.95), (1.35, 1.75)),
     vehicles.bus: ((9.4, 12.3), (2.4, 2.7), (2.8, 3.3)),
     vehicles.truck: ((6.3, 9.4), (2.2, 2.7), (2.8, 3.6)),
-    cycles.bicycle: ((1.5, 1.9), (0.4, 0.65), (0.9, 1.2)),
-    cycles.motorcycle: ((1.8, 2.3), (0.6, 0.85), (0.9, 1.25)),
+    vehicles.bicycle: ((1.5, 1.9), (0.4, 0.65), (0.9, 1.2)),
+    vehicles.motorcycle: ((1.8, 2.3), (0.6, 0.85), (0.9, 1.25)),
     figures.person: ((0.25, 1.3), (0.45, 0.9), (1.5, 2.05)),
     figures.dog: ((0.8, 1.5), (0.15, 0.35), (0.45, 1.0)),
-    furniture.bench: ((0.4, 0.75), (1.4, 2.1), (0.7, 0.95)),
-    furniture.chair: ((0.4, 0.65), (0.4, 0.6), (0.8, 1.05)),
-    furniture.potted_plant: ((0.4, 1.6), (0.4, 1.6), (0.8, 2.0)),
+    scenery.bench: ((0.4, 0.75), (1.4, 2.1), (0.7, 0.95)),
+    scenery.chair: ((0.4, 0.65), (0.4, 0.6), (0.8, 1.05)),
+    scenery.potted_plant: ((0.4, 1.6), (0.4, 1.6), (0.8, 2.0)),
 }
 
 
@@ -32,7 +32,7 @@ def test_sizes_are_believable_and_shapes_stand_on_the_ground(build, seed):
 
 
 def across(shape, x_m, z_m):
-    """Whether each ray along y through (x, z) meets the shape."""
+    """True for each ray along y through (x, z) that meets the shape."""
     x, z = np.broadcast_arrays(np.asarray(x_m, float), np.asarray(z_m, float))
     origins = np.column_stack([x.ravel(), np.full(x.size, -9.0), z.ravel()])
     return RayCaster(shape).faces(origins, np.tile([0.0, 1.0, 0.0], (x.size, 1))) >= 0
@@ -57,12 +57,12 @@ def test_rays_pass_between_the_legs_of_a_walker():
 
 
 def test_rays_pass_through_the_wheels_of_a_bicycle():
-    bicycle = cycles.bicycle(np.random.default_rng(0))
+    bicycle = vehicles.bicycle(np.random.default_rng(0))
     wheel = across(bicycle, *np.meshgrid(np.linspace(0.7, 0.78, 9), np.linspace(0.28, 0.38, 9)))
     assert wheel.mean() < 0.3
 
 
-@pytest.mark.parametrize("build", [furniture.bench, furniture.chair])
+@pytest.mark.parametrize("build", [scenery.bench, scenery.chair])
 def test_rays_pass_under_seats(build):
     assert across(build(np.random.default_rng(0)), np.linspace(-0.1, 0.1, 9), 0.25).mean() < 0.3
 

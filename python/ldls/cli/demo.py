@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from PIL import Image
 from rich.table import Table
 
 import ldls
@@ -18,7 +17,8 @@ from ldls.cli.recording_options import ONLY_CAMERA, RerunOption, check_recording
 from ldls.io import save
 
 if TYPE_CHECKING:
-    from ldls.simulation import SimulatedFrame
+    from ldls.cloud import Points
+    from ldls.datasets.frame import CameraImage
 
 
 @speaks_plainly
@@ -26,83 +26,87 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)] = Path(
         "ldls-demo"
     ),
-    seed: Annotated[int, typer.Option(help="Which street; every number is another one.", min=0)] = 0,
+    seed: Annotated[
+        int | None, typer.Option(help="Simulate another street, that of this number; needs the extra `sim`.", min=0)
+    ] = None,
     rerun: RerunOption = None,
 ) -> None:
     """Run the method on a simulated street: no data needed.
 
-    Builds a small street with cars, people and more, simulates a lidar sweep and the masks that a network would
-    find, segments the sweep, and holds direct projection and the method against the scene's true labels. Writes the
-    results as `ldls segment` does, pictures (the image, the bird's-eye view, and the comparison with direct
-    projection), and the frame itself so that you can run that command on it.
+    Takes the frame that comes with ldls, a lidar sweep of a street with cars, people and more and the masks that a
+    network would find in its image, segments the sweep, and holds direct projection and the method against the true
+    labels. Writes the results as `ldls segment` does, pictures (the image, the bird's-eye view, and the comparison
+    with direct projection), and the frame itself so that you can run that command on it.
     """
-    from ldls.simulation import street_scene
+    from ldls.simulation import sample_frame, scene_frame
     from ldls.viewing import save_pictures
 
     check_recording(rerun)
-    frame = street_scene(seed)
-    masks = ldls.InstanceMasks.from_array(
-        frame.masks,
-        categories=frame.categories,
-        scores=frame.scores,
-        image_size=frame.image.shape[:2],
-    )
-    camera = ldls.Camera(projection=frame.projection, T_camera_lidar=frame.T_camera_lidar)
-    result = ldls.segment(frame.points, masks, camera)
+    frame = sample_frame() if seed is None else scene_frame(seed)
+    (image,) = frame.images
+    assert image.masks is not None and frame.truth is not None
+    rgb = image.read()
+    result = ldls.segment(frame.points, image.masks, image.camera)
     outputs = [output for output in DEFAULT_OUTPUTS if output is not Output.PNG]
-    written = write_outputs(out, "demo", result, frame.image, outputs)
-    written += save_pictures(out / "demo.png", result, frame.image)
-    command = write_inputs(out, frame, masks)
+    written = write_outputs(out, "demo", result, rgb, outputs)
+    written += save_pictures(out / "demo.png", result, rgb)
+    command = write_inputs(out, frame.points, image)
 
     screen = console()
     screen.print(object_table(result.objects))
     screen.print(timing_table(result.timings))
-    screen.print(accuracy_table(frame, masks, result))
+    screen.print(accuracy_table(result, frame.truth.instances))
     screen.print("wrote " + " ".join(map(str, written)), highlight=False, soft_wrap=True)
     screen.print(f"the same from files: {command}", highlight=False, soft_wrap=True)
     if rerun is not None:
-        said = record(result, rerun, name="demo", images={ONLY_CAMERA: frame.image})
+        said = record(result, rerun, name="demo", images={ONLY_CAMERA: rgb})
         screen.print(said, highlight=False, soft_wrap=True)
 
 
-def accuracy_table(frame: SimulatedFrame, masks: ldls.InstanceMasks, result: ldls.Segmentation) -> Table:
-    """Intersection over union of each object with the truth, for direct projection and for the method."""
-    truth = frame.truth[result.in_view]
-    direct = result.direct_labels[result.in_view]
-    found = result.labels[result.in_view]
-    ious = [(_iou(direct, truth, m), _iou(found, truth, m)) for m in range(1, len(masks) + 1)]
-    mean = np.nanmean(ious, axis=0)
+def accuracy_table(result: ldls.Segmentation, truth: NDArray[np.int32]) -> Table:
+    """Intersection over union with the truth, (N,) instances, of each mask's object, by direct projection and by ldls.
+
+    A mask is of the object that most of its points in direct projection belong to.
+    """
+    seen = result.in_view
+    truth, direct, labels = truth[seen], result.direct_labels[seen], result.labels[seen]
+    rows, ious = [], []
+    for instance in result.instances:
+        points = np.bincount(truth[direct == instance.label], minlength=2)[1:]
+        if points.any():  # else it is a mask of nothing
+            mine = truth == points.argmax() + 1
+            rows.append((instance.name, int(mine.sum())))
+            ious.append([_iou(one == instance.label, mine) for one in (direct, labels)])
+    of_direct, of_method = np.mean(ious, axis=0) if ious else (np.nan, np.nan)
     table = Table(title="accuracy against the true labels (IoU of points, %)", show_footer=True)
     table.add_column("object", footer="mean")
-    table.add_column("true points", justify="right", footer=f"{(truth > 0).sum():,}")
-    table.add_column("direct projection", justify="right", footer=f"{mean[0]:.1%}".rstrip("%"))
-    table.add_column("ldls", justify="right", footer=f"{mean[1]:.1%}".rstrip("%"))
-    for m, (mask, iou) in enumerate(zip(masks, ious, strict=True), start=1):
-        row = [mask.name, f"{(truth == m).sum():,}", *(f"{i:.1%}".rstrip("%") for i in iou)]
-        table.add_row(*row)
+    table.add_column("true points", justify="right", footer=f"{sum(count for _, count in rows):,}")
+    table.add_column("direct projection", justify="right", footer=f"{of_direct:.1f}")
+    table.add_column("ldls", justify="right", footer=f"{of_method:.1f}")
+    for (name, count), (before, after) in zip(rows, ious, strict=True):
+        table.add_row(name, f"{count:,}", f"{before:.1f}", f"{after:.1f}")
     return table
 
 
-def write_inputs(out: Path, frame: SimulatedFrame, masks: ldls.InstanceMasks) -> str:
+def write_inputs(out: Path, points: Points, image: CameraImage) -> str:
     """Write the frame as files that `ldls segment` reads; the command that does so."""
+    from PIL import Image
+
+    from ldls.simulation.kitti_layout import calibration_lines, write_lines
+
     folder = out / "input"
     folder.mkdir(parents=True, exist_ok=True)
-    frame.points.tofile(folder / "points.bin")
-    save(masks, folder / "masks.npz")
-    Image.fromarray(frame.image).save(folder / "image.png")
-    matrices = {
-        "P2": frame.projection,
-        "R0_rect": np.eye(3),
-        "Tr_velo_to_cam": frame.T_camera_lidar[:3],
-    }
-    lines = (f"{key}: {' '.join(map(repr, matrix.ravel().tolist()))}\n" for key, matrix in matrices.items())
-    (folder / "calib.txt").write_text("".join(lines))
+    np.asarray(points, np.float32).tofile(folder / "points.bin")
+    assert image.masks is not None
+    save(image.masks, folder / "masks.npz")
+    Image.fromarray(image.read()).save(folder / "image.png")
+    write_lines(folder / "calib.txt", calibration_lines(image.camera))
     return (
         f"ldls segment --points {folder / 'points.bin'} --calib {folder / 'calib.txt'} "
         f"--masks {folder / 'masks.npz'} --image {folder / 'image.png'} --out {out / 'from-files'}"
     )
 
 
-def _iou(labels: NDArray[np.int32], truth: NDArray[np.int32], m: int) -> float:
-    union = ((labels == m) | (truth == m)).sum()
-    return float(((labels == m) & (truth == m)).sum() / union) if union else float("nan")
+def _iou(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+    """Intersection over union, in percent."""
+    return float(100 * (one & other).sum() / (one | other).sum())

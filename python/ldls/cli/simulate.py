@@ -12,11 +12,10 @@ from rich.table import Table
 
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import SuitePart
-from ldls.cli.simulate_bag import write_bag
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
-    from ldls.simulation.production import FrameOrder, FrameSummary
+    from ldls.simulation import FrameSummary, SegmenterErrors
 
 
 class SceneKind(StrEnum):
@@ -44,7 +43,7 @@ class CameraName(StrEnum):
 
 
 class Layout(StrEnum):
-    """What the files are."""
+    """Layouts of the files."""
 
     KITTI = "kitti"
     KITTI_RAW = "kitti-raw"
@@ -59,9 +58,9 @@ BAGS = (Layout.ROSBAG1, Layout.ROSBAG2, Layout.MCAP)
 @speaks_plainly
 def simulate(
     out: Annotated[Path, typer.Argument(help="Folder for the frames; made if need be.", file_okay=False)],
-    frames: Annotated[int, typer.Option(min=1, help="How many frames.")] = 20,
+    frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first frame; each next frame has the next seed.")] = 0,
-    scene: Annotated[SceneKind, typer.Option(help="What the scenes are.")] = SceneKind.STREET,
+    scene: Annotated[SceneKind, typer.Option(help="Kind of the scenes.")] = SceneKind.STREET,
     lidar: Annotated[LidarName, typer.Option(help="Beam table, ranges and noise of the sweep.")] = LidarName.HDL_64E,
     camera: Annotated[
         CameraName,
@@ -105,25 +104,52 @@ def simulate(
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt
     --masks scenes/training/masks/000000.json --out results
     """
+    from ldls.simulation import (
+        Drive,
+        FrameOrder,
+        SegmenterErrors,
+        SensorErrors,
+        drive_folder,
+        make_frames,
+        suite_orders,
+        write_drive,
+    )
+
+    if suite and layout is not Layout.KITTI:
+        raise ParameterError(f"--suite: the suite is in KITTI's layout; use --frames with --layout {layout.value}")
+    if suite and not errors:
+        raise ParameterError("--no-errors: the suite's errors are part of it; use --frames and --seed without --suite")
+    segmenter = SegmenterErrors() if errors else SegmenterErrors.none()
+    sensors = SensorErrors() if errors else SensorErrors.none()
     if layout in BAGS:
-        if suite:
-            raise ParameterError(f"--suite: the suite is in KITTI's layout; use --frames with --layout {layout.value}")
-        write_bag(out, layout.value, frames=frames, seed=seed, errors=errors)
-        return
-    if layout is Layout.KITTI_RAW:
-        where, total, making = _drive(out, suite, frames, seed, scene, lidar, camera, errors, processes)
+        _write_bag(out, layout, frames, seed, segmenter)
+    elif layout is Layout.KITTI_RAW:
+        drive = Drive(
+            n_frames=frames,
+            seed=seed,
+            kind=scene.value,
+            lidar=lidar.value,
+            camera=camera.value,
+            segmenter=segmenter,
+            sensors=sensors,
+        )
+        _follow(write_drive(out, drive, processes=processes), frames, drive_folder(out, drive))
     else:
-        orders = _suite_orders(suite, errors) if suite else _orders(frames, seed, scene, lidar, camera, errors)
-        where, total, making = out / "training", len(orders), _frames(out, orders, processes)
-    summaries = _followed(making, total)
-    screen = console()
-    made = [s for s in summaries if s is not None]
-    if made:
-        screen.print(summary_table(made))
-    kept = len(summaries) - len(made)
-    screen.print(f"wrote {len(made)} frames to {where}", highlight=False, soft_wrap=True)
-    if kept:
-        screen.print(f"kept {kept} that were there; delete them to make them anew", highlight=False)
+        orders = [
+            FrameOrder(
+                name=f"{number:06d}",
+                seed=seed + number,
+                kind=scene.value,
+                lidar=lidar.value,
+                camera=camera.value,
+                segmenter=segmenter,
+                sensors=sensors,
+            )
+            for number in range(frames)
+        ]
+        if suite:
+            orders = suite_orders(suite.value)
+        _follow(make_frames(out, orders, processes=processes), len(orders), out / "training")
 
 
 def summary_table(made: list[FrameSummary]) -> Table:
@@ -143,68 +169,25 @@ def summary_table(made: list[FrameSummary]) -> Table:
     return table
 
 
-def _orders(
-    frames: int, seed: int, scene: SceneKind, lidar: LidarName, camera: CameraName, errors: bool
-) -> list[FrameOrder]:
-    from ldls.simulation import FrameOrder, SegmenterErrors, SensorErrors
-
-    return [
-        FrameOrder(
-            name=f"{number:06d}",
-            seed=seed + number,
-            kind=scene.value,
-            lidar=lidar.value,
-            camera=camera.value,
-            segmenter=SegmenterErrors() if errors else SegmenterErrors.none(),
-            sensors=SensorErrors() if errors else SensorErrors.none(),
-        )
-        for number in range(frames)
-    ]
-
-
-def _suite_orders(part: SuitePart, errors: bool) -> list[FrameOrder]:
-    from ldls.simulation import suite_orders
-
-    if not errors:
-        raise ParameterError("--no-errors: the suite's errors are part of it; use --frames and --seed without --suite")
-    return suite_orders(part.value)
-
-
-def _drive(
-    out: Path,
-    suite: SuitePart | None,
-    frames: int,
-    seed: int,
-    scene: SceneKind,
-    lidar: LidarName,
-    camera: CameraName,
-    errors: bool,
-    processes: int,
-) -> tuple[Path, int, Iterator[FrameSummary | None]]:
-    """Folder and frames of a drive, and what makes them."""
-    from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_folder, write_drive
-
-    if suite is not None:
-        raise ParameterError("--suite: its frames are single scenes; leave out --layout kitti-raw")
-    drive = Drive(
-        n_frames=frames,
-        seed=seed,
-        kind=scene.value,
-        lidar=lidar.value,
-        camera=camera.value,
-        segmenter=SegmenterErrors() if errors else SegmenterErrors.none(),
-        sensors=SensorErrors() if errors else SensorErrors.none(),
-    )
-    return drive_folder(out, drive), frames, write_drive(out, drive, processes=processes)
-
-
-def _frames(out: Path, orders: list[FrameOrder], processes: int) -> Iterator[FrameSummary | None]:
-    from ldls.simulation import make_frames
-
-    return make_frames(out, orders, processes=processes)
-
-
-def _followed(frames: Iterator[FrameSummary | None], total: int) -> list[FrameSummary | None]:
+def _follow(frames: Iterator[FrameSummary | None], total: int, where: Path) -> None:
+    """Wait for frames that are made, and print what they hold."""
     from rich.progress import track
 
-    return list(track(frames, "simulating", total=total, console=console(), transient=True))
+    screen = console()
+    summaries = list(track(frames, "simulating", total=total, console=screen, transient=True))
+    made = [s for s in summaries if s is not None]
+    if made:
+        screen.print(summary_table(made))
+    kept = len(summaries) - len(made)
+    screen.print(f"wrote {len(made)} frames to {where}", highlight=False, soft_wrap=True)
+    if kept:
+        screen.print(f"kept {kept} that were there; delete them to make them anew", highlight=False)
+
+
+def _write_bag(out: Path, layout: Layout, frames: int, seed: int, segmenter: SegmenterErrors) -> None:
+    from ldls.simulation import write_robot_drive
+
+    screen = console()
+    with screen.status("simulating"):
+        path = write_robot_drive(out, layout.value, frames=frames, seed=seed, segmenter=segmenter)
+    screen.print(f"wrote {frames} sweeps to {path}, masks and annotations beside it", highlight=False, soft_wrap=True)

@@ -1,24 +1,30 @@
-"""Scenes with perfect labels: the small street of the demo, and whole scenes with sensors and their errors.
+"""Scenes with perfect labels, seen by sensors and a segmenter that err as real ones do.
 
-`street_scene` needs nothing more; all else needs `pip install 'ldls[sim]'` when it is called.
+`sample_frame` needs nothing more; all else needs `pip install 'ldls[sim]'` when it is called.
 """
 
-from ldls.simulation.demo.street import SimulatedFrame, street_scene
-from ldls.simulation.drive import Drive, drive_frame
-from ldls.simulation.errors import SegmenterErrors, SensorErrors
-from ldls.simulation.frame import SceneFrame, View, scene_frame
+from ldls.simulation.drives import Drive, drive_frame, robot_drive
+from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.kitti_layout import write_kitti
 from ldls.simulation.lidars import LIDARS, Lidar
-from ldls.simulation.objects import SceneObject
 from ldls.simulation.photograph import PixelTruth
-from ldls.simulation.production import FrameOrder, FrameSummary, make_frames
+from ldls.simulation.production import (
+    FrameOrder,
+    FrameSummary,
+    make_frames,
+    make_suite,
+    suite,
+    suite_folder,
+    suite_orders,
+)
 from ldls.simulation.raw_layout import drive_folder, write_drive
-from ldls.simulation.rig import Rig, make_rig
-from ldls.simulation.robot_drive import Moment, robot_drive
+from ldls.simulation.rigs import Rig, make_rig
 from ldls.simulation.ros_layout import write_robot_drive
+from ldls.simulation.sample import sample_frame
+from ldls.simulation.scene_object import SceneObject
 from ldls.simulation.scenes import Scene, make_scene
 from ldls.simulation.segmenting import segmented, true_masks
-from ldls.simulation.suite import make_suite, suite, suite_folder, suite_orders
+from ldls.simulation.simulated_frame import SimulatedFrame, SimulatedImage, scene_frame
 
 __all__ = [
     "LIDARS",
@@ -26,16 +32,14 @@ __all__ = [
     "FrameOrder",
     "FrameSummary",
     "Lidar",
-    "Moment",
     "PixelTruth",
     "Rig",
     "Scene",
-    "SceneFrame",
     "SceneObject",
     "SegmenterErrors",
     "SensorErrors",
     "SimulatedFrame",
-    "View",
+    "SimulatedImage",
     "drive_folder",
     "drive_frame",
     "make_frames",
@@ -43,9 +47,9 @@ __all__ = [
     "make_scene",
     "make_suite",
     "robot_drive",
+    "sample_frame",
     "scene_frame",
     "segmented",
-    "street_scene",
     "suite",
     "suite_folder",
     "suite_orders",

@@ -4,7 +4,7 @@ OUT/training/velodyne/NNNNNN.bin     points
 OUT/training/image_2/NNNNNN.png      image ahead
 OUT/training/calib/NNNNNN.txt        calibration as given; P0, P1 and P3 repeat P2, as there is one camera
 OUT/training/label_2/NNNNNN.txt      boxes of the objects in the image
-OUT/training/masks/NNNNNN.json       what the segmenter finds, as COCO JSON with scores
+OUT/training/masks/NNNNNN.json       masks that the segmenter finds, as COCO JSON with scores
 OUT/training/annotations/NNNNNN.txt  `instance class`, a line a point of the whole cloud; `0 background` for no object
 
 The other cameras of a ring have image_ring_K, calib_ring_K (their P2) and masks_ring_K, K from 1 to 5, to the left.
@@ -23,55 +23,48 @@ from PIL import Image
 
 from ldls.camera import Camera
 from ldls.io.files import whole_file
+from ldls.io.labels import write_annotations
 from ldls.masks import InstanceMasks
-from ldls.simulation.boxes import annotation_name, label_rows
-from ldls.simulation.frame import SceneFrame, View
+from ldls.simulation.scene_object import KITTI_NAMES, SceneObject
+from ldls.simulation.simulated_frame import SimulatedFrame, SimulatedImage
 
-NOTHING = "0 background"
-"""The line of a point of no object."""
+NEAREST_M = 0.5
 
 
-def write_kitti(folder: str | PathLike[str], name: str, frame: SceneFrame) -> None:
+def write_kitti(folder: str | PathLike[str], name: str, frame: SimulatedFrame) -> None:
     """Write `frame` under `folder`, `name` being six digits; every file is whole or not there.
 
     Point annotations come last, so a frame that has them has everything.
     """
     training = Path(folder) / "training"
-    write(training / "velodyne" / f"{name}.bin", frame.points.astype("<f4").tobytes())
-    for k, view in enumerate(frame.views):
-        suffix = "" if k == 0 else f"_ring_{k}"
-        _write_view(training, "image_2" if k == 0 else f"image{suffix}", suffix, name, view)
-    write_lines(training / "label_2" / f"{name}.txt", label_rows(frame.objects, frame.views[0]))
-    write_lines(training / "annotations" / f"{name}.txt", annotation_lines(frame))
+    write_points(training / "velodyne" / f"{name}.bin", frame)
+    for image in frame.images:
+        ring = "" if image.name == "image_2" else image.name.removeprefix("image")
+        write_picture(training / image.name / f"{name}.png", image.read())
+        write_lines(training / f"calib{ring}" / f"{name}.txt", calibration_lines(image.camera))
+        write_masks(training / f"masks{ring}" / f"{name}.json", image.masks, int(name))
+    write_lines(training / "label_2" / f"{name}.txt", label_rows(frame.objects, frame.images[0]))
+    write_truth(training / "annotations" / f"{name}.txt", frame)
 
 
-def is_whole(folder: str | PathLike[str], name: str) -> bool:
-    """Whether `write_kitti` came to its end for this frame."""
-    return (Path(folder) / "training" / "annotations" / f"{name}.txt").is_file()
-
-
-def _write_view(training: Path, images: str, suffix: str, name: str, view: View) -> None:
-    picture = training / images / f"{name}.png"
-    write_picture(picture, view.image)
-    write_lines(training / f"calib{suffix}" / f"{name}.txt", _calibration(view.camera))
-    document = coco_document(view.masks, int(name), picture.name)
-    write(training / f"masks{suffix}" / f"{name}.json", json.dumps(document).encode())
+def write_points(path: Path, frame: SimulatedFrame) -> None:
+    """Write the points of a frame as KITTI does, and their folder."""
+    _write(path, np.asarray(frame.points, "<f4").tobytes())
 
 
 def write_picture(path: Path, image: NDArray[np.uint8]) -> None:
-    """Write a PNG and its folder, whole or not at all."""
+    """Write a PNG and its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         Image.fromarray(image).save(file, "PNG", compress_level=3)
 
 
-def coco_document(masks: InstanceMasks, image_id: int, file_name: str) -> dict[str, object]:
-    """COCO's data set object of one image, its masks as run lengths, with scores."""
-    image = {"id": image_id, "file_name": file_name, "height": masks.height, "width": masks.width}
+def write_masks(path: Path, masks: InstanceMasks, image_id: int) -> None:
+    """Write masks and their folder as COCO's data set of one image, in plain run lengths, with scores."""
+    image = {"id": image_id, "file_name": f"{path.stem}.png", "height": masks.height, "width": masks.width}
     annotations = []
     for i, mask in enumerate(masks, start=1):
         top, left, height, width = mask.bounding_box
-        counts = mask.rle.runs().tolist()
         annotations.append(
             {
                 "id": i,
@@ -81,14 +74,27 @@ def coco_document(masks: InstanceMasks, image_id: int, file_name: str) -> dict[s
                 "bbox": [left, top, width, height],
                 "area": mask.area,
                 "iscrowd": 0,
-                "segmentation": {"size": [masks.height, masks.width], "counts": counts},
+                "segmentation": {"size": [masks.height, masks.width], "counts": mask.rle.runs().tolist()},
             }
         )
     categories = [{"id": i, "name": n} for i, n in masks.names.items()]
-    return {"images": [image], "categories": categories, "annotations": annotations}
+    document = {"images": [image], "categories": categories, "annotations": annotations}
+    _write(path, json.dumps(document).encode())
 
 
-def _calibration(camera: Camera) -> list[str]:
+def write_truth(path: Path, frame: SimulatedFrame) -> None:
+    """Write the point annotations of a frame, and their folder; instances count from 1 over the whole turn."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_annotations(path, frame.truth)
+
+
+def write_lines(path: Path, lines: Iterable[str]) -> None:
+    """Write a text file and its folder."""
+    _write(path, "".join(f"{line}\n" for line in lines).encode())
+
+
+def calibration_lines(camera: Camera) -> list[str]:
+    """The lines of a calibration file; all four cameras have the one projection."""
     matrices = {f"P{k}": camera.projection for k in range(4)}
     matrices |= {"R0_rect": np.eye(3), "Tr_velo_to_cam": camera.T_camera_lidar[:3], "Tr_imu_to_velo": np.eye(3, 4)}
     return [f"{key}: {row_of(matrix)}" for key, matrix in matrices.items()]
@@ -99,21 +105,64 @@ def row_of(matrix: NDArray[np.float64]) -> str:
     return " ".join(f"{value:.12e}" for value in matrix.ravel())
 
 
-def annotation_lines(frame: SceneFrame) -> list[str]:
-    """A line for each point; instances count from 1 over the whole turn."""
-    named = [f"{m} {annotation_name(thing.category)}" for m, thing in enumerate(frame.objects, start=1)]
-    lines = np.array([NOTHING, *named])
-    chosen: list[str] = lines[frame.instances].tolist()
-    return chosen
-
-
-def write_lines(path: Path, lines: Iterable[str]) -> None:
-    """Write a text file and its folder, whole or not at all."""
-    write(path, "".join(f"{line}\n" for line in lines).encode())
-
-
-def write(path: Path, content: bytes) -> None:
-    """Write a file and its folder, whole or not at all."""
+def _write(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
         file.write(content)
+
+
+def label_rows(things: tuple[SceneObject, ...], image: SimulatedImage) -> list[str]:
+    """A row of 15 fields for each object that the image shows, in the camera frame of the calibration as given.
+
+    Categories that KITTI has no name for are Misc.
+
+    The 2D box is that of the projected corners, cut at the image's edges. Occlusion is 0 where at least 0.7 of the
+    object is visible, 1 from 0.35, else 2.
+    """
+    shown = np.bincount(image.pixels.instances.ravel(), minlength=len(things) + 1)[1:]
+    rows = [
+        _row(thing, image.camera, float(count / max(expected, 1.0)))
+        for thing, count, expected in zip(things, shown, image.pixels.expected_px, strict=True)
+        if count > 0
+    ]
+    return [row for row in rows if row]
+
+
+def _row(thing: SceneObject, camera: Camera, visible: float) -> str:
+    bottom = np.array([*thing.centre_m[:2], thing.centre_m[2] - thing.height_m / 2])
+    x, y, z = _to_camera(camera, bottom[None])[0]
+    if z < NEAREST_M:
+        return ""
+    heading = np.array([np.cos(thing.yaw), np.sin(thing.yaw), 0.0])
+    ahead = camera.T_camera_lidar[:3, :3] @ heading
+    turn = float(np.arctan2(-ahead[2], ahead[0]))
+    alpha = _wrapped(turn - float(np.arctan2(x, z)))
+    box, truncated = _image_box(thing, camera)
+    occluded = 0 if visible >= 0.7 else 1 if visible >= 0.35 else 2
+    size = (thing.height_m, thing.width_m, thing.length_m)
+    numbers = " ".join(f"{n:.2f}" for n in (alpha, *box, *size, x, y, z, turn))
+    return f"{KITTI_NAMES.get(thing.category, 'Misc')} {truncated:.2f} {occluded} {numbers}"
+
+
+def _image_box(thing: SceneObject, camera: Camera) -> tuple[tuple[float, float, float, float], float]:
+    """(left, top, right, bottom) within the image, and the share of the box outside it."""
+    corners = _to_camera(camera, thing.corners_m())
+    corners[:, 2] = np.maximum(corners[:, 2], 0.2)
+    homogeneous = np.column_stack([corners, np.ones(8)]) @ camera.projection.T
+    uv = homogeneous[:, :2] / homogeneous[:, 2:]
+    height, width = camera.image_size or (0, 0)
+    low, high = uv.min(axis=0), uv.max(axis=0)
+    cut_low, cut_high = (np.clip(edge, 0, (width - 1, height - 1)) for edge in (low, high))
+    share = float(np.prod(cut_high - cut_low) / max(float(np.prod(high - low)), 1e-9))
+    box = (float(cut_low[0]), float(cut_low[1]), float(cut_high[0]), float(cut_high[1]))
+    return box, float(np.clip(1 - share, 0, 1))
+
+
+def _to_camera(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    transform = camera.T_camera_lidar
+    moved: NDArray[np.float64] = points @ transform[:3, :3].T + transform[:3, 3]
+    return moved
+
+
+def _wrapped(angle: float) -> float:
+    return (angle + np.pi) % (2 * np.pi) - np.pi

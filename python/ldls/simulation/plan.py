@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.simulation.ground import Ground
-from ldls.simulation.objects import SceneObject
+from ldls.simulation.scene_object import SceneObject
 from ldls.simulation.shapes.shape import Shape
 
 CLEAR_M = 3.2

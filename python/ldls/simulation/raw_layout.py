@@ -5,7 +5,7 @@ OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/timestamps.txt   times of the swee
 OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/data/*.bin       points
 OUT/DATE/DATE_drive_NNNN_sync/image_02/timestamps.txt          times of the images
 OUT/DATE/DATE_drive_NNNN_sync/image_02/data/*.png              images
-OUT/DATE/DATE_drive_NNNN_sync/masks_02/*.json                  what the segmenter finds, as COCO JSON with scores
+OUT/DATE/DATE_drive_NNNN_sync/masks_02/*.json                  masks that the segmenter finds, as COCO JSON with scores
 OUT/DATE/DATE_drive_NNNN_sync/annotations/*.txt                `instance class`, a line a point; `0 background` for none
 
 NNNN is the seed; a day is that of the seed too, for its calibration is.
@@ -13,7 +13,6 @@ NNNN is the seed; a day is that of the seed too, for its calibration is.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
@@ -21,9 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ldls.simulation.drive import PERIOD_S, Drive, drive_frame
-from ldls.simulation.kitti_layout import annotation_lines, coco_document, row_of, write, write_lines, write_picture
-from ldls.simulation.production import FrameSummary, make_frames, summary_of
+from ldls.simulation.drives import PERIOD_S, Drive, drive_frame
+from ldls.simulation.kitti_layout import row_of, write_lines, write_masks, write_picture, write_points, write_truth
+from ldls.simulation.production import FrameSummary, make_frames
+from ldls.simulation.simulated_frame import SimulatedFrame
 
 FIRST_DAY = np.datetime64("2026-01-01")
 FIRST_MOMENT = np.timedelta64(12, "h")
@@ -31,7 +31,7 @@ MADE = "calib_time: 01-Jan-2026 12:00:00"
 
 
 def drive_folder(folder: str | PathLike[str], drive: Drive) -> Path:
-    """Where `write_drive` writes a drive."""
+    """Folder that `write_drive` writes a drive to."""
     day = str(FIRST_DAY + drive.seed).replace("-", "_")
     return Path(folder) / day / f"{day}_drive_{drive.seed:04d}_sync"
 
@@ -59,7 +59,7 @@ class DriveFrameOrder:
 
     Attributes:
         drive: The drive.
-        number: Which frame, from 0.
+        number: Number of the frame, from 0.
     """
 
     drive: Drive
@@ -71,18 +71,18 @@ class DriveFrameOrder:
         return f"{self.number:010d}"
 
     def is_whole(self, folder: str | PathLike[str]) -> bool:
-        """Whether the frame is in `folder`; its annotations come last."""
+        """True where the frame is in `folder`; its annotations come last."""
         return (drive_folder(folder, self.drive) / "annotations" / f"{self.name}.txt").is_file()
 
-    def make(self, folder: str | PathLike[str]) -> FrameSummary:
-        """Write the frame; what it holds."""
+    def make(self, folder: str | PathLike[str]) -> SimulatedFrame:
+        """Make and write the frame."""
         frame, path = drive_frame(self.drive, self.number), drive_folder(folder, self.drive)
-        write(path / "velodyne_points/data" / f"{self.name}.bin", frame.points.astype("<f4").tobytes())
-        write_picture(path / "image_02/data" / f"{self.name}.png", frame.image)
-        document = coco_document(frame.masks, self.number, f"{self.name}.png")
-        write(path / "masks_02" / f"{self.name}.json", json.dumps(document).encode())
-        write_lines(path / "annotations" / f"{self.name}.txt", annotation_lines(frame))
-        return summary_of(self.name, frame)
+        (image,) = frame.images
+        write_points(path / "velodyne_points/data" / f"{self.name}.bin", frame)
+        write_picture(path / "image_02/data" / f"{self.name}.png", image.read())
+        write_masks(path / "masks_02" / f"{self.name}.json", image.masks, self.number)
+        write_truth(path / "annotations" / f"{self.name}.txt", frame)
+        return frame
 
 
 def _stamp(drive: Drive, number: int, later_s: float) -> str:
@@ -94,7 +94,7 @@ def _stamp(drive: Drive, number: int, later_s: float) -> str:
 
 def _write_calibration(day: Path, drive: Drive) -> None:
     mounted = drive.rig().cameras[0]
-    transform = drive.drift() @ mounted.T_camera_lidar()
+    transform = drive.sensors.drift(drive.seed) @ mounted.T_camera_lidar()
     cameras = [MADE]
     for k in range(4):
         cameras += [

@@ -1,7 +1,7 @@
 """A simulated drive as a ROS bag, with masks and truth beside it.
 
 OUT/drive.bag or OUT/drive/     the bag: ROS 1, or ROS 2 with SQLite or MCAP storage
-OUT/masks/STAMP.json            what a segmenter finds in the image of the sweep, as COCO JSON with scores
+OUT/masks/STAMP.json            masks that a segmenter finds in the image of the sweep, as COCO JSON with scores
 OUT/annotations/STAMP.txt       `instance class`, a line a point of the sweep; `0 background` for no object
 
 STAMP is that of the sweep in nanoseconds, the name that `ldls.datasets.RosBag` gives the frame.
@@ -10,8 +10,6 @@ STAMP is that of the sweep in nanoseconds, the name that `ldls.datasets.RosBag` 
 from __future__ import annotations
 
 import io
-import json
-from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ldls.io.files import whole_file
 from ldls.io.ros.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -35,12 +32,10 @@ from ldls.io.ros.messages import (
 )
 from ldls.io.ros.point_cloud2 import encode
 from ldls.io.ros.writer import BagWriter
-from ldls.simulation.boxes import annotation_name
-from ldls.simulation.errors import SegmenterErrors
-from ldls.simulation.kitti_layout import NOTHING, coco_document
-from ldls.simulation.lenses import LensModel
-from ldls.simulation.robot_drive import IMAGE_DELAY_S, PERIOD_S, ROBOT, Moment, robot_drive
-from ldls.simulation.scanning import Sweep
+from ldls.simulation.drives import PERIOD_S, ROBOT, ROBOT_SPEED_M_S, robot_drive
+from ldls.simulation.error_model import SegmenterErrors
+from ldls.simulation.kitti_layout import write_masks, write_truth
+from ldls.simulation.simulated_frame import SimulatedFrame
 
 START_NS = 1_700_000_000 * NANOSECONDS
 """Stamp of the first sweep."""
@@ -61,7 +56,7 @@ def write_robot_drive(
     segmenter: SegmenterErrors | None = None,
     compressed: bool = False,
 ) -> Path:
-    """Write the bag of a robot's drive through a campus; where it is.
+    """Write the bag of a robot's drive through a campus, and return its path.
 
     The bag has /velodyne_points (x y z intensity ring time, as the VLP-16's driver has it), /camera/image_raw (or
     /camera/image_raw/compressed), /camera/camera_info with a plumb_bob lens, /tf_static and /tf.
@@ -69,10 +64,10 @@ def write_robot_drive(
     Args:
         folder: Where to write; made if need be.
         kind: "rosbag1", "rosbag2" (SQLite) or "mcap".
-        frames: How many sweeps, ten a second.
-        seed: Which scene, and which noise.
-        segmenter: How wrong the masks are; `SegmenterErrors()` by default.
-        compressed: Whether images are PNG rather than raw.
+        frames: Number of sweeps, ten a second.
+        seed: Seed of the scene and its noise.
+        segmenter: Errors of the masks; `SegmenterErrors()` by default.
+        compressed: PNG images rather than raw ones.
 
     Raises:
         ParameterError: There is no such kind, or `frames` is below 1.
@@ -91,9 +86,11 @@ def write_robot_drive(
         bag.add_topic(Topic(image_topic, COMPRESSED_IMAGE if compressed else IMAGE, 0))
         bag.add_topic(Topic(INFO_TOPIC, CAMERA_INFO, 0))
         bag.write_message("/tf_static", _static_transforms(bag.types), START_NS)
-        for moment in robot_drive(frames, seed=seed, segmenter=segmenter):
-            _write_moment(bag, image_topic, moment)
-            _write_beside(folder, moment)
+        for number, frame in enumerate(robot_drive(frames, seed=seed, segmenter=segmenter)):
+            _write_frame(bag, image_topic, frame)
+            stamp = _stamp_ns(frame.stamp)
+            write_masks(folder / "masks" / f"{stamp}.json", frame.images[0].masks, number)
+            write_truth(folder / "annotations" / f"{stamp}.txt", frame)
     return path
 
 
@@ -101,14 +98,15 @@ def _stamp_ns(seconds: float) -> int:
     return START_NS + round(seconds * NANOSECONDS)
 
 
-def _write_moment(bag: BagWriter, image_topic: str, moment: Moment) -> None:
-    swept, taken = _stamp_ns(moment.seconds), _stamp_ns(moment.seconds + IMAGE_DELAY_S)
+def _write_frame(bag: BagWriter, image_topic: str, frame: SimulatedFrame) -> None:
+    (view,) = frame.images
+    swept, taken = _stamp_ns(frame.stamp), _stamp_ns(view.stamp)
     image_header = make_header(bag.types, Header(taken, OPTICAL_FRAME))
-    image = (_png if image_topic.endswith("compressed") else _image)(bag.types, moment.image, image_header)
+    image = (_png if image_topic.endswith("compressed") else _image)(bag.types, view.read(), image_header)
     info = _camera_info(bag.types, image_header)
-    cloud = encode(bag.types, velodyne_columns(moment.sweep), Header(swept, LIDAR_FRAME))
+    cloud = encode(bag.types, _velodyne_columns(frame), Header(swept, LIDAR_FRAME))
     way = np.eye(4)
-    way[0, 3] = moment.travelled_m
+    way[0, 3] = ROBOT_SPEED_M_S * frame.stamp
     moved = make(bag.types, TRANSFORMS, transforms=[_transform(bag.types, Header(swept, "odom"), "base_link", way)])
     for topic, message, stamp_ns in (
         ("/tf", moved, swept),
@@ -119,9 +117,9 @@ def _write_moment(bag: BagWriter, image_topic: str, moment: Moment) -> None:
         bag.write_message(topic, message, stamp_ns + LATENCY_NS)
 
 
-def velodyne_columns(sweep: Sweep) -> dict[str, NDArray[Any]]:
+def _velodyne_columns(frame: SimulatedFrame) -> dict[str, NDArray[Any]]:
     """The fields of the VLP-16's driver: ring 0 is the lowest beam, intensity 0 to 255, time in seconds of the turn."""
-    x, y, z, intensity = sweep.points.T
+    x, y, z, intensity = frame.points.T
     turned = (np.pi - np.arctan2(y, x)) / (2 * np.pi)
     beams = len(ROBOT.lidar.elevations_deg)
     return {
@@ -129,7 +127,7 @@ def velodyne_columns(sweep: Sweep) -> dict[str, NDArray[Any]]:
         "y": y,
         "z": z,
         "intensity": np.round(255 * intensity).astype(np.float32),
-        "ring": (beams - 1 - sweep.rings).astype(np.uint16),
+        "ring": (beams - 1 - frame.rings).astype(np.uint16),
         "time": (PERIOD_S * turned).astype(np.float32),
     }
 
@@ -158,16 +156,8 @@ def _png(types: Any, pixels: NDArray[np.uint8], header: Any) -> Any:  # noqa: AN
 
 def _camera_info(types: Any, header: Any) -> Any:  # noqa: ANN401
     model = ROBOT.cameras[0].model
-    assert isinstance(model, LensModel)
-    region = make(
-        types,
-        "sensor_msgs/msg/RegionOfInterest",
-        x_offset=0,
-        y_offset=0,
-        height=0,
-        width=0,
-        do_rectify=False,
-    )
+    whole = dict.fromkeys(("x_offset", "y_offset", "height", "width"), 0)
+    region = make(types, "sensor_msgs/msg/RegionOfInterest", **whole, do_rectify=False)
     matrices: dict[str, NDArray[np.float64]] = {
         "D": np.array(model.distortion.coefficients),
         "K": model.projection()[:, :3].reshape(-1),
@@ -222,21 +212,3 @@ def _quaternion(rotation: NDArray[np.float64]) -> tuple[float, float, float, flo
     w = np.sqrt(1 + np.trace(rotation)) / 2
     x, y, z = rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
     return float(x / (4 * w)), float(y / (4 * w)), float(z / (4 * w)), float(w)
-
-
-def _write_beside(folder: Path, moment: Moment) -> None:
-    name = str(_stamp_ns(moment.seconds))
-    document = coco_document(moment.masks, round(moment.seconds / PERIOD_S), f"{name}.png")
-    _write(folder / "masks" / f"{name}.json", json.dumps(document).encode())
-    _write(folder / "annotations" / f"{name}.txt", "".join(f"{line}\n" for line in _annotations(moment)).encode())
-
-
-def _annotations(moment: Moment) -> Iterator[str]:
-    for instance, category in zip(moment.sweep.instances.tolist(), moment.categories.tolist(), strict=True):
-        yield f"{instance} {annotation_name(category)}" if instance else NOTHING
-
-
-def _write(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as file:
-        file.write(content)

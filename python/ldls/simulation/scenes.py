@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ldls.errors import ParameterError
 from ldls.simulation.layouts import LAYOUTS
-from ldls.simulation.objects import SceneObject
 from ldls.simulation.plan import Plan
+from ldls.simulation.scene_object import SceneObject
 from ldls.simulation.shapes.shape import Shape, join
 
 

@@ -1,4 +1,4 @@
-"""What stands where: one module a kind of scene."""
+"""Kinds of scenes, one a module: where their things stand."""
 
 from ldls.simulation.layouts.campus import campus
 from ldls.simulation.layouts.street import street

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ldls.simulation import objects
 from ldls.simulation.ground import Ground, Strip
 from ldls.simulation.layouts import pavement
 from ldls.simulation.plan import Plan
-from ldls.simulation.shapes import cycles, scenery, vehicles
+from ldls.simulation.scene_object import BICYCLE, BUS, CAR, TRUCK
+from ldls.simulation.shapes import scenery, vehicles
 from ldls.simulation.shapes.shape import Material
 
 PATH, LAWN = (0.50, 0.48, 0.45), (0.25, 0.36, 0.15)
@@ -46,11 +46,11 @@ def _vehicles(plan: Plan, right: float, left: float, rng: np.random.Generator) -
     side, start = (right - 1.3, left + 1.3)[int(rng.integers(2))], rng.uniform(6, 20)
     for k in range(int(rng.integers(2, 7))):
         yaw = np.pi * rng.integers(2) + rng.normal(0, 0.05)
-        plan.put(objects.CAR, vehicles.car(rng), start + 5.6 * k, side, yaw=yaw)
+        plan.put(CAR, vehicles.car(rng), start + 5.6 * k, side, yaw=yaw)
     if rng.random() < 0.5:
         yaw, speed = np.pi * rng.integers(2), rng.uniform(2, 5)
-        plan.put(objects.CAR, vehicles.car(rng), rng.uniform(10, 35), 0.0, yaw=yaw, speed_m_s=speed)
-    for category, build, chance in ((objects.TRUCK, vehicles.truck, 0.35), (objects.BUS, vehicles.bus, 0.2)):
+        plan.put(CAR, vehicles.car(rng), rng.uniform(10, 35), 0.0, yaw=yaw, speed_m_s=speed)
+    for category, build, chance in ((TRUCK, vehicles.truck, 0.35), (BUS, vehicles.bus, 0.2)):
         if rng.random() < chance:
             y = (right - 2.5, left + 2.5)[int(rng.integers(2))]
             plan.put(category, build(rng), rng.uniform(18, 50), y, yaw=rng.normal(0, 0.1))
@@ -61,7 +61,7 @@ def _racks(plan: Plan, across_m: tuple[float, float], rng: np.random.Generator) 
     x, y = rng.uniform(7, 28), rng.uniform(*across_m)
     for k in range(int(rng.integers(0, 6))):
         yaw = np.pi / 2 + rng.normal(0, 0.08)
-        plan.put(objects.BICYCLE, cycles.bicycle(rng), x + 0.75 * k, y, yaw=yaw)
+        plan.put(BICYCLE, vehicles.bicycle(rng), x + 0.75 * k, y, yaw=yaw)
 
 
 def _greenery(plan: Plan, across_m: tuple[float, float], rng: np.random.Generator) -> None:

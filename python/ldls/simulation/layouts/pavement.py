@@ -1,4 +1,4 @@
-"""What stands and walks on pavements and paths."""
+"""Things and people on pavements and paths."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ldls.simulation import objects
 from ldls.simulation.plan import Plan
-from ldls.simulation.shapes import cycles, figures, furniture, scenery
+from ldls.simulation.scene_object import BENCH, BICYCLE, CHAIR, DOG, MOTORCYCLE, PERSON, POTTED_PLANT
+from ldls.simulation.shapes import figures, scenery, vehicles
 from ldls.simulation.shapes.shape import Shape
 
 Range = tuple[float, float]
 THINGS: tuple[tuple[int, Callable[[np.random.Generator], Shape], float], ...] = (
-    (objects.BICYCLE, cycles.bicycle, 1.4),
-    (objects.BENCH, furniture.bench, 0.9),
-    (objects.POTTED_PLANT, furniture.potted_plant, 1.1),
-    (objects.DOG, figures.dog, 0.5),
-    (objects.MOTORCYCLE, cycles.motorcycle, 0.3),
+    (BICYCLE, vehicles.bicycle, 1.4),
+    (BENCH, scenery.bench, 0.9),
+    (POTTED_PLANT, scenery.potted_plant, 1.1),
+    (DOG, figures.dog, 0.5),
+    (MOTORCYCLE, vehicles.motorcycle, 0.3),
 )
 """Category, shape, and how many there are on average to a pavement."""
 
@@ -27,8 +27,8 @@ def furnish(plan: Plan, across_m: Range, *, along_m: Range, rng: np.random.Gener
     for category, build, count in THINGS:
         for _ in range(int(rng.poisson(count))):
             yaw = rng.normal(0, 0.2) + np.pi * rng.integers(2)
-            speed = 0.8 if category == objects.DOG else 0.0
-            turn = np.pi / 2 if category == objects.BENCH else 0.0
+            speed = 0.8 if category == DOG else 0.0
+            turn = np.pi / 2 if category == BENCH else 0.0
             plan.put(category, build(rng), *_place(across_m, along_m, rng), yaw=yaw + turn, speed_m_s=speed)
     for _ in range(int(rng.poisson(1.0))):
         plan.scenery(scenery.bush(rng), *_place(across_m, along_m, rng), room_m=0.7)
@@ -39,10 +39,10 @@ def furnish(plan: Plan, across_m: Range, *, along_m: Range, rng: np.random.Gener
 def cafe(plan: Plan, x_m: float, y_m: float, rng: np.random.Generator) -> None:
     """Put tables there with two to four chairs around each."""
     for dx in (0.0, 2.3):
-        plan.scenery(furniture.table(rng), x_m + dx, y_m, room_m=0.3)
+        plan.scenery(scenery.table(rng), x_m + dx, y_m, room_m=0.3)
         for angle in rng.uniform(0, 0.6) + np.arange(int(rng.integers(2, 5))) * (np.pi / 2):
             x, y = x_m + dx + 0.72 * np.cos(angle), y_m + 0.72 * np.sin(angle)
-            plan.put(objects.CHAIR, furniture.chair(rng), x, y, yaw=angle + np.pi + rng.normal(0, 0.2))
+            plan.put(CHAIR, scenery.chair(rng), x, y, yaw=angle + np.pi + rng.normal(0, 0.2))
 
 
 def people(
@@ -58,7 +58,7 @@ def people(
             dx, dy = -0.62 * member * np.sin(yaw), 0.62 * member * np.cos(yaw)
             body = figures.person(rng, walking=walking)
             speed = rng.uniform(0.9, 1.7) if walking else 0.0
-            plan.put(objects.PERSON, body, x + dx + rng.normal(0, 0.12), y + dy, yaw=turn, speed_m_s=speed)
+            plan.put(PERSON, body, x + dx + rng.normal(0, 0.12), y + dy, yaw=turn, speed_m_s=speed)
 
 
 def _place(across_m: Range, along_m: Range, rng: np.random.Generator) -> tuple[float, float]:

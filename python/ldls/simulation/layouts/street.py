@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ldls.simulation import objects
 from ldls.simulation.ground import Ground, Strip
 from ldls.simulation.layouts import pavement
 from ldls.simulation.plan import Plan
-from ldls.simulation.shapes import cycles, scenery, vehicles
+from ldls.simulation.scene_object import BUS, CAR, MOTORCYCLE, TRUCK
+from ldls.simulation.shapes import scenery, vehicles
 from ldls.simulation.shapes.shape import Material
 
 ASPHALT, PAVING = (0.30, 0.30, 0.32), (0.58, 0.56, 0.53)
@@ -58,10 +58,10 @@ def _ground(across: Profile, rng: np.random.Generator) -> Ground:
 def _traffic(plan: Plan, across: Profile, rng: np.random.Generator) -> None:
     """Vehicles ahead in the sensor's lane and in the one that comes towards it."""
     kinds = (
-        (objects.CAR, vehicles.car),
-        (objects.BUS, vehicles.bus),
-        (objects.TRUCK, vehicles.truck),
-        (objects.MOTORCYCLE, cycles.motorcycle),
+        (CAR, vehicles.car),
+        (BUS, vehicles.bus),
+        (TRUCK, vehicles.truck),
+        (MOTORCYCLE, vehicles.motorcycle),
     )
     for lane_m, yaw, spots in ((0.0, 0.0, (16.0, 28.0, 42.0, -14.0)), (3.4, np.pi, (13.0, 23.0, 34.0, 48.0, -16.0))):
         for x in spots:
@@ -80,11 +80,11 @@ def _parked(plan: Plan, across: Profile, rng: np.random.Generator) -> None:
             beside = 3 < x < 9  # the mouth of a drive, often kept free
             if rng.random() < (0.4 * full if beside else full):
                 truck = rng.random() < 0.06
-                category, build = (objects.TRUCK, vehicles.truck) if truck else (objects.CAR, vehicles.car)
+                category, build = (TRUCK, vehicles.truck) if truck else (CAR, vehicles.car)
                 turn = yaw + rng.normal(0, 0.025) + (np.pi if rng.random() < 0.15 else 0.0)
                 plan.put(category, build(rng), x + rng.uniform(-0.3, 0.3), y + rng.normal(0, 0.08), yaw=turn)
             elif rng.random() < 0.15:
-                plan.put(objects.MOTORCYCLE, cycles.motorcycle(rng), x, y, yaw=yaw + rng.normal(0, 0.3))
+                plan.put(MOTORCYCLE, vehicles.motorcycle(rng), x, y, yaw=yaw + rng.normal(0, 0.3))
             x += rng.uniform(5.3, 6.8)
 
 

@@ -7,9 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.categories import COCO_NAMES
+
 PERSON, BICYCLE, CAR, MOTORCYCLE, BUS, TRUCK = 1, 2, 3, 4, 6, 8
 BENCH, DOG, CHAIR, POTTED_PLANT = 15, 18, 62, 64
 """COCO's ids of the categories that scenes hold."""
+KITTI_NAMES = {PERSON: "Pedestrian", CAR: "Car", TRUCK: "Truck"}
+CLASS_NAMES = {
+    category: KITTI_NAMES.get(category, COCO_NAMES[category])
+    for category in (PERSON, BICYCLE, CAR, MOTORCYCLE, BUS, TRUCK, BENCH, DOG, CHAIR, POTTED_PLANT)
+}
+"""Class of each category in the truth: KITTI's name where it has one, else COCO's."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +41,6 @@ class SceneObject:
     height_m: float
     yaw: float
     velocity_m_s: tuple[float, float] = (0.0, 0.0)
-
-    def after(self, seconds: float) -> SceneObject:
-        """The object `seconds` later."""
-        vx, vy = self.velocity_m_s
-        return self.moved((vx * seconds, vy * seconds, 0.0))
 
     def below(self, height_m: float) -> SceneObject:
         """The object in a frame whose origin lies `height_m` higher."""

@@ -1,4 +1,4 @@
-"""How wrong segmenters and sensors are; every strength of 0 means perfect."""
+"""Errors of segmenters and sensors, by their strengths; every strength of 0 means perfect."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ldls.errors import ParameterError
 
 @dataclass(frozen=True, kw_only=True)
 class SegmenterErrors:
-    """What an image segmenter gets wrong.
+    """Errors of an image segmenter.
 
     Attributes:
         mask_cells: A mask is drawn on this many cells across its box and enlarged, as networks do; 0 for pixels.
@@ -51,7 +51,7 @@ class SegmenterErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorErrors:
-    """What a calibration and a pair of clocks get wrong.
+    """Errors of a calibration and of a pair of clocks.
 
     Attributes:
         rotation_deg: Angle of the calibration's error, about an axis drawn from the seed, in degrees.
@@ -71,13 +71,13 @@ class SensorErrors:
         """Of perfect sensors."""
         return cls(rotation_deg=0, translation_m=0, delay_s=0)
 
-    def calibrated(self, T_camera_lidar: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-        """The transform (4, 4) that a user is given instead of the true one."""
-        axis, direction = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+    def drift(self, seed: int) -> NDArray[np.float64]:
+        """(4, 4) error of the calibration that a user is given, to be applied after the true transform."""
+        axis, direction = (v / np.linalg.norm(v) for v in np.random.default_rng((seed, 1)).normal(size=(2, 3)))
         error = np.eye(4)
         error[:3, :3] = _rotation(axis, np.radians(self.rotation_deg))
         error[:3, 3] = self.translation_m * direction
-        return error @ T_camera_lidar
+        return error
 
 
 def _rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:

@@ -1,1 +1,0 @@
-"""The small street of `ldls demo`: numpy alone, no ray-casting library."""

@@ -1,0 +1,175 @@
+"""Drives through one scene, in which objects move, ten frames a second: a car's, and a robot's.
+
+Objects move straight on and do not mind one another. The rig stays upright, and all stands still during a sweep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import ParameterError
+from ldls.simulation.error_model import SegmenterErrors, SensorErrors
+from ldls.simulation.ground import Ground
+from ldls.simulation.lidars import VLP_16
+from ldls.simulation.plan import Plan
+from ldls.simulation.rigs import ROBOT_LENS, MountedCamera, Rig, make_rig
+from ldls.simulation.scene_object import SceneObject
+from ldls.simulation.scenes import Scene, build, make_plan, make_scene
+from ldls.simulation.simulated_frame import SimulatedFrame, take_frame
+
+PERIOD_S = 0.1
+SPEED_M_S = 5.0
+LONGEST_M = 40.0
+"""How far a drive goes at most, for scenes end; longer ones go slower."""
+CLEAR_M = 1.5
+"""No object comes nearer to the lidar than this."""
+ROBOT = Rig(VLP_16, 0.75, (MountedCamera(ROBOT_LENS, (0.10, 0.0, -0.12)),))
+"""A VLP-16 over a camera with a lens."""
+ROBOT_SPEED_M_S = 1.2
+ROBOT_IMAGE_DELAY_S = 0.012
+"""How much later than its sweep a robot's image is taken."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """A car's drive: objects that would come too near to the rig are taken away before.
+
+    The rig keeps its height above the ground, and stands still between an image and its sweep.
+
+    Attributes:
+        n_frames: Number of frames.
+        seed: Seed of the scene and all noise.
+        kind: `street` or `campus`.
+        lidar: Name of a lidar.
+        camera: Name of a camera; a ring has more than KITTI's raw layout takes.
+        segmenter: Errors of the masks.
+        sensors: Errors of calibration and clocks, the same in all frames.
+
+    Raises:
+        ParameterError: There is no frame, or the camera is a ring.
+    """
+
+    n_frames: int = 20
+    seed: int = 0
+    kind: str = "street"
+    lidar: str = "hdl-64e"
+    camera: str = "kitti"
+    segmenter: SegmenterErrors = field(default_factory=SegmenterErrors)
+    sensors: SensorErrors = field(default_factory=SensorErrors)
+
+    def __post_init__(self) -> None:
+        if self.n_frames < 1:
+            raise ParameterError(f"n_frames: got {self.n_frames}, expected 1 or more")
+        if len(self.rig().cameras) > 1:
+            raise ParameterError(f"camera: got {self.camera!r}, expected kitti or robot, for a drive has one camera")
+
+    @property
+    def speed_m_s(self) -> float:
+        """Speed of the rig, in metres a second."""
+        return min(SPEED_M_S, LONGEST_M / (self.n_frames * PERIOD_S))
+
+    def rig(self) -> Rig:
+        """Lidar and camera."""
+        return make_rig(lidar=self.lidar, camera=self.camera)
+
+
+def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
+    """Frame `number` of a drive, from 0; the same every time.
+
+    Raises:
+        ParameterError: There is no such frame.
+        ImportError: `ldls[sim]` is not installed.
+    """
+    if not 0 <= number < drive.n_frames:
+        raise ParameterError(f"number: got {number}, expected 0 to {drive.n_frames - 1}")
+    plan = make_plan(drive.seed, kind=drive.kind)
+    plan.remove(_in_the_way(drive, plan))
+    seconds, seed = number * PERIOD_S, 1000 * drive.seed + number
+    scene = _on_the_ground(build(plan), plan.ground, seconds, drive.speed_m_s * seconds)
+    return take_frame(
+        scene,
+        scene.after(drive.sensors.delay_s),
+        drive.rig(),
+        name=f"{number:010d}",
+        stamps=(seconds, seconds + drive.sensors.delay_s),
+        sweep_noise=(seed, 0),
+        mask_seed=seed,
+        drift=drive.sensors.drift(drive.seed),
+        segmenter=drive.segmenter,
+    )
+
+
+def robot_drive(
+    frames: int, *, seed: int = 0, rig: Rig = ROBOT, segmenter: SegmenterErrors | None = None
+) -> Iterator[SimulatedFrame]:
+    """The frames of a robot's drive along x through a campus; its calibration has no error.
+
+    Objects do not make way, so keep it to some seconds. Stamps count from the begin of the drive.
+
+    Args:
+        frames: Number of frames.
+        seed: Seed of the scene and its noise.
+        rig: Lidar and camera.
+        segmenter: Errors of the masks; `SegmenterErrors()` by default.
+
+    Raises:
+        ParameterError: `frames` is below 1.
+        ImportError: `ldls[sim]` is not installed.
+    """
+    if frames < 1:
+        raise ParameterError(f"frames: got {frames}, expected 1 or more")
+    scene = make_scene(seed, kind="campus")
+    for number in range(frames):
+        swept = number * PERIOD_S
+        taken = swept + ROBOT_IMAGE_DELAY_S
+        yield take_frame(
+            _from_the_robot(scene, taken),
+            _from_the_robot(scene, swept),
+            rig,
+            name=f"{number:06d}",
+            stamps=(taken, swept),
+            sweep_noise=(seed, 0, number),
+            mask_seed=seed + 7919 * number,
+            drift=np.eye(4),
+            segmenter=segmenter,
+        )
+
+
+def _from_the_robot(scene: Scene, seconds: float) -> Scene:
+    """The scene at a time, its origin below the robot that has driven on."""
+    way = [ROBOT_SPEED_M_S * seconds, 0.0, 0.0]
+    return scene.after(seconds).moved(-np.tile(way, (len(scene.objects) + 1, 1)))
+
+
+def _on_the_ground(scene: Scene, ground: Ground, seconds: float, way_m: float) -> Scene:
+    """The scene `seconds` later, seen from `way_m` farther along x; objects keep to the ground."""
+    by_m = np.zeros((len(scene.objects) + 1, 3))
+    by_m[1:] = [_moved_m(thing, ground, seconds) for thing in scene.objects]
+    return scene.moved(by_m - [way_m, 0.0, ground.height_m(way_m, 0.0)])
+
+
+def _moved_m(thing: SceneObject, ground: Ground, seconds: float) -> tuple[float, float, float]:
+    x, y, _ = thing.centre_m
+    dx, dy = (speed * seconds for speed in thing.velocity_m_s)
+    return dx, dy, ground.height_m(x + dx, y + dy) - ground.height_m(x, y)
+
+
+def _in_the_way(drive: Drive, plan: Plan) -> set[int]:
+    """Numbers of the objects that come within `CLEAR_M` of the lidar's axis at any time of the drive."""
+    seconds = PERIOD_S * np.arange(drive.n_frames, dtype=np.float64)
+    numbered = enumerate(plan.objects, start=1)
+    return {number for number, thing in numbered if _nearest_m(thing, seconds, drive.speed_m_s) < CLEAR_M}
+
+
+def _nearest_m(thing: SceneObject, seconds: NDArray[np.float64], speed_m_s: float) -> float:
+    """Least distance between the lidar's axis and the box of an object."""
+    (x, y, _), (vx, vy) = thing.centre_m, thing.velocity_m_s
+    towards = np.stack([x + (vx - speed_m_s) * seconds, y + vy * seconds])
+    c, s = np.cos(thing.yaw), np.sin(thing.yaw)
+    along, across = np.abs(np.array([[c, s], [-s, c]]) @ towards)
+    beyond = np.maximum([along - thing.length_m / 2, across - thing.width_m / 2], 0)
+    return float(np.hypot(*beyond).min())
