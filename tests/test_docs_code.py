@@ -93,7 +93,7 @@ def test_parameters(run, capsys):
     from ldls.simulation import suite_orders
     from ldls.simulation.production import make_frames
 
-    frames = suite_orders("tuning")[:2]
+    frames = suite_orders("tuning")[:1]
     assert len(list(make_frames("tuning", frames, processes=1))) == len(frames)
     names = run("docs/parameters.md", holding="def scores")
     assert len(capsys.readouterr().out.splitlines()) == len(names["SETTINGS"])

@@ -65,7 +65,20 @@ def drive(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drive")
     done = CliRunner().invoke(
         app,
-        ["simulate", "--layout", "kitti-raw", "--frames", "3", "--lidar", "vlp-16", "--camera", "robot", str(folder)],
+        [
+            "simulate",
+            "--layout",
+            "kitti-raw",
+            "--frames",
+            "3",
+            "--lidar",
+            "vlp-16",
+            "--camera",
+            "robot",
+            "--processes",
+            "1",
+            str(folder),
+        ],
     )
     assert done.exit_code == 0, done.output
     (found,) = folder.glob("*/*_sync")
