@@ -1,11 +1,14 @@
 //! Each stage of the method and all of it, on a made-up street of 20 instances: `cargo bench`.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use ldls_core::{
     Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, View, diffuse,
     keep_largest_components, project, segment,
 };
+use rayon::prelude::*;
 use std::hint::black_box;
+use std::num::NonZero;
 
 const HEIGHT: usize = 375;
 const WIDTH: usize = 1242;
@@ -56,6 +59,18 @@ fn masks() -> InstanceMasks {
     InstanceMasks::new(HEIGHT, WIDTH, rles.collect()).expect("masks")
 }
 
+/// The points themselves and their `k` nearest neighbours, by kiddo.
+fn neighbors_of_kiddo(points: &[[f64; 3]], k: usize) -> Vec<u32> {
+    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(points).expect("a tree");
+    let wanted = NonZero::new(k + 1).expect("one at least");
+    let nearest = |point: &[f64; 3]| {
+        let query = tree.query(point);
+        query.nearest_n::<SquaredEuclidean<f64>>(wanted).execute()
+    };
+    let rows = points.par_iter().flat_map_iter(nearest);
+    rows.map(|item| item.item).collect()
+}
+
 fn stages(criterion: &mut Criterion) {
     let (camera, masks, params) = (camera(), masks(), Params::paper());
     let view = View {
@@ -100,6 +115,10 @@ fn stages(criterion: &mut Criterion) {
         });
         group.bench_function(BenchmarkId::new("neighbors", n), |b| {
             b.iter(|| black_box(Neighbors::search(points, params.neighbors)));
+        });
+        // the peer: kiddo's tree, whose queries run on all threads as ours do
+        group.bench_function(BenchmarkId::new("neighbors of kiddo", n), |b| {
+            b.iter(|| black_box(neighbors_of_kiddo(points, params.neighbors)));
         });
         group.bench_function(BenchmarkId::new("graph", n), |b| {
             b.iter(|| {

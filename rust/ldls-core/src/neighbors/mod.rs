@@ -58,6 +58,7 @@ impl Neighbors {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::num::NonZero;
 
     fn brute_force(points: &[[f64; 3]], k: usize) -> Neighbors {
         let k = k.min(points.len().saturating_sub(1));
@@ -114,6 +115,38 @@ mod tests {
         ) {
             let points: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
             prop_assert_eq!(Neighbors::search(&points, 10), brute_force(&points, 10));
+        }
+    }
+
+    /// The squared distances that kiddo, an independent k-d tree, finds: with equal distances, it may name other points.
+    fn distances_of_kiddo(points: &[[f64; 3]], k: usize) -> Vec<f64> {
+        let tree = kiddo::ImmutableKdTree::<f64, 3>::new_from_slice(points).unwrap();
+        // the point itself, or another one at its place, is the nearest
+        let wanted = NonZero::new(k + 1).unwrap();
+        let of_point = |point: &[f64; 3]| {
+            let query = tree.query(point);
+            let nearest = query.nearest_n::<kiddo::SquaredEuclidean<f64>>(wanted);
+            nearest.execute().into_iter().skip(1)
+        };
+        let items = points.iter().flat_map(of_point);
+        items.map(|item| item.distance).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn distances_are_those_of_an_independent_tree(
+            points in proptest::collection::vec([-9.0..9.0_f64, -9.0..9.0, -2.0..2.0], 40..3000),
+            k in 1_usize..30, far in prop_oneof![Just(0.0), Just(5e5)],
+        ) {
+            let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + far, p[1] - far, p[2]]).collect();
+            let distances = Neighbors::search(&points, k).squared_distances(&points);
+            let expected = distances_of_kiddo(&points, k);
+            prop_assert_eq!(distances.len(), expected.len());
+            // kiddo may add squares in another order
+            for (distance, expected) in distances.iter().zip(&expected) {
+                prop_assert!((distance - expected).abs() <= 4.0 * f64::EPSILON * expected);
+            }
         }
     }
 
