@@ -172,3 +172,24 @@ def test_likelihoods_beyond_what_the_pixel_edges_allow_are_computed_by_plain_pro
     assert allowed[1] < 200 == beyond[1]
     np.testing.assert_allclose(allowed[0], beyond[0], atol=1e-5)
     np.testing.assert_allclose(beyond[0].sum(axis=1), 2, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("drift", "masses", "shares"),
+    [
+        pytest.param(0.13, [0.2, 0.2, 0.02, 0.02], [0.5] * 100, id="sums beyond what the seeds allow"),
+        pytest.param(0.11, [0.02], [0.25] * 2 + [0.0] * 98, id="negative likelihoods"),
+    ],
+)
+def test_a_series_that_the_graph_leads_astray_is_given_up_for_products(drift, masses, shares):
+    # a ring on which values flow more one way than the other; the signs of labels 0 and 1 cancel in the probe of errors
+    n = 400
+    mass, share = np.resize(masses, n), np.resize(shares, n)
+    i = np.arange(n)
+    flows = np.stack([np.full(n, 0.001), np.full(n, 0.999 * (0.5 + drift)), np.full(n, 0.999 * (0.5 - drift))], axis=1)
+    columns = np.stack([i, (i + 1) % n, (i - 1) % n], axis=1)
+    weights = (flows * (1 - mass)[:, None]).astype(np.float32)
+    A = csr_array((weights.ravel(), columns.ravel(), 3 * np.arange(n + 1)), shape=(n, n))
+    b = csr_array(np.repeat((mass * share)[:, None], 2, axis=1).astype(np.float32))
+    (expected,) = plain_loop(A, b, [200])
+    np.testing.assert_allclose(stages.diffuse(A, b), expected, atol=1e-5)

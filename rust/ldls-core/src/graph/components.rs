@@ -68,9 +68,9 @@ impl Component {
 }
 
 fn largest_of_each(labels: &[u32], components: &[u32], indices: &[u32]) -> Vec<Component> {
-    let mut found = vec![Component::NONE; labels.len()];
+    let mut all = vec![Component::NONE; labels.len()];
     for (&root, &index) in components.iter().zip(indices) {
-        let component = &mut found[root as usize];
+        let component = &mut all[root as usize];
         let first = component.first.min(index);
         *component = Component {
             root,
@@ -80,7 +80,7 @@ fn largest_of_each(labels: &[u32], components: &[u32], indices: &[u32]) -> Vec<C
     }
     let n_labels = labels.iter().max().map_or(1, |&label| label as usize + 1);
     let mut largest = vec![Component::NONE; n_labels];
-    for &component in found.iter().filter(|component| component.size > 0) {
+    for &component in all.iter().filter(|component| component.size > 0) {
         let best = &mut largest[labels[component.root as usize] as usize];
         let larger = component.size > best.size;
         if larger || (component.size == best.size && component.first < best.first) {
@@ -134,6 +134,16 @@ mod tests {
             keep_largest_components(&chain(9), &labels).unwrap(),
             [0, 0, 0, 1, 1, 1, 2, 2, 0]
         );
+    }
+
+    #[test]
+    fn sets_are_joined_by_their_roots_whichever_elements_are_named() {
+        let mut sets = DisjointSets::new(7);
+        for (a, b) in [(4, 5), (2, 3), (5, 3), (6, 5), (1, 0)] {
+            sets.join(a, b);
+        }
+        let roots: Vec<u32> = (0..7).map(|i| sets.root(i)).collect();
+        assert_eq!(roots, [0, 0, 2, 2, 2, 2, 2]);
     }
 
     #[test]

@@ -8,28 +8,28 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Rows handled by one task of the thread pool.
-const BLOCK: usize = 1024;
+const ROWS_A_TASK: usize = 1024;
 
 /// Weighted edges between points in compressed sparse rows: row i lists the points that label flows
 /// from to point i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointGraph<T = f32> {
-    rows: Rows,
+    layout: Layout,
     /// Shared by the graphs of one cloud in both precisions.
     columns: Arc<Vec<u32>>,
     weights: Vec<T>,
 }
 
-/// Where the rows of a sparse matrix lie.
+/// The layout of the rows of a sparse matrix.
 #[derive(Debug, Clone, PartialEq)]
-enum Rows {
+enum Layout {
     /// All of one length.
     Uniform { count: usize, degree: usize },
     /// Row i at `offsets[i]..offsets[i + 1]`.
     Varied { offsets: Vec<usize> },
 }
 
-impl Rows {
+impl Layout {
     fn count(&self) -> usize {
         match self {
             Self::Uniform { count, .. } => *count,
@@ -85,7 +85,7 @@ impl<T: Real> PointGraph<T> {
             .par_chunks_mut(degree)
             .zip(adjacency.columns.par_chunks(degree))
             .zip(points);
-        rows.with_min_len(BLOCK)
+        rows.with_min_len(ROWS_A_TASK)
             .for_each(|((weights, columns), point)| {
                 weights[0] = T::from_f64(1.0);
                 for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
@@ -94,7 +94,7 @@ impl<T: Real> PointGraph<T> {
                 }
             });
         Self {
-            rows: Rows::Uniform { count, degree },
+            layout: Layout::Uniform { count, degree },
             columns: Arc::clone(&adjacency.columns),
             weights,
         }
@@ -138,7 +138,7 @@ impl<T: Real> PointGraph<T> {
             ));
         }
         Ok(Self {
-            rows: Rows::Varied { offsets },
+            layout: Layout::Varied { offsets },
             columns: Arc::new(columns),
             weights,
         })
@@ -157,14 +157,14 @@ impl<T: Real> PointGraph<T> {
             });
         }
         let scale = |(i, mass): (usize, &T)| {
-            let edges = &self.weights[self.rows.range(i..i + 1)];
+            let edges = &self.weights[self.layout.range(i..i + 1)];
             let sum = edges.iter().map(|w| w.to_f64()).sum::<f64>() + mass.to_f64();
             // a row without edges stays empty rather than become NaN
             if sum > 0.0 { 1.0 / sum } else { 0.0 }
         };
-        let masses = labels.mass.par_iter().enumerate().with_min_len(BLOCK);
+        let masses = labels.mass.par_iter().enumerate().with_min_len(ROWS_A_TASK);
         let scales: Vec<f64> = masses.map(scale).collect();
-        scale_rows(&mut self.weights, &scales, |rows| self.rows.range(rows));
+        scale_rows(&mut self.weights, &scales, |rows| self.layout.range(rows));
         let range = |rows: Range<usize>| labels.offsets[rows.start]..labels.offsets[rows.end];
         scale_rows(&mut labels.weights, &scales, range);
         labels
@@ -177,19 +177,19 @@ impl<T: Real> PointGraph<T> {
 
     /// Number of points.
     pub fn len(&self) -> usize {
-        self.rows.count()
+        self.layout.count()
     }
 
-    /// Whether there is no point.
+    /// True if there is no point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// Edges of each point, if it is known that all have as many.
     pub(crate) fn degree(&self) -> Option<usize> {
-        match self.rows {
-            Rows::Uniform { degree, .. } => Some(degree),
-            Rows::Varied { .. } => None,
+        match self.layout {
+            Layout::Uniform { degree, .. } => Some(degree),
+            Layout::Varied { .. } => None,
         }
     }
 
@@ -206,14 +206,14 @@ impl<T: Real> PointGraph<T> {
     /// Columns and weights of `rows`, row after row.
     #[inline(always)]
     pub(crate) fn slices(&self, rows: Range<usize>) -> (&[u32], &[T]) {
-        let range = self.rows.range(rows);
+        let range = self.layout.range(rows);
         (&self.columns[range.clone()], &self.weights[range])
     }
 
     /// Row starts, column indices and weights.
     pub fn into_csr(self) -> (Vec<usize>, Vec<u32>, Vec<T>) {
         let offsets = (0..=self.len())
-            .map(|i| self.rows.range(i..i).start)
+            .map(|i| self.layout.range(i..i).start)
             .collect();
         (offsets, Arc::unwrap_or_clone(self.columns), self.weights)
     }
@@ -225,14 +225,14 @@ fn scale_rows<T: Real>(
     scales: &[f64],
     range: impl Fn(Range<usize>) -> Range<usize> + Sync,
 ) {
-    let mut blocks = Vec::with_capacity(scales.len().div_ceil(BLOCK));
-    for (block, scales) in scales.chunks(BLOCK).enumerate() {
-        let first = block * BLOCK;
+    let mut tasks = Vec::with_capacity(scales.len().div_ceil(ROWS_A_TASK));
+    for (task, scales) in scales.chunks(ROWS_A_TASK).enumerate() {
+        let first = task * ROWS_A_TASK;
         let (head, tail) = values.split_at_mut(range(first..first + scales.len()).len());
-        blocks.push((head, first, scales));
+        tasks.push((head, first, scales));
         values = tail;
     }
-    blocks.into_par_iter().for_each(|(values, first, scales)| {
+    tasks.into_par_iter().for_each(|(values, first, scales)| {
         let start = range(first..first).start;
         for (i, &scale) in (first..).zip(scales) {
             let row = range(i..i + 1);
