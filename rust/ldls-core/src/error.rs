@@ -1,7 +1,7 @@
-//! The one error type of the core. Its fields carry the numbers; its messages say what was found, what was expected
+//! The one error type of the core. Its fields carry the numbers; its messages name what was given, what was expected
 //! and how to mend it.
 
-/// What can be wrong with the input of the method.
+/// A fault of the input of the method.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// A coordinate is too large for the graph's distances to mean anything.
@@ -29,7 +29,7 @@ pub enum Error {
         neighbors: usize,
         /// The limit.
         limit: u64,
-        /// What the limit counts.
+        /// The things that the limit counts.
         of: &'static str,
     },
 
@@ -38,7 +38,7 @@ pub enum Error {
         "camera: {matrix}[{row}, {column}] is {value}, expected finite numbers; was the calibration loaded whole?"
     )]
     CameraNotFinite {
-        /// Which matrix.
+        /// Name of the matrix.
         matrix: &'static str,
         /// Row of the value.
         row: usize,
@@ -152,9 +152,9 @@ pub enum Error {
         "RLE: byte {offset} of counts: {problem}; expected the compressed string that COCO tools write"
     )]
     RleString {
-        /// Where in the string.
+        /// Offset in the string.
         offset: usize,
-        /// What is wrong there.
+        /// The fault there.
         problem: &'static str,
     },
 
@@ -163,7 +163,7 @@ pub enum Error {
         "polygon: {problem}; expected a flat list x1, y1, x2, y2, ... of at least 3 points in pixels, near the image"
     )]
     Polygon {
-        /// What is wrong.
+        /// The fault.
         problem: String,
     },
 
@@ -192,7 +192,7 @@ pub enum Error {
     Mismatch {
         /// Name of the argument.
         name: &'static str,
-        /// What does not fit.
+        /// The misfit.
         problem: String,
     },
 }

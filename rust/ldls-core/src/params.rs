@@ -15,7 +15,7 @@ pub struct Params {
     pub window: usize,
     /// Number of products z <- A z + b; `None` runs them until nothing changes.
     pub iterations: Option<usize>,
-    /// Whether only the largest connected component of an instance keeps its label.
+    /// Set if only the largest connected component of an instance keeps its label.
     pub remove_outliers: bool,
 }
 

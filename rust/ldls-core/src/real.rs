@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 use std::iter::Sum;
-use std::ops::{Add, AddAssign, Mul, MulAssign, Sub};
+use std::ops::{Add, AddAssign, Mul, Sub};
 
 /// A floating-point number.
 pub trait Real:
@@ -18,7 +18,6 @@ pub trait Real:
     + AddAssign
     + Sub<Output = Self>
     + Mul<Output = Self>
-    + MulAssign
     + 'static
 {
     /// Share of the largest seed below which a likelihood is lost in the rounding of what it competes with.

@@ -1,4 +1,4 @@
-//! How Python calls the core: without the GIL, on a thread pool, and with panics turned into `InternalError`.
+//! Calls of the core from Python: without the GIL, on a thread pool, and with panics turned into `InternalError`.
 
 use crate::errors::{raise, to_python};
 use pyo3::prelude::*;
@@ -18,7 +18,7 @@ type Pools = HashMap<(u32, usize), Arc<ThreadPool>>;
 /// Pools by process and size: threads do not survive a fork, so a child makes its own. Pools are never dropped, which
 /// would wait for threads that a child does not have. Locked under the GIL only, which a fork from Python holds too.
 static POOLS: LazyLock<Mutex<Pools>> = LazyLock::new(Mutex::default);
-/// Where and why the last panic happened.
+/// Place of the last panic.
 static LAST_PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// Runs `work` on `threads` threads (`None`: as many as the process may use) with the GIL released.

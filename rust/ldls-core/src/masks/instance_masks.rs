@@ -1,4 +1,4 @@
-//! The instance masks of an image. What points have of their pixels is the business of [`super::pixel_labels`].
+//! The instance masks of an image.
 
 use super::rle::{Rle, check_size};
 use crate::{Error, Result};
@@ -69,7 +69,7 @@ impl InstanceMasks {
         self.masks.len()
     }
 
-    /// Whether there is no instance.
+    /// True if there is no instance.
     pub fn is_empty(&self) -> bool {
         self.masks.is_empty()
     }

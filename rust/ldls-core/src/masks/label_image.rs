@@ -1,5 +1,5 @@
-//! All masks of an image painted into one, and the labels found in windows of it. What they weigh is the business of
-//! [`super::pixel_labels`].
+//! All masks of an image painted into one, and the labels found in windows of it. [`super::pixel_labels`]
+//! weighs them.
 
 use super::instance_masks::InstanceMasks;
 use super::rle::Rle;
@@ -22,7 +22,7 @@ struct LabelSet {
     rest: u32,
 }
 
-/// How often each label occurs in one window.
+/// Number of occurrences of each label in one window.
 #[derive(Debug, Default)]
 pub(crate) struct WindowCounts {
     /// Pixels of the window that lie in the image.

@@ -43,7 +43,7 @@ impl Rle {
     }
 }
 
-/// How far a disk of `radius` around 0 reaches up at `across` from its middle.
+/// The distance that a disk of `radius` around 0 reaches up at `across` from its middle.
 fn half_chord(radius: usize, across: usize) -> usize {
     let (radius, across) = (radius as u128, across as u128);
     (radius * radius - across * across).isqrt() as usize

@@ -7,7 +7,7 @@ use crate::{Error, Real, Result};
 use rayon::prelude::*;
 
 /// Points handled by one task of the thread pool.
-const BLOCK: usize = 2048;
+const POINTS_A_TASK: usize = 2048;
 
 /// The pixel edges of every point, added up by label: row i holds the labels found in the window of point i and the
 /// sum of the weights of the edges that end in each. A pixel under several masks counts for each of them.
@@ -36,21 +36,21 @@ impl InstanceMasks {
         pixel_weight: f64,
     ) -> Result<PixelLabels<T>> {
         let image = LabelImage::paint(self);
-        let blocks: Vec<Result<PixelLabels<T>>> = uv
-            .par_chunks(BLOCK)
+        let parts: Vec<Result<PixelLabels<T>>> = uv
+            .par_chunks(POINTS_A_TASK)
             .enumerate()
-            .map(|(block, uv)| {
+            .map(|(task, uv)| {
                 let mut labels = PixelLabels::default();
                 let mut counts = WindowCounts::default();
-                for (i, &uv) in (block * BLOCK..).zip(uv) {
+                for (i, &uv) in (task * POINTS_A_TASK..).zip(uv) {
                     image.count(self.nearest_pixel(i, uv)?, window / 2, &mut counts);
                     labels.push(&counts, pixel_weight);
                 }
                 Ok(labels)
             })
             .collect();
-        let blocks = blocks.into_iter().collect::<Result<Vec<_>>>()?;
-        Ok(PixelLabels::concatenate(&blocks))
+        let parts = parts.into_iter().collect::<Result<Vec<_>>>()?;
+        Ok(PixelLabels::concatenate(&parts))
     }
 
     /// Direct projection: the label of the pixel nearest to each of `uv`; of several masks, the first.
@@ -130,9 +130,9 @@ impl<T: Real> PixelLabels<T> {
         self.offsets.push(self.labels.len());
     }
 
-    fn concatenate(blocks: &[Self]) -> Self {
-        let points: usize = blocks.iter().map(Self::rows).sum();
-        let entries = blocks.iter().map(|block| block.labels.len()).sum();
+    fn concatenate(parts: &[Self]) -> Self {
+        let points: usize = parts.iter().map(Self::rows).sum();
+        let entries = parts.iter().map(|part| part.labels.len()).sum();
         let mut all = Self {
             offsets: Vec::with_capacity(points + 1),
             labels: Vec::with_capacity(entries),
@@ -140,13 +140,13 @@ impl<T: Real> PixelLabels<T> {
             mass: Vec::with_capacity(points),
         };
         all.offsets.push(0);
-        for block in blocks {
+        for part in parts {
             let start = all.labels.len();
             all.offsets
-                .extend(block.offsets.iter().map(|offset| start + offset));
-            all.labels.extend_from_slice(&block.labels);
-            all.weights.extend_from_slice(&block.weights);
-            all.mass.extend_from_slice(&block.mass);
+                .extend(part.offsets.iter().map(|offset| start + offset));
+            all.labels.extend_from_slice(&part.labels);
+            all.weights.extend_from_slice(&part.weights);
+            all.mass.extend_from_slice(&part.mass);
         }
         all
     }

@@ -58,7 +58,7 @@ fn column_switches(polygon: &[f64], height: usize, width: usize) -> Vec<u32> {
         .collect()
 }
 
-/// Where the step from `a` to `b`, one fine column apart, switches an image column, if it crosses one's centre line.
+/// The position at which the step from `a` to `b`, one fine column apart, switches an image column, if it crosses one's centre line.
 fn switch(a: [i64; 2], b: [i64; 2], height: usize, width: usize) -> Option<u32> {
     let left = a[0].min(b[0]);
     let crosses_centres = left.rem_euclid(FINE) == FINE / 2;

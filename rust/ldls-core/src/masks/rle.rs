@@ -107,7 +107,7 @@ impl Rle {
         }
     }
 
-    /// Where `self` or `other`, of the same size, has a pixel.
+    /// The pixels of `self` and of `other`, which is of the same size.
     ///
     /// # Panics
     /// If the sizes differ.
@@ -119,7 +119,7 @@ impl Rle {
         Self::from_spans(self.height, self.width, spans)
     }
 
-    /// Where `self` has a pixel and `other`, of the same size, has none.
+    /// The pixels of `self` that `other`, of the same size, has not.
     ///
     /// # Panics
     /// If the sizes differ.
@@ -129,7 +129,7 @@ impl Rle {
         self.complement().union(other).complement()
     }
 
-    /// Where `self` has no pixel.
+    /// The pixels that `self` has not.
     #[must_use]
     pub fn complement(&self) -> Self {
         let runs = match self.runs.split_first() {

@@ -1,5 +1,4 @@
-//! Which candidates are the nearest neighbours of a point, as double precision sees them. Finding candidates
-//! is the business of the searches.
+//! The choice, in double precision, of the nearest neighbours of a point among candidates, which the searches find.
 
 use super::kdtree::KdTree;
 use super::keys::{Key, position_of};
@@ -19,7 +18,7 @@ pub(crate) fn precedes(a: Candidate, b: Candidate) -> bool {
     a.0 < b.0 || (a.0 == b.0 && a.1 < b.1)
 }
 
-/// Fills `row` with the nearest of `candidates` as double precision sees them.
+/// Fills `row` with the nearest of `candidates`, by double precision; false if they are too few.
 pub(crate) fn decide(
     tree: &KdTree,
     points: &[[f64; 3]],

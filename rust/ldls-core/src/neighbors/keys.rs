@@ -5,7 +5,7 @@
 ///
 /// The bits of a positive `f32` sort as its value does, and so do those of an `f64`: with the distance in its
 /// upper half and the position in its lower, one floating-point comparison compares both. The lowest exponent
-/// is added lest it be subnormal, which some processors take for zero.
+/// is added so that it is not subnormal, which some processors take for zero.
 pub(crate) type Key = f64;
 const LOWEST_EXPONENT: u64 = 1 << 52;
 

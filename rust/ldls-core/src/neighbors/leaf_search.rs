@@ -148,7 +148,7 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
         self.visit_leaf(self.leaf);
         let node = self.leaf / FAN;
         let tree = self.tree;
-        self.visit_children(&tree.levels[0][node], 0, node, Some(self.leaf % FAN));
+        self.visit_children(&tree.levels[0][node], node, Some(self.leaf % FAN));
         self.visit_ancestors(node);
     }
 
@@ -166,7 +166,7 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
     /// Visits the children of a node that are near enough, but for the one that is done.
     fn visit_node(&mut self, boxes: &Boxes, level: usize, node: usize, done: Option<usize>) {
         if level == 0 {
-            self.visit_children(boxes, level, node, done);
+            self.visit_children(boxes, node, done);
             return;
         }
         let tree = self.tree;
@@ -181,7 +181,7 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
 
     /// Visits the leaves of a node of the lowest level, the nearest first.
     #[inline(always)]
-    fn visit_children(&mut self, boxes: &Boxes, _level: usize, node: usize, done: Option<usize>) {
+    fn visit_children(&mut self, boxes: &Boxes, node: usize, done: Option<usize>) {
         let squared = boxes.squared_distances(&self.low, &self.high);
         let mut near = [0.0; FAN];
         let mut count = 0;

@@ -1,10 +1,10 @@
-//! Points to pixels: a general pinhole camera. What it sees of a cloud is the business of [`super::in_view`].
+//! Points to pixels: a general pinhole camera.
 
 use super::distortion::{Distortion, Lens};
 use crate::{Error, Result};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 
-/// How far a rotation may be from orthonormal; calibration files round to 7 digits.
+/// Largest deviation of a rotation from orthonormal; calibration files round to 7 digits.
 const ROTATION_LIMIT: f64 = 1e-3;
 
 /// A camera: a rigid transform to the camera frame (x right, y down, z forward), then a 3 x 4 projection to pixels, with
@@ -20,7 +20,7 @@ pub struct Camera {
     min_depth_m: f64,
 }
 
-/// What a camera has of a point.
+/// The position of a point relative to an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sight {
     /// At or behind the smallest depth.
@@ -100,7 +100,7 @@ impl Camera {
         })
     }
 
-    /// Where a point of the lidar frame falls on an image of `height` x `width` pixels.
+    /// The position of a point of the lidar frame relative to an image of `height` x `width` pixels.
     #[inline]
     pub(crate) fn sight(&self, xyz: &[f64; 3], height: usize, width: usize) -> Sight {
         let [u, v, depth] = self.project(xyz);

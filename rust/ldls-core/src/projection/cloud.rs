@@ -29,7 +29,7 @@ impl Cloud<'_> {
         }
     }
 
-    /// Whether there is no point.
+    /// True if there is no point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

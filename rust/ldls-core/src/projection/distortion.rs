@@ -3,7 +3,7 @@
 
 use crate::{Error, Result};
 
-/// How a lens departs from a pinhole.
+/// The departure of a lens from a pinhole.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Distortion {
     /// None: a pinhole, or an image that was rectified.
@@ -58,7 +58,7 @@ impl Lens {
         self.distortion == Distortion::None
     }
 
-    /// Where (x, y) of the plane z = 1 is seen on it; none beyond the fold.
+    /// The image of (x, y) of the plane z = 1 on that plane; none beyond the fold.
     #[inline]
     pub(crate) fn bend(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let r2 = x * x + y * y;

@@ -223,7 +223,7 @@ mod tests {
     ];
     const PROJECTION: [f64; 12] = [100., 0., 50., 0., 0., 100., 40., 0., 0., 0., 1., 0.];
 
-    /// What an image of 80 x 100 pixels sees of points given in single precision.
+    /// The points in view of an image of 80 x 100 pixels, of those given in single precision.
     fn in_view(points: &[f32]) -> Result<InView> {
         let camera = Camera::new(&PROJECTION, &IDENTITY, 0.125).unwrap();
         let cloud = Cloud::F32 {

@@ -14,7 +14,7 @@ const UNSEEN: u32 = u32::MAX;
 pub(crate) struct Images<'a> {
     views: &'a [View<'a>],
     pub(crate) sightings: Vec<Sighting>,
-    /// Where each point in view stands in the sighting of each image.
+    /// Position of each point in view in the sighting of each image.
     slots: Vec<Vec<u32>>,
     /// Label of each instance of each image, at the number of the instance; entry 0 is the background.
     labels: Vec<Vec<u32>>,
@@ -123,7 +123,7 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Where each of `n` points in view stands in a sighting.
+/// Position of each of `n` points in view in a sighting.
 fn slots(sighting: &Sighting, n: usize) -> Vec<u32> {
     let mut slots = vec![UNSEEN; n];
     for (slot, &point) in sighting.seen.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Which instances of several images show one object: those on which the points agree that both images see.
+//! The instances of several images that show one object: those on which the points agree that both images see.
 
 use super::view::View;
 use crate::masks::InstanceMasks;
@@ -42,7 +42,7 @@ pub(crate) fn same_objects(
     groups
 }
 
-/// How many points of two instances agree.
+/// Numbers of points on which two instances agree, and in all.
 #[derive(Debug, Clone, Copy)]
 struct Agreement {
     /// Points on both masks.
@@ -106,7 +106,7 @@ fn instances_at(masks: &InstanceMasks, uv: impl Iterator<Item = [f64; 2]>) -> Ve
     let pixels: Vec<[usize; 2]> = uv
         .filter_map(|uv| nearest_pixel(uv, masks.height(), masks.width()))
         .collect();
-    let mut found = vec![Vec::new(); pixels.len()];
+    let mut instances_of = vec![Vec::new(); pixels.len()];
     for (m, mask) in (1..).zip(masks.masks()) {
         let [top, left, height, width] = mask.bounding_box();
         let ends: Vec<usize> = mask
@@ -117,7 +117,7 @@ fn instances_at(masks: &InstanceMasks, uv: impl Iterator<Item = [f64; 2]>) -> Ve
                 Some(*end)
             })
             .collect();
-        for ([column, row], instances) in pixels.iter().zip(&mut found) {
+        for ([column, row], instances) in pixels.iter().zip(&mut instances_of) {
             let near = (left..left + width).contains(column) && (top..top + height).contains(row);
             let at = column * masks.height() + row;
             // runs of ones have odd numbers
@@ -126,7 +126,7 @@ fn instances_at(masks: &InstanceMasks, uv: impl Iterator<Item = [f64; 2]>) -> Ve
             }
         }
     }
-    found
+    instances_of
 }
 
 #[cfg(test)]
