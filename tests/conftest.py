@@ -18,6 +18,15 @@ settings.load_profile("tests")
 KITTI_FRAMES = ("000000", "000001", "000002", "000003", "000571")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config):
+    """A process for each core, four at most, for the whole suite; a file alone is sooner done in this one."""
+    if config.args == config.getini("testpaths") and (cores := os.cpu_count() or 1) > 1:
+        return min(cores, 4)
+    config.option.dist = "no"
+    return 0
+
+
 @dataclass(frozen=True)
 class Frame:
     """One real KITTI frame and what the method makes of it."""
