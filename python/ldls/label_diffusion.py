@@ -243,7 +243,7 @@ def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
 
 
 def _warning(message: str, category: type[Warning]) -> None:
-    # the caller of segment, four calls up, is the one to be told
+    # the warning names the line that calls segment, four calls up
     warnings.warn(message, category, stacklevel=5)
 
 

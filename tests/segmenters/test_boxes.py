@@ -95,17 +95,17 @@ def label_file(tmp_path, *rows):
 def test_kitti_classes(tmp_path):
     known = ["Car", "Pedestrian", "Person_sitting", "Truck", "Tram", "Van", "Cyclist", "Misc"]
     path = label_file(tmp_path, *((name, "") for name in [*known, "DontCare", "Forklift", "dog"]))
-    masks = BoxSegmenter.from_kitti(path, names={104: "Forklift"})(IMAGE)
+    masks = BoxSegmenter.read_kitti(path, names={104: "Forklift"})(IMAGE)
     assert masks.categories.tolist() == [3, 1, 1, 8, 7, 101, 102, 103, 104, 18]
     assert [m.name for m in masks][5:] == ["Van", "Cyclist", "Misc", "Forklift", "dog"]
     with pytest.raises(MaskError, match="000001.txt: box 8: class 'Forklift' is none of"):
-        BoxSegmenter.from_kitti(path)
+        BoxSegmenter.read_kitti(path)
     assert (masks.scores == 1).all()
 
 
 def test_kitti_scores(tmp_path):
     path = label_file(tmp_path, ("Car", " 0.75"), ("Car", " 0.25"))
-    assert BoxSegmenter.from_kitti(path, min_score=0.5)(IMAGE).scores.tolist() == [0.75]
+    assert BoxSegmenter.read_kitti(path, min_score=0.5)(IMAGE).scores.tolist() == [0.75]
 
 
 @pytest.mark.parametrize(
@@ -118,11 +118,11 @@ def test_kitti_scores(tmp_path):
 )
 def test_kitti_files_that_cannot_be(rows, error, match, tmp_path):
     with pytest.raises(error, match=match):
-        BoxSegmenter.from_kitti(label_file(tmp_path, *rows))
+        BoxSegmenter.read_kitti(label_file(tmp_path, *rows))
 
 
 def test_kitti_file_without_objects(tmp_path):
-    assert len(BoxSegmenter.from_kitti(label_file(tmp_path))(IMAGE)) == 0
+    assert len(BoxSegmenter.read_kitti(label_file(tmp_path))(IMAGE)) == 0
 
 
 def disc(seed=0):

@@ -59,7 +59,7 @@ class BoxSegmenter:
         self.boxes.flags.writeable = False
 
     @classmethod
-    def from_kitti(
+    def read_kitti(
         cls,
         path: str | PathLike[str],
         *,

@@ -21,8 +21,8 @@ def _torchvision(name: str, **options: Any) -> Segmenter:  # noqa: ANN401
 SEGMENTERS: dict[str, Callable[..., Segmenter]] = {
     "onnx": OnnxSegmenter,
     "torchvision": _torchvision,
-    "boxes": BoxSegmenter.from_kitti,
-    "grabcut": partial(BoxSegmenter.from_kitti, grabcut=True),
+    "boxes": BoxSegmenter.read_kitti,
+    "grabcut": partial(BoxSegmenter.read_kitti, grabcut=True),
 }
 """Makers of the segmenters by name; they take the text after the colon."""
 EXAMPLES = {

@@ -24,14 +24,14 @@ from ldls.simulation.simulated_frame import SimulatedFrame, take_frame
 PERIOD_S = 0.1
 SPEED_M_S = 5.0
 LONGEST_M = 40.0
-"""How far a drive goes at most, for scenes end; longer ones go slower."""
+"""Longest way of a drive, for scenes end; longer drives go slower."""
 CLEAR_M = 1.5
 """No object comes nearer to the lidar than this."""
 ROBOT = Rig(VLP_16, 0.75, (MountedCamera(ROBOT_LENS, (0.10, 0.0, -0.12)),))
 """A VLP-16 over a camera with a lens."""
 ROBOT_SPEED_M_S = 1.2
 ROBOT_IMAGE_DELAY_S = 0.012
-"""How much later than its sweep a robot's image is taken."""
+"""Time from a robot's sweep to its image."""
 
 
 @dataclass(frozen=True, kw_only=True)

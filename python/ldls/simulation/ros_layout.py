@@ -40,7 +40,7 @@ from ldls.simulation.simulated_frame import SimulatedFrame
 START_NS = 1_700_000_000 * NANOSECONDS
 """Stamp of the first sweep."""
 LATENCY_NS = 3_000_000
-"""How long after its stamp a message is received."""
+"""Time from the stamp of a message to its reception."""
 POINTS_TOPIC, INFO_TOPIC, IMAGE_TOPIC = "/velodyne_points", "/camera/camera_info", "/camera/image_raw"
 LIDAR_FRAME, OPTICAL_FRAME = "velodyne", "camera_optical_frame"
 OPTICAL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])

@@ -36,7 +36,7 @@ def read(
         names: Name of each category id.
 
     Raises:
-        MaskError: It cannot be told which axis counts the masks, or the values are no masks.
+        MaskError: Either axis may count the masks, or the values are no masks.
         FileFormatError: It is not a whole `.npy` file, or holds Python objects.
     """
     stack = read_npy(path)

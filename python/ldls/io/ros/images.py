@@ -17,7 +17,7 @@ CHANNELS: dict[str, tuple[int, ...]] = {
     "rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2, 3), "bgra8": (2, 1, 0, 3), "mono8": (0, 0, 0),
     "8UC1": (0, 0, 0), "8UC3": (2, 1, 0), "rgb16": (0, 1, 2), "bgr16": (2, 1, 0), "mono16": (0, 0, 0),
 }  # fmt: skip
-"""Where each encoding keeps red, green and blue (and alpha); 8UC1 and 8UC3 are OpenCV's, in its order."""
+"""Channels of red, green and blue (and alpha) in each encoding; 8UC1 and 8UC3 are OpenCV's, in its order."""
 BAYER = {"bayer_rggb": "RGGB", "bayer_bggr": "BGGR", "bayer_gbrg": "GBRG", "bayer_grbg": "GRBG"}
 """Colours of the upper left four pixels, by rows."""
 

@@ -13,7 +13,7 @@ Colour = tuple[float, float, float]
 
 
 class Material(IntEnum):
-    """How a surface looks, and what it does to a laser."""
+    """Look of a surface, and its effect on a laser."""
 
     PLAIN = 0
     GLASS = 1
