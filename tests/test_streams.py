@@ -70,7 +70,8 @@ from ldls.simulation import sample_frame
 frame = sample_frame()
 (image,) = frame.images
 stream = ldls.LabelDiffusion(image.camera, ldls.Params(threads=1))
-points = np.tile(frame.points, (5, 1)) + np.arange(5).repeat(len(frame.points))[:, None].astype(np.float32) * 1e-3
+turn = np.vstack([frame.points, frame.points * np.float32([-1, 1, 1, 1])])  # the sample is what lies ahead
+points = np.tile(turn, (5, 1)) + np.arange(5).repeat(len(turn))[:, None].astype(np.float32) * 1e-3
 def peak_kib(frames):
     for number in range(frames):
         stream.segment(points[number % 7 :], image.masks)
