@@ -24,6 +24,7 @@ from PIL import Image
 from ldls.camera import Camera
 from ldls.io.files import whole_file
 from ldls.io.labels import write_annotations
+from ldls.io.labels.kitti_objects import in_camera_frame
 from ldls.masks import InstanceMasks
 from ldls.simulation.scene_object import KITTI_NAMES, SceneObject
 from ldls.simulation.simulated_frame import SimulatedFrame, SimulatedImage
@@ -43,7 +44,7 @@ def write_kitti(folder: str | PathLike[str], name: str, frame: SimulatedFrame) -
         write_picture(training / image.name / f"{name}.png", image.read())
         write_lines(training / f"calib{ring}" / f"{name}.txt", calibration_lines(image.camera))
         write_masks(training / f"masks{ring}" / f"{name}.json", image.masks, int(name))
-    write_lines(training / "label_2" / f"{name}.txt", label_rows(frame.objects, frame.images[0]))
+    write_lines(training / "label_2" / f"{name}.txt", _label_rows(frame.objects, frame.images[0]))
     write_truth(training / "annotations" / f"{name}.txt", frame)
 
 
@@ -111,13 +112,11 @@ def _write(path: Path, content: bytes) -> None:
         file.write(content)
 
 
-def label_rows(things: tuple[SceneObject, ...], image: SimulatedImage) -> list[str]:
+def _label_rows(things: tuple[SceneObject, ...], image: SimulatedImage) -> list[str]:
     """A row of 15 fields for each object that the image shows, in the camera frame of the calibration as given.
 
-    Categories that KITTI has no name for are Misc.
-
     The 2D box is that of the projected corners, cut at the image's edges. Occlusion is 0 where at least 0.7 of the
-    object is visible, 1 from 0.35, else 2.
+    object is visible, 1 from 0.35, else 2. Categories that KITTI has no name for are Misc.
     """
     shown = np.bincount(image.pixels.instances.ravel(), minlength=len(things) + 1)[1:]
     rows = [
@@ -130,7 +129,7 @@ def label_rows(things: tuple[SceneObject, ...], image: SimulatedImage) -> list[s
 
 def _row(thing: SceneObject, camera: Camera, visible: float) -> str:
     bottom = np.array([*thing.centre_m[:2], thing.centre_m[2] - thing.height_m / 2])
-    x, y, z = _to_camera(camera, bottom[None])[0]
+    x, y, z = in_camera_frame(bottom[None], camera)[0]
     if z < NEAREST_M:
         return ""
     heading = np.array([np.cos(thing.yaw), np.sin(thing.yaw), 0.0])
@@ -146,7 +145,7 @@ def _row(thing: SceneObject, camera: Camera, visible: float) -> str:
 
 def _image_box(thing: SceneObject, camera: Camera) -> tuple[tuple[float, float, float, float], float]:
     """(left, top, right, bottom) within the image, and the share of the box outside it."""
-    corners = _to_camera(camera, thing.corners_m())
+    corners = in_camera_frame(thing.corners_m(), camera)
     corners[:, 2] = np.maximum(corners[:, 2], 0.2)
     homogeneous = np.column_stack([corners, np.ones(8)]) @ camera.projection.T
     uv = homogeneous[:, :2] / homogeneous[:, 2:]
@@ -156,12 +155,6 @@ def _image_box(thing: SceneObject, camera: Camera) -> tuple[tuple[float, float, 
     share = float(np.prod(cut_high - cut_low) / max(float(np.prod(high - low)), 1e-9))
     box = (float(cut_low[0]), float(cut_low[1]), float(cut_high[0]), float(cut_high[1]))
     return box, float(np.clip(1 - share, 0, 1))
-
-
-def _to_camera(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    transform = camera.T_camera_lidar
-    moved: NDArray[np.float64] = points @ transform[:3, :3].T + transform[:3, 3]
-    return moved
 
 
 def _wrapped(angle: float) -> float:

@@ -19,7 +19,7 @@ class Plan:
     """Shapes on a ground, each a scenery or an object, none in the place of another.
 
     Attributes:
-        ground: What they stand on.
+        ground: The ground that they stand on.
         placed: Each shape with the number of its object, 0 for scenery.
         objects: Object m is `objects[m - 1]`.
     """
