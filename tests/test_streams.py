@@ -77,11 +77,12 @@ def peak_kib(frames):
         stream.segment(points[number % 7 :], image.masks)
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmHWM:")[1].split()[0])
-print(peak_kib(3), peak_kib(40))
+print(peak_kib(10), peak_kib(60))
 """
         ),
     )
-    assert later - first < 0.02 * first, f"{first} KiB after three frames, {later} after 40 more"
+    # what the allocator keeps differs by some per cent; a frame that left a hundredth of itself behind would add 60
+    assert later - first < 0.1 * first, f"{first} KiB after ten frames, {later} after 60 more"
 
 
 @linux
