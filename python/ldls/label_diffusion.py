@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.camera import Camera
 from ldls.cloud import Points, as_points
 from ldls.errors import (

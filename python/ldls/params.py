@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from dataclasses import dataclass
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.errors import ParameterError
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.camera import Camera
 from ldls.cloud import as_points

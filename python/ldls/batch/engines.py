@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.batch.frame_work import FrameWork, Outcome
 from ldls.batch.local import run_local
 from ldls.batch.ray_engine import RayCluster, run_ray

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.batch.frame_work import FrameWork, Outcome
 from ldls.batch.lock import LOCK_NAME

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.batch.frame_work import FrameWork, Outcome, Work
 from ldls.batch.lock import LOCK_NAME
 from ldls.errors import BatchError

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.errors import ParameterError
 from ldls.io.results import WRITERS
 from ldls.label_diffusion import SAME_OBJECT

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.camera import camera_info, nuscenes
 from ldls.camera.distortion import Distortion
 from ldls.camera.rigid import as_matrix, as_transform, from_parts

@@ -77,7 +77,7 @@ def run(
 
     ldls run 2011_09_26/2011_09_26_drive_0064_sync --segmenter onnx:yolo11n-seg.onnx --out labels --formats label,ply
     """
-    from ldls import batch
+    import ldls.batch as batch
     from ldls.batch.plan import parse_frames
     from ldls.datasets import open_source
 

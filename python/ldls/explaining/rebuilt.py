@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import stages
+import ldls.stages as stages
 from ldls._optional import require
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import stages
+import ldls.stages as stages
 from ldls.camera import Camera
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView, camera_names

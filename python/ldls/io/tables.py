@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.io.files import whole_file
 from ldls.io.labelled_points import instances, names, positions

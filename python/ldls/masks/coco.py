@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES
 from ldls.errors import CorruptFileError, MaskError, within
 from ldls.masks.instance_mask import InstanceMask

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, find_categories
 from ldls.errors import MaskError, ParameterError, within
 from ldls.masks import adapters, coco, instance_image

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.errors import MaskError, ParameterError
 
 

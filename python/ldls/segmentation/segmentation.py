@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.cloud import Points
 from ldls.errors import InputError
 from ldls.masks import InstanceMasks

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngImageFile, PngInfo
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.errors import (
     CorruptFileError,
     FileFormatError,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
 from ldls.errors import LdlsError, MaskError, ParameterError, UnsupportedFormatError, within
 from ldls.io.arrays import read_npz, write_npz

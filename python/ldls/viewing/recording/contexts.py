@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import palette
+import ldls.palette as palette
 from ldls.categories import category_ids
 from ldls.errors import LimitError
 from ldls.labeling import Labeling

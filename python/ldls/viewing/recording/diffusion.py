@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import stages
+import ldls.stages as stages
 from ldls._optional import require
 from ldls.errors import ParameterError
 from ldls.explaining import rebuild
