@@ -1,6 +1,9 @@
-//! A wall of points before cameras whose masks are rectangles, for the tests of several images.
+//! For tests of several images, a wall of points before cameras whose masks are rectangles; for those of diffusion, a graph of
+//! two points.
 
-use crate::{Camera, Cloud, InstanceMasks, Params, Rle, Segmentation, View};
+use crate::{
+    Camera, Cloud, InstanceMasks, Params, PixelLabels, PointGraph, Rle, Segmentation, View,
+};
 
 const IDENTITY: [f64; 16] = [
     1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
@@ -50,4 +53,16 @@ pub(crate) fn segment(views: &[View]) -> Segmentation {
         columns: 3,
     };
     crate::segment(cloud, views, 0.5, &Params::paper(), false).unwrap()
+}
+
+/// Two points, each joined to the other with weight 1/4 and to its own pixel with weight 1/2.
+pub(crate) fn pair() -> (PointGraph, PixelLabels) {
+    let a = PointGraph::from_csr(vec![0, 2, 4], vec![0, 1, 0, 1], vec![0.25; 4]).unwrap();
+    let b = PixelLabels {
+        offsets: vec![0, 1, 2],
+        labels: vec![0, 1],
+        weights: vec![0.5; 2],
+        mass: vec![0.5; 2],
+    };
+    (a, b)
 }

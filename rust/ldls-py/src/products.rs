@@ -44,7 +44,7 @@ impl Products {
         matrix(py, z, self.n_labels)
     }
 
-    /// Whether none is left.
+    /// True if none is left.
     #[getter]
     fn finished(&self) -> bool {
         self.state.is_finished()

@@ -141,19 +141,8 @@ mod tests {
     use super::*;
     use crate::Real;
     use crate::neighbors::Neighbors;
+    use crate::test_support::pair;
     use proptest::prelude::*;
-
-    /// Two points, each joined to the other with weight 1/4 and to its own pixel with weight 1/2.
-    fn pair() -> (PointGraph, PixelLabels) {
-        let a = PointGraph::from_csr(vec![0, 2, 4], vec![0, 1, 0, 1], vec![0.25; 4]).unwrap();
-        let b = PixelLabels {
-            offsets: vec![0, 1, 2],
-            labels: vec![0, 1],
-            weights: vec![0.5; 2],
-            mass: vec![0.5; 2],
-        };
-        (a, b)
-    }
 
     fn never() -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
         panic!("single precision tells the winner")

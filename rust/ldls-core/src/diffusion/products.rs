@@ -117,22 +117,16 @@ impl Products {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_support::pair;
 
-    /// Two points, each joined to the other with weight 1/4 and to its own pixel with weight 1/2.
-    fn pair(iterations: Option<usize>) -> Products {
-        let a = PointGraph::from_csr(vec![0, 2, 4], vec![0, 1, 0, 1], vec![0.25; 4]).unwrap();
-        let b = PixelLabels {
-            offsets: vec![0, 1, 2],
-            labels: vec![0, 1],
-            weights: vec![0.5; 2],
-            mass: vec![0.5; 2],
-        };
+    fn products_of_pair(iterations: Option<usize>) -> Products {
+        let (a, b) = pair();
         Products::new(a, b, 2, iterations).unwrap()
     }
 
     #[test]
     fn products_are_run_from_zero_one_after_another_and_no_more_than_asked_for() {
-        let mut products = pair(Some(3));
+        let mut products = products_of_pair(Some(3));
         assert_eq!(products.likelihoods(), [0.0; 4]);
         products.advance(1);
         assert_eq!(products.likelihoods(), [0.5, 0.0, 0.0, 0.5]);
@@ -145,7 +139,7 @@ mod tests {
 
     #[test]
     fn without_a_number_it_ends_where_a_product_changes_next_to_nothing() {
-        let mut products = pair(None);
+        let mut products = products_of_pair(None);
         products.advance(usize::MAX);
         assert!(products.is_finished());
         // product t changes likelihoods by 2^-(t + 1), and 2^-17 < 1e-5 < 2^-16

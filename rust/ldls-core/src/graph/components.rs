@@ -36,8 +36,7 @@ pub(crate) fn keep_largest_by_index(
             sets.join(i as u32, j as u32);
         }
     }
-    let mut components = Vec::with_capacity(labels.len());
-    components.extend((0..labels.len() as u32).map(|i| sets.root(i)));
+    let components: Vec<u32> = (0..labels.len() as u32).map(|i| sets.root(i)).collect();
     let largest = largest_of_each(labels, &components, indices);
     let kept = |(&label, &component): (&u32, &u32)| {
         if largest[label as usize].root == component {
@@ -46,9 +45,7 @@ pub(crate) fn keep_largest_by_index(
             0
         }
     };
-    let mut all = Vec::with_capacity(labels.len());
-    all.extend(labels.iter().zip(&components).map(kept));
-    Ok(all)
+    Ok(labels.iter().zip(&components).map(kept).collect())
 }
 
 /// One component: its root, its size, and the lowest index of a point in it.
@@ -97,9 +94,9 @@ struct DisjointSets {
 
 impl DisjointSets {
     fn new(n: usize) -> Self {
-        let mut parents = Vec::with_capacity(n);
-        parents.extend(0..n as u32);
-        Self { parents }
+        Self {
+            parents: (0..n as u32).collect(),
+        }
     }
 
     fn root(&mut self, mut element: u32) -> u32 {

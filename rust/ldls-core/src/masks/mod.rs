@@ -1,5 +1,6 @@
 //! Instance masks of an image, and the labels that its pixels give to points (method, step 2).
 
+mod compressed;
 mod instance_masks;
 mod label_image;
 mod morphology;
