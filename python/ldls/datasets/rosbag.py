@@ -180,8 +180,9 @@ class RosBag:
 
     def _image(self, image: StampedMessage, sweep: Header) -> CameraImage:
         info = nearest(self._infos[image.topic], image.header.stamp_ns)
+        message = self._message(info)
         with within(self._place(info)):
-            camera = _camera(self._message(info), self._transform(image, sweep), rectified="image_rect" in image.topic)
+            camera = _camera(message, self._transform(image, sweep), rectified="image_rect" in image.topic)
         return CameraImage(
             name=_camera_name(image.topic),
             camera=camera,

@@ -82,8 +82,8 @@ class BoxSegmenter:
             MaskError: A class without category id, or a score outside 0 to 1, which KITTI allows.
             FileNotFoundError: There is no such file.
         """
+        objects = kitti_boxes.read_boxes(path, names=names)
         try:
-            objects = kitti_boxes.read_boxes(path, names=names)
             return cls(
                 objects.boxes,
                 categories=objects.categories,

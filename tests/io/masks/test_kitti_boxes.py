@@ -75,7 +75,7 @@ def test_an_empty_file_has_no_masks(tmp_path):
 def test_faults_of_boxes_are_named(tmp_path, text, options, error, message):
     with pytest.raises(error, match=message) as caught:
         boxes(tmp_path, text, **options)
-    assert "000007.txt" in str(caught.value)
+    assert str(caught.value).count("000007.txt") == 1
 
 
 def test_classes_of_ones_own_get_ids(tmp_path):

@@ -51,12 +51,13 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
     objects = [each for each in read_kitti_objects(path) if not each.is_region]
     all_names = KITTI_NAMES | dict(names or {})
     ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
-    return KittiBoxes(
-        boxes=[each.bbox for each in objects],
-        categories=[_category(i, each, ids) for i, each in enumerate(objects)],
-        scores=[_score(i, each) for i, each in enumerate(objects)],
-        names=all_names,
-    )
+    with within(path):
+        return KittiBoxes(
+            boxes=[each.bbox for each in objects],
+            categories=[_category(i, each, ids) for i, each in enumerate(objects)],
+            scores=[_score(i, each) for i, each in enumerate(objects)],
+            names=all_names,
+        )
 
 
 def read(
@@ -75,8 +76,8 @@ def read(
     """
     if image_size is None:
         raise MaskError(f"{path}: says nothing of the image's size; pass image_size=(height, width)")
+    objects = read_boxes(path, names=names)
     with within(path):
-        objects = read_boxes(path, names=names)
         return InstanceMasks.from_boxes(
             objects.boxes,
             image_size,
