@@ -157,6 +157,12 @@ class LeftOutWarning(LdlsWarning):
     """Sweeps that no frame is made of, for something that belongs to them is missing."""
 
 
+def some(names: Sequence[str], most: int = 8) -> str:
+    """The first of `names`, at the most so many, and how many more there are."""
+    listed = ", ".join(names[:most])
+    return listed if len(names) <= most else f"{listed} and {len(names) - most} more"
+
+
 @contextmanager
 def within(place: str | PathLike[str]) -> Iterator[None]:
     """Begin the message of an error of `ldls` that leaves the block with the file or argument that it is about."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.errors import InputError, LeftOutWarning, SourceError
+from ldls.errors import InputError, LeftOutWarning, SourceError, some
 from ldls.io import read_image, read_points
 from ldls.io.labels import read_labeling
 from ldls.labeling import Labeling
@@ -19,8 +19,6 @@ from ldls.masks import InstanceMasks
 
 POINT_SUFFIXES = (".bin", ".npy")
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
-LISTED = 8
-"""Number of names that an error lists."""
 
 
 class FileSource:
@@ -159,12 +157,6 @@ def choose(path: Path, what: str, there: Sequence[str], wanted: str | None) -> s
     if wanted is None:
         raise SourceError(f"{path}: holds {len(there)} {what}s ({listed}); say which by {what}=")
     raise SourceError(f"{path}: has no {what} {wanted!r}; found {listed}")
-
-
-def some(names: Sequence[str]) -> str:
-    """The first of `names`, and how many more there are."""
-    listed = ", ".join(names[:LISTED])
-    return listed if len(names) <= LISTED else f"{listed} and {len(names) - LISTED} more"
 
 
 def image_from_file(

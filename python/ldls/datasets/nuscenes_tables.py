@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion
-from ldls.datasets.file_source import choose, some
-from ldls.errors import CalibrationError, CorruptFileError, SourceError
+from ldls.datasets.file_source import choose
+from ldls.errors import CalibrationError, CorruptFileError, SourceError, some
 from ldls.io.json_rows import read_json_rows
 
 TABLES = ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ldls.errors import CorruptFileError, FileFormatError, LimitError, TruncatedFileError, UnsafeFileError
+from ldls.errors import CorruptFileError, FileFormatError, LimitError, TruncatedFileError, UnsafeFileError, within
 from ldls.io.files import regular_file, whole_file
 
 MAX_BYTES = 4 << 30
@@ -30,11 +30,8 @@ def read_npy(path: str | PathLike[str]) -> NDArray[Any]:
         FileFormatError: It is not a whole `.npy` file, or holds Python objects.
     """
     path = regular_file(path)
-    try:
-        with path.open("rb") as file:
-            return read_array(file, path.stat().st_size)
-    except FileFormatError as error:
-        raise type(error)(f"{path}: {error}") from None
+    with within(path), path.open("rb") as file:
+        return read_array(file, path.stat().st_size)
 
 
 def read_array(file: IO[bytes], n_bytes: int) -> NDArray[Any]:

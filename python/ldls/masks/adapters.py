@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, category_ids
-from ldls.errors import MaskError
+from ldls.errors import MaskError, within
 from ldls.masks.coco import from_rle
 from ldls.masks.pixels import checked_size, encode
 
@@ -144,10 +144,8 @@ def _ultralytics_rles(masks: Any, size: tuple[int, int]) -> list[_ldls.Rle]:  # 
 def _from_outline(index: int, outline: Any, size: tuple[int, int]) -> _ldls.Rle:  # noqa: ANN401
     if len(outline) < 3:  # of a mask without pixels, or with next to none
         return _ldls.Rle.from_pixels(np.zeros(size, np.bool_))
-    try:
+    with within(f"mask {index}"):
         return _ldls.Rle.from_polygons(*size, [outline.ravel().tolist()])
-    except MaskError as error:
-        raise MaskError(f"mask {index}: {error}") from None
 
 
 def from_sam(
@@ -186,10 +184,8 @@ def _sam_rle(index: int, record: Mapping[str, Any]) -> _ldls.Rle:
     segmentation = record["segmentation"]
     if not isinstance(segmentation, Mapping):
         return encode(index, to_numpy(segmentation))
-    try:
+    with within(f"record {index}"):
         return from_rle(segmentation)
-    except MaskError as error:
-        raise MaskError(f"record {index}: {error}") from None
 
 
 def to_numpy(values: Any) -> NDArray[Any]:  # noqa: ANN401

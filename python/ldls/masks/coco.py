@@ -155,10 +155,8 @@ def from_rle(rle: Mapping[str, Any], image_size: tuple[int, int] | None = None) 
     Raises:
         MaskError: Runs that do not sum to height * width, or another size than `image_size`.
     """
-    try:
+    with within("RLE"):
         size = checked_size(rle.get("size"))
-    except MaskError as error:
-        raise MaskError(f"RLE: {error}") from None
     if image_size is not None and size != image_size:
         hint = "; swapped?" if size == image_size[::-1] else ""
         raise MaskError(f"RLE of size {size}, image is {image_size}{hint}")

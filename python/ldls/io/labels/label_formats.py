@@ -11,7 +11,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
-from ldls.errors import InputError, ParameterError, UnsupportedFormatError
+from ldls.errors import InputError, ParameterError, UnsupportedFormatError, some
 from ldls.io.labels.annotations import read_annotations
 from ldls.io.labels.kitti_objects import read_kitti_boxes
 from ldls.io.labels.labeling_npz import read_labeling_npz
@@ -144,7 +144,9 @@ def pair_files(
     both = sorted(ours.keys() & theirs.keys())
     if lacking and (missing == "error" or not both):
         sides = (predictions, "no truth", ours.keys() - theirs), (truth, "no prediction", theirs.keys() - ours)
-        listed = "; ".join(f"{_listed(sorted(names))} of {side} have {what}" for side, what, names in sides if names)
+        listed = "; ".join(
+            f"{some(sorted(names), LISTED)} of {side} have {what}" for side, what, names in sides if names
+        )
         raise InputError(f"frames without their pair: {listed}; add them, or skip them (--missing skip)")
     return tuple(LabelFiles(name, ours[name], theirs[name]) for name in both), tuple(lacking)
 
@@ -182,8 +184,3 @@ def _known(format: str) -> str:
 
 def _frame_name(path: Path, endings: list[str]) -> str | None:
     return next((path.name.removesuffix(ending) for ending in endings if path.name.endswith(ending)), None)
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(names[:LISTED])
-    return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
