@@ -111,7 +111,7 @@ class Island:
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """The facts that decided the label of one point; `explanation.verdict` sums them up in a sentence.
+    """The facts that decided the label of one point; `verdict` sums them up in a sentence.
 
     Attributes:
         point: Its row in the cloud.
@@ -154,7 +154,14 @@ class Explanation:
     @property
     def verdict(self) -> str:
         """The reason for the label of the point, in a sentence."""
-        return verdict_of(self)
+        point = f"Point {self.point}"
+        if self.label < 0:
+            return f"{point} is out of view: {_why_unseen(self.sights)}."
+        components = self.components
+        if components is not None and components.removed:
+            given = named(self, components.label)
+            return f"{point} is background: diffusion gave it to {given}, but it lies in a {_where(components)}."
+        return f"{point} is {named(self, self.label)}: {_lead(self)}."
 
     def to_dict(self) -> dict[str, Any]:
         """The same as plain values that JSON can hold, the verdict first; numbers that are not finite are None."""
@@ -162,18 +169,6 @@ class Explanation:
 
     def __str__(self) -> str:
         return self.verdict
-
-
-def verdict_of(explanation: Explanation) -> str:
-    """The reason for the label of the point, in a sentence."""
-    point = f"Point {explanation.point}"
-    if explanation.label < 0:
-        return f"{point} is out of view: {_why_unseen(explanation.sights)}."
-    components = explanation.components
-    if components is not None and components.removed:
-        given = named(explanation, components.label)
-        return f"{point} is background: diffusion gave it to {given}, but it lies in a {_where(components)}."
-    return f"{point} is {named(explanation, explanation.label)}: {_lead(explanation)}."
 
 
 def named(explanation: Explanation, label: int) -> str:
