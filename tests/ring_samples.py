@@ -28,7 +28,7 @@ def random_ring(seed):
 
 
 def as_views(views):
-    """What `ldls.segment` takes of the views of `random_ring`."""
+    """The views of `random_ring`, as `ldls.segment` takes them."""
     return [
         ldls.View(ldls.InstanceMasks.from_array(pixels, categories=categories), one)
         for pixels, categories, one in views

@@ -20,7 +20,7 @@ WRITTEN = {
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
-    """What an example prints, and where it wrote; each is run once, two at a time."""
+    """The text that an example prints, and the folder it wrote to; each is run once, two at a time."""
     with ThreadPoolExecutor(2) as runs:
         ended = {name: runs.submit(run, name, tmp_path_factory.mktemp(name)) for name in WRITTEN}
         yield lambda name: ended[name].result()

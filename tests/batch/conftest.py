@@ -16,7 +16,7 @@ def source(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def undisturbed(source, tmp_path_factory):
-    """What a run that nothing disturbs leaves of these."""
+    """The files that an undisturbed run of these frames leaves."""
     out = tmp_path_factory.mktemp("undisturbed")
     outcome = runs.finished(runs.arguments(source, out))
     assert outcome.returncode == 0, outcome.stderr
@@ -31,7 +31,7 @@ def few(tmp_path):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """What mounts a file system of so many KiB."""
+    """A file system of 120 KiB, mounted."""
     place = tmp_path / "small"
     place.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=120k", "none", str(place)]

@@ -30,7 +30,7 @@ TO_OPTICAL = (0.5, -0.5, 0.5, -0.5)
 
 @dataclass(kw_only=True)
 class Recording:
-    """What a small bag holds; each test changes one thing."""
+    """The contents of a small bag; each test changes one thing."""
 
     kind: str = "rosbag1"
     sweeps: int = 3

@@ -13,7 +13,7 @@ CLASSES = {0: "person", 1: "forklift", 2: "car"}
 
 
 class Tensor:
-    """What a tensor on a GPU lets one do, in order."""
+    """A stand-in that permits the calls of a tensor on a GPU, in their order."""
 
     def __init__(self, values, steps=()):
         self.values, self.steps = np.asarray(values), steps

@@ -1,4 +1,4 @@
-"""What `segment` accepts, refuses, reports and returns."""
+"""`segment`: the input it accepts and refuses, its report and its result."""
 
 import multiprocessing
 import sys

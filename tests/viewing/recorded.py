@@ -1,4 +1,4 @@
-"""What a recording holds, read with Rerun's own reader."""
+"""The contents of a recording, read with Rerun's own reader."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from rerun.chunk import RrdReader
 
 @dataclass(frozen=True)
 class Row:
-    """What one entity got at one time; `times` is empty where it holds for all times."""
+    """The values logged to one entity at one time; `times` is empty where it holds for all times."""
 
     times: dict
     values: dict

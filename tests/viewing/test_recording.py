@@ -530,7 +530,7 @@ def wait_for(condition, seconds=300):
 
 
 def received(path):
-    """What a listener has written so far, which has no end yet; None where that cannot be read."""
+    """The recording that a listener has written so far, which has no end yet; None where that cannot be read."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RerunWarning)
         try:

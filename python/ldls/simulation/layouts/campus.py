@@ -42,7 +42,7 @@ def _ground(right: float, left: float, rng: np.random.Generator) -> Ground:
 
 
 def _vehicles(plan: Plan, right: float, left: float, rng: np.random.Generator) -> None:
-    """A row of parked cars beside the path, and perhaps a lorry that delivers or a bus that waits."""
+    """A row of parked cars beside the path, and perhaps a truck that delivers or a bus that waits."""
     side, start = (right - 1.3, left + 1.3)[int(rng.integers(2))], rng.uniform(6, 20)
     for k in range(int(rng.integers(2, 7))):
         yaw = np.pi * rng.integers(2) + rng.normal(0, 0.05)

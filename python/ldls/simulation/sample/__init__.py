@@ -13,6 +13,6 @@ FOLDER = Path(__file__).parent / "training"
 def sample_frame() -> Frame:
     """The street that `ldls demo` shows, with masks as a segmenter finds them and the true labels of its points.
 
-    Cars, people, a lorry, a bicycle and a dog, seen by KITTI's lidar and camera; of the sweep, the 100 degrees ahead.
+    Cars, people, a truck, a bicycle and a dog, seen by KITTI's lidar and camera; of the sweep, the 100 degrees ahead.
     """
     return KittiObjectSource(FOLDER, masks="masks")[0]

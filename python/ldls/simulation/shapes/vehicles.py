@@ -104,7 +104,7 @@ def bus(rng: np.random.Generator) -> Shape:
 
 
 def truck(rng: np.random.Generator) -> Shape:
-    """A lorry with a cab, a box body and a gap between them, 6.5 to 9 m long."""
+    """A truck with a cab, a box body and a gap between them, 6.5 to 9 m long."""
     length, height = rng.uniform(6.5, 9.0), rng.uniform(2.9, 3.5)
     half, width, paint, load = length / 2, 2.4, paints.pick(paints.PAINTS, rng), paints.pick(paints.PAINTS, rng)
     cab = half - 1.8
