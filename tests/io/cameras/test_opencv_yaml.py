@@ -139,8 +139,9 @@ def test_models_of_distortion(write, entries, options, model):
     ],
 )
 def test_faults_are_named_with_their_file(write, text, message):
-    with pytest.raises(ldls.CalibrationError, match=f"camera.yaml.*({message})"):
+    with pytest.raises(ldls.CalibrationError, match=f"camera.yaml.*({message})") as caught:
         ldls.read_camera(write(text), format="opencv", T_camera_lidar=np.eye(4))
+    assert str(caught.value).count("camera.yaml") == 1
 
 
 def test_files_that_are_no_yaml(tmp_path, monkeypatch):

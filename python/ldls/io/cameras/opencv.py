@@ -29,12 +29,13 @@ def camera_of(fields: Fields, *, T_camera_lidar: NDArray[np.float64], fisheye: b
         CalibrationError: A key is missing, or a value cannot be a camera's.
     """
     projection, distortion = fields.matrix((3, 3), *MATRIX), _distortion(fields, fisheye)
+    image_size = fields.image_size()
     with within(fields.place):
         return Camera(
             projection=projection,
             T_camera_lidar=T_camera_lidar,
             distortion=distortion,
-            image_size=fields.image_size(),
+            image_size=image_size,
         )
 
 
