@@ -16,7 +16,7 @@ def run(*arguments):
 def test_frames_are_written_and_counted(tmp_path):
     result = run(tmp_path / "out", "--frames", 2, "--scene", "campus", "--seed", 4, *SMALL)
     assert result.exit_code == 0, result.output
-    assert "person" in result.output and "2 frames" in result.output
+    assert "person" in result.output and "Cyclist" in result.output and "2 frames" in result.output
     training = tmp_path / "out/training"
     assert sorted(p.name for p in (training / "velodyne").iterdir()) == ["000000.bin", "000001.bin"]
     assert ldls.read_masks(training / "masks/000001.json").image_size == (480, 640)

@@ -32,7 +32,7 @@ class Street:
         frame = scene_frame(seed, segmenter=SegmenterErrors.none(), sensors=SensorErrors.none())
         (image,) = frame.images
         self.points, self.truth, self.camera = frame.points, frame.truth.instances, image.camera
-        owners, categories = image.pixels.instances, image.pixels.categories
+        owners, categories = image.pixels.instances, np.array([one.category for one in frame.objects])
         sizes = np.bincount(owners.ravel(), minlength=len(categories) + 1)
         self.objects = [m for m in range(1, len(categories) + 1) if sizes[m] >= MIN_PIXELS]
         palette = np.random.default_rng(5).permutation(np.array(np.meshgrid(*[[60, 150, 240]] * 3)).reshape(3, -1).T)

@@ -24,7 +24,7 @@ from ldls.simulation import (
     write_kitti,
 )
 from ldls.simulation import suite as make_whole_suite
-from ldls.simulation.scene_object import CLASS_NAMES
+from ldls.simulation.scene_object import CLASS_NAMES, CYCLIST
 from ldls.stages import project
 
 
@@ -75,15 +75,15 @@ def test_annotations_have_a_line_for_each_point(frame, training):
 
 
 def test_names_are_those_that_evaluation_knows():
-    names = [CLASS_NAMES[category] for category in (1, 3, 8, 6, 64)]
-    assert names == ["Pedestrian", "Car", "Truck", "bus", "potted plant"]
+    names = [CLASS_NAMES[category] for category in (1, 3, 8, 6, 64, CYCLIST)]
+    assert names == ["Pedestrian", "Car", "Truck", "bus", "potted plant", "Cyclist"]
     assert all(ClassSet.kitti().knows(name) for name in names)
 
 
 def test_boxes_hold_the_points_of_their_objects(frame, training):
     rows = [line.split() for line in (training / "label_2/000021.txt").read_text().splitlines()]
     assert {len(row) for row in rows} == {15}
-    assert {row[0] for row in rows} <= {"Car", "Pedestrian", "Truck", "Misc"}
+    assert {row[0] for row in rows} <= {"Car", "Pedestrian", "Truck", "Cyclist", "Misc"}
     boxes = np.array([row[1:] for row in rows], float)
     transform = frame.images[0].camera.T_camera_lidar
     points = frame.points[:, :3].astype(float) @ transform[:3, :3].T + transform[:3, 3]
@@ -189,7 +189,7 @@ def test_the_suite_is_fixed():
 def test_the_suite_is_kept_in_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("LDLS_CACHE", str(tmp_path))
     folder = suite_folder("tuning")
-    assert folder.is_relative_to(tmp_path) and "suite-v1" in folder.parts
+    assert folder.is_relative_to(tmp_path) and "suite-v2" in folder.parts
     (folder / "training/annotations").mkdir(parents=True)
     for order in suite_orders("tuning"):
         (folder / f"training/annotations/{order.name}.txt").touch()

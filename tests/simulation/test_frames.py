@@ -5,7 +5,7 @@ import pytest
 
 from ldls.errors import ParameterError
 from ldls.simulation import SegmenterErrors, SensorErrors, SimulatedFrame, make_rig, make_scene, scene_frame
-from ldls.simulation.scene_object import CLASS_NAMES
+from ldls.simulation.scene_object import CLASS_NAMES, CYCLIST
 from ldls.stages import project
 
 PERFECT = {"segmenter": SegmenterErrors.none(), "sensors": SensorErrors.none()}
@@ -67,11 +67,11 @@ def test_objects_do_not_stand_in_one_another(frame):
             assert np.hypot(*np.subtract(one.centre_m, other.centre_m)[:2]) > 1.8
 
 
-def test_scenes_hold_ten_categories():
+def test_scenes_hold_ten_categories_and_cyclists():
     found = {
         o.category for kind in ("street", "campus") for seed in range(12) for o in make_scene(seed, kind=kind).objects
     }
-    assert found == {1, 2, 3, 4, 6, 8, 15, 18, 62, 64}
+    assert found == {1, 2, 3, 4, 6, 8, 15, 18, 62, 64, CYCLIST}
 
 
 def test_a_seed_is_a_frame():

@@ -85,7 +85,8 @@ COSINE_BANDS = np.array([0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.0])
 def wall(material=Material.PLAIN):
     """A long grey wall to the left of the lidar, seen ever more at a slant the farther along it a ray goes."""
     shape = box((0, WALL_M + 0.5, 0), (400, 1, 400), (GREY, GREY, GREY), material)
-    return Scene(shape, np.zeros(len(shape.faces), np.int32), ())
+    scenery = np.zeros(len(shape.faces), np.int32)
+    return Scene(shape, scenery, scenery, ())
 
 
 def sweep_of_the_wall(**changes):

@@ -154,7 +154,7 @@ def simulate(
 
 def summary_table(made: list[FrameSummary]) -> Table:
     """Objects with points and their points, by category, over all frames."""
-    from ldls.categories import COCO_NAMES
+    from ldls.io.masks.kitti_boxes import KITTI_NAMES
 
     points, objects = sum(s.points for s in made), sum(sum(s.objects.values()) for s in made)
     masks, labelled = sum(s.masks for s in made), sum(sum(s.object_points.values()) for s in made)
@@ -165,7 +165,7 @@ def summary_table(made: list[FrameSummary]) -> Table:
     table.add_column("points", justify="right", footer=f"{labelled:,}")
     for category in sorted({c for s in made for c in s.objects}):
         count = sum(s.objects.get(category, 0) for s in made)
-        table.add_row(COCO_NAMES[category], f"{count:,}", f"{sum(s.object_points.get(category, 0) for s in made):,}")
+        table.add_row(KITTI_NAMES[category], f"{count:,}", f"{sum(s.object_points.get(category, 0) for s in made):,}")
     return table
 
 

@@ -28,7 +28,7 @@ class PixelTruth:
 
     Attributes:
         instances: (H, W) int32 object of each pixel, 0 for scenery and sky.
-        categories: (M,) int32 COCO id of each object m, at m - 1.
+        categories: (H, W) int32 COCO id that each pixel looks like, 0 for scenery and sky.
         expected_px: (M,) float64 pixels that each object's box would cover with nothing before it.
     """
 
@@ -46,10 +46,13 @@ def photograph(
     origin = np.add(camera.position_m, (0, 0, height_m))
     ranges, faces = caster.first_hits(origin, directions)
     colours = _shaded(scene, caster, origin, directions, ranges, faces)
-    owners = np.where(faces == MISS, 0, scene.face_objects[faces]).astype(np.int32)
     shape = (model.height, model.width)
+    owners, looks = (
+        np.where(faces == MISS, 0, of_face[faces]).astype(np.int32).reshape(shape)
+        for of_face in (scene.face_objects, scene.face_categories)
+    )
     image = np.round(np.clip(colours, 0, 1) ** (1 / 1.15) * 255).astype(np.uint8).reshape(*shape, 3)
-    return image, PixelTruth(owners.reshape(shape), scene.categories, _expected_px(scene, camera, height_m))
+    return image, PixelTruth(owners, looks, _expected_px(scene, camera, height_m))
 
 
 def _shaded(

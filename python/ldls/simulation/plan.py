@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.simulation.ground import Ground
-from ldls.simulation.scene_object import SceneObject
-from ldls.simulation.shapes.shape import Shape
+from ldls.simulation.scene_object import BICYCLE, CYCLIST, PERSON, SceneObject
+from ldls.simulation.shapes.shape import Shape, join
 
 CLEAR_M = 3.2
 """Nothing stands nearer to the sensor than this."""
@@ -20,13 +20,13 @@ class Plan:
 
     Attributes:
         ground: The ground that they stand on.
-        placed: Each shape with the number of its object, 0 for scenery.
+        placed: Each shape with the number of its object and the COCO id that it looks like; 0 and 0 for scenery.
         objects: Object m is `objects[m - 1]`.
     """
 
     def __init__(self, ground: Ground) -> None:
         self.ground = ground
-        self.placed: list[tuple[int, Shape]] = [(0, ground.shape())]
+        self.placed: list[tuple[int, int, Shape]] = [(0, 0, ground.shape())]
         self.objects: list[SceneObject] = []
         self._discs = np.array([[0.0, 0.0, CLEAR_M]])
 
@@ -37,12 +37,25 @@ class Plan:
             return
         if room_m > 0:
             self._discs = np.vstack([self._discs, disc])
-        self.placed.append((0, self._stand(shape, x_m, y_m, yaw)))
+        self.placed.append((0, 0, self._stand(shape, x_m, y_m, yaw)))
 
     def put(
         self, category: int, shape: Shape, x_m: float, y_m: float, *, yaw: float = 0.0, speed_m_s: float = 0.0
     ) -> bool:
         """Put an object there that moves along its heading; False where there is no room."""
+        return self._put(category, {category: shape}, x_m, y_m, yaw, speed_m_s)
+
+    def put_cyclist(
+        self, body: Shape, bicycle: Shape, x_m: float, y_m: float, *, yaw: float = 0.0, speed_m_s: float = 0.0
+    ) -> bool:
+        """Put a person on a bicycle there, who moves along the heading; False where there is no room."""
+        return self._put(CYCLIST, {PERSON: body, BICYCLE: bicycle}, x_m, y_m, yaw, speed_m_s)
+
+    def _put(
+        self, category: int, parts: Mapping[int, Shape], x_m: float, y_m: float, yaw: float, speed_m_s: float
+    ) -> bool:
+        """Put an object of parts, each by the COCO id that it looks like."""
+        shape = join([*parts.values()])
         discs = _footprint(shape, x_m, y_m, yaw)
         if not self._free(discs):
             return False
@@ -56,14 +69,14 @@ class Plan:
         velocity = (float(speed_m_s * c), float(speed_m_s * s))
         size = (float(length), float(width), float(height))
         self.objects.append(SceneObject(category, centre, *size, float(yaw), velocity))
-        self.placed.append((len(self.objects), self._stand(shape, x_m, y_m, yaw)))
+        self.placed += [(len(self.objects), look, self._stand(part, x_m, y_m, yaw)) for look, part in parts.items()]
         return True
 
     def remove(self, numbers: Container[int]) -> None:
         """Take objects away by their numbers, from 1; the others are numbered anew, in their order."""
         kept = [m for m in range(1, len(self.objects) + 1) if m not in numbers]
         new = {0: 0} | {old: m for m, old in enumerate(kept, start=1)}
-        self.placed = [(new[m], shape) for m, shape in self.placed if m in new]
+        self.placed = [(new[m], look, shape) for m, look, shape in self.placed if m in new]
         self.objects = [self.objects[m - 1] for m in kept]
 
     def _stand(self, shape: Shape, x_m: float, y_m: float, yaw: float) -> Shape:

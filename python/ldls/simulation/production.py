@@ -23,7 +23,7 @@ from ldls.simulation.simulated_frame import SimulatedFrame, scene_frame
 
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """Processes already fill the cores."""
-SUITE_VERSION = "suite-v1"
+SUITE_VERSION = "suite-v2"
 """Changes whenever a frame of the suite does, so that a cache never mixes two suites."""
 SUITE_SEEDS: dict[str, range] = {"validation": range(1000, 1200), "tuning": range(2000, 2020)}
 """Seeds of each part; even ones are streets, odd ones campuses."""
@@ -90,8 +90,8 @@ class FrameSummary:
     Attributes:
         name: Name of the frame.
         points: Points of the sweep.
-        objects: Objects with points, by COCO id.
-        object_points: Points of objects, by COCO id.
+        objects: Objects with points, by category.
+        object_points: Points of objects, by category.
         masks: Masks that the segmenter found ahead.
     """
 

@@ -8,15 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.categories import COCO_NAMES
+from ldls.io.masks.kitti_boxes import KITTI_CATEGORIES
 
 PERSON, BICYCLE, CAR, MOTORCYCLE, BUS, TRUCK = 1, 2, 3, 4, 6, 8
 BENCH, DOG, CHAIR, POTTED_PLANT = 15, 18, 62, 64
 """COCO's ids of the categories that scenes hold."""
-KITTI_NAMES = {PERSON: "Pedestrian", CAR: "Car", TRUCK: "Truck"}
+CYCLIST = KITTI_CATEGORIES["Cyclist"]
+"""A person on a bicycle: one object in truth, in which a segmenter of COCO finds a person and a bicycle."""
+KITTI_NAMES = {PERSON: "Pedestrian", CAR: "Car", TRUCK: "Truck", CYCLIST: "Cyclist"}
 CLASS_NAMES = {
-    category: KITTI_NAMES.get(category, COCO_NAMES[category])
+    category: COCO_NAMES[category]
     for category in (PERSON, BICYCLE, CAR, MOTORCYCLE, BUS, TRUCK, BENCH, DOG, CHAIR, POTTED_PLANT)
-}
+} | KITTI_NAMES
 """Class of each category in the truth: KITTI's name where it has one, else COCO's."""
 
 
@@ -25,7 +28,7 @@ class SceneObject:
     """One object and the upright box around it.
 
     Attributes:
-        category: COCO id.
+        category: COCO id, or CYCLIST.
         centre_m: Middle of the box, in metres.
         length_m: Extent along its heading, in metres.
         width_m: Extent across, in metres.

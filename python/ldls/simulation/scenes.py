@@ -23,17 +23,14 @@ class Scene:
     Attributes:
         shape: The mesh.
         face_objects: (F,) int32 object of each triangle; 0 is scenery.
+        face_categories: (F,) int32 COCO id that each triangle looks like; 0 is scenery.
         objects: Object m is `objects[m - 1]`.
     """
 
     shape: Shape
     face_objects: NDArray[np.int32]
+    face_categories: NDArray[np.int32]
     objects: tuple[SceneObject, ...]
-
-    @property
-    def categories(self) -> NDArray[np.int32]:
-        """(M,) COCO ids of the objects."""
-        return np.array([o.category for o in self.objects], np.int32)
 
     def after(self, seconds: float) -> Scene:
         """The scene `seconds` later, its objects moved on."""
@@ -75,9 +72,11 @@ def make_plan(seed: int = 0, *, kind: str = "street") -> Plan:
 
 def build(plan: Plan) -> Scene:
     """The scene of a plan."""
-    faces = [np.full(len(shape.faces), number, np.int32) for number, shape in plan.placed]
+    numbers, looks, shapes = zip(*plan.placed, strict=True)
+    counts = [len(shape.faces) for shape in shapes]
     return Scene(
-        shape=join([shape for _, shape in plan.placed]),
-        face_objects=np.concatenate(faces),
+        shape=join(shapes),
+        face_objects=np.repeat(np.array(numbers, np.int32), counts),
+        face_categories=np.repeat(np.array(looks, np.int32), counts),
         objects=tuple(plan.objects),
     )

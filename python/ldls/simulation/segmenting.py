@@ -38,9 +38,13 @@ CONFUSED_WITH = {
 
 @dataclass(frozen=True, eq=False)
 class _Find:
-    """One instance as found so far, of the object `number`; `visible` is the share of it that nothing hides."""
+    """One instance as found so far: the part of the object `number` that looks like `category`.
+
+    `part` counts those of an object: a cyclist has two. `visible` is the share of the object that nothing hides.
+    """
 
     number: int
+    part: int
     category: int
     mask: Mask
     visible: float
@@ -48,7 +52,7 @@ class _Find:
 
 
 def true_masks(truth: PixelTruth) -> InstanceMasks:
-    """Masks of every object that the image shows, in the order of the objects' numbers."""
+    """Masks of every object that the image shows, in the order of the objects' numbers; a cyclist has two."""
     return _as_masks(_visible(truth, 1), truth)
 
 
@@ -62,7 +66,7 @@ def segmented(truth: PixelTruth, *, errors: SegmenterErrors | None = None, seed:
     seen = _visible(truth, SMALLEST_PX)
     found = [f for f, chance in zip(seen, missing.random(len(seen)), strict=True) if chance >= _miss_chance(f, errors)]
     found = [
-        replace(f, mask=_drawn(f.mask, errors, np.random.default_rng((seed, 3, f.number))))
+        replace(f, mask=_drawn(f.mask, errors, np.random.default_rng((seed, 3, f.number, f.part))))
         for f in _merged(found, errors, merging)
     ]
     found = [_named(_scored(f, errors, naming), errors, naming) for f in found]
@@ -71,12 +75,14 @@ def segmented(truth: PixelTruth, *, errors: SegmenterErrors | None = None, seed:
 
 
 def _visible(truth: PixelTruth, smallest_px: int) -> list[_Find]:
-    counts = np.bincount(truth.instances.ravel(), minlength=len(truth.categories) + 1)[1:]
+    counts = np.bincount(truth.instances.ravel(), minlength=len(truth.expected_px) + 1)[1:]
     shares = np.clip(counts / np.maximum(truth.expected_px, counts).clip(1), 0, 1)
-    return [
-        _Find(m + 1, int(truth.categories[m]), truth.instances == m + 1, float(shares[m]))
-        for m in np.flatnonzero(counts >= smallest_px).tolist()
-    ]
+    found = []
+    for m in np.flatnonzero(counts).tolist():
+        own = truth.instances == m + 1
+        for part, category in enumerate(np.unique(truth.categories[own]).tolist()):
+            found.append(_Find(m + 1, part, category, own & (truth.categories == category), float(shares[m])))
+    return [find for find in found if np.count_nonzero(find.mask) >= smallest_px]
 
 
 def _miss_chance(find: _Find, errors: SegmenterErrors) -> float:
@@ -130,7 +136,7 @@ def _invented(truth: PixelTruth, rng: np.random.Generator) -> _Find:
     tall, wide = rng.uniform(0.03, 0.12) * height, rng.uniform(0.02, 0.12) * height
     blob = ((v - row) / tall) ** 2 + ((u - column) / wide) ** 2 <= 1
     categories = list(CONFUSED_WITH)
-    return _Find(0, categories[int(rng.integers(len(categories)))], blob, 1.0, float(rng.uniform(0.3, 0.65)))
+    return _Find(0, 0, categories[int(rng.integers(len(categories)))], blob, 1.0, float(rng.uniform(0.3, 0.65)))
 
 
 def _drawn(silhouette: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mask:

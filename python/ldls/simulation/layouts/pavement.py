@@ -1,4 +1,4 @@
-"""Things and people on pavements and paths."""
+"""Things and people on pavements and paths, and cyclists between the kerbs."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ THINGS: tuple[tuple[int, Callable[[np.random.Generator], Shape], float], ...] = 
     (MOTORCYCLE, vehicles.motorcycle, 0.3),
 )
 """Category, shape, and how many there are on average to a pavement."""
+ONE_MORE_CYCLIST = 0.5
+"""Chance that one more rides in a scene, where there is room."""
 
 
 def furnish(plan: Plan, across_m: Range, *, along_m: Range, rng: np.random.Generator) -> None:
@@ -59,6 +61,16 @@ def people(
             body = figures.person(rng, walking=walking)
             speed = rng.uniform(0.9, 1.7) if walking else 0.0
             plan.put(PERSON, body, x + dx + rng.normal(0, 0.12), y + dy, yaw=turn, speed_m_s=speed)
+
+
+def cyclists(plan: Plan, across_m: Range, *, along_m: Range, rng: np.random.Generator) -> None:
+    """Put people on bicycles there, who ride along x and keep to the right."""
+    while rng.random() < ONE_MORE_CYCLIST:
+        x, y = _place(across_m, along_m, rng)
+        yaw = (0.0 if y < np.mean(across_m) else np.pi) + rng.normal(0, 0.05)
+        bicycle = vehicles.bicycle(rng)
+        body = figures.rider(bicycle, rng)
+        plan.put_cyclist(body, bicycle, x, y, yaw=yaw, speed_m_s=rng.uniform(3, 6))
 
 
 def _place(across_m: Range, along_m: Range, rng: np.random.Generator) -> tuple[float, float]:

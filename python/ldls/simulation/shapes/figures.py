@@ -1,12 +1,20 @@
-"""People and dogs, with the gaps between their legs."""
+"""People, on foot and on bicycles, and dogs, with the gaps between their legs."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ldls.simulation.shapes import paints
 from ldls.simulation.shapes.primitives import ball, box, tube
 from ldls.simulation.shapes.shape import Colour, Shape, join
+
+F64 = NDArray[np.float64]
+HIPS_M = (-0.2, 0.0, 1.04)
+"""Where the hips of a rider are, on a bicycle that is `BICYCLE_HEIGHT_M` high."""
+BICYCLE_HEIGHT_M = 1.056
 
 
 def person(rng: np.random.Generator, *, walking: bool = True) -> Shape:
@@ -23,6 +31,55 @@ def person(rng: np.random.Generator, *, walking: bool = True) -> Shape:
     tall = rng.uniform(0.87, 1.12)
     stout = tall * rng.uniform(0.95, 1.2)
     return join(parts).scaled((stout, stout, tall))
+
+
+def rider(bicycle: Shape, rng: np.random.Generator) -> Shape:
+    """A person astride `bicycle`, of `vehicles.bicycle`: hands on its handlebar, feet where its pedals would be."""
+    shirt, trousers = paints.pick(paints.SHIRTS, rng), paints.pick(paints.TROUSERS, rng)
+    skin, crank, lean = paints.pick(paints.SKINS, rng), rng.uniform(0, 2 * np.pi), float(rng.uniform(0.35, 0.6))
+    parts = [_leaning(join([*_torso(shirt, trousers), *_head(skin)]), lean)]
+    for side in (-1, 1):
+        parts += _pedalling(side, crank if side < 0 else crank + np.pi, trousers)
+        shoulder = np.add(HIPS_M, (0.48 * np.sin(lean), 0.22 * side, 0.48 * np.cos(lean)))
+        parts += _reaching(shoulder, np.array([0.33, 0.24 * side, 1.06]), shirt, skin)
+    return join(parts).scaled(bicycle.size_m[2] / BICYCLE_HEIGHT_M)
+
+
+def _leaning(upright: Shape, lean: float) -> Shape:
+    """A torso and head turned forward by `lean` radians about the hips, on the saddle."""
+    c, s = np.cos(lean), np.sin(lean)
+    about = upright.moved((0, 0, -0.93)).vertices_m
+    return replace(upright, vertices_m=about @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) + np.array(HIPS_M))
+
+
+def _pedalling(side: int, crank: float, trousers: Colour) -> list[Shape]:
+    """A leg whose foot is at the angle `crank` of a circle of 0.17 m about the bottom bracket."""
+    hip = np.add(HIPS_M, (0, 0.095 * side, 0))
+    ankle = np.array([-0.09 + 0.17 * np.cos(crank), 0.12 * side, 0.39 + 0.17 * np.sin(crank)])
+    knee = _joint(hip, ankle, 0.46)
+    return [
+        tube(hip, knee, 0.078, trousers),
+        tube(knee, ankle, 0.056, trousers),
+        ball(np.add(ankle, (0.07, 0, -0.05)), (0.14, 0.05, 0.045), paints.RUBBER, detail=1),
+    ]
+
+
+def _reaching(shoulder: F64, hand: F64, shirt: Colour, skin: Colour) -> list[Shape]:
+    elbow = _joint(hand, shoulder, 0.3)
+    return [
+        tube(shoulder, elbow, 0.048, shirt, sides=8),
+        tube(elbow, hand, 0.038, shirt, sides=8),
+        ball(hand, (0.045, 0.03, 0.06), skin, detail=1),
+    ]
+
+
+def _joint(upper: F64, lower: F64, bone_m: float) -> F64:
+    """Where two bones of `bone_m` meet between two ends, bent forward (x) as seen from `upper` down to `lower`."""
+    along = lower - upper
+    length = float(np.linalg.norm(along))
+    forward = np.cross(along, (0.0, 1.0, 0.0)) / length
+    bend: F64 = (upper + lower) / 2 + forward * np.sqrt(max(bone_m**2 - length**2 / 4, 0.0))
+    return bend
 
 
 def _torso(shirt: Colour, trousers: Colour) -> list[Shape]:
