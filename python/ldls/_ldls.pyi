@@ -5,8 +5,10 @@ from typing import Any, TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
-_Params: TypeAlias = tuple[int, float, float, int, int | None, bool]
+from ldls.params import Params
+
 _Csr: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]
+_Depths: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
 _Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 __all__ = [
@@ -17,16 +19,19 @@ __all__ = [
     "SegmentationArrays",
     "__version__",
     "check_params",
+    "clear_ground",
     "default_threads",
+    "depth_groups",
     "diffuse",
     "direct_labels",
-    "largest_components",
+    "ground",
     "neighbors",
     "normalize_rows",
     "panic_in_worker",
     "pixel_labels",
     "point_graph",
     "project",
+    "remove_outliers",
     "segment",
 ]
 
@@ -113,11 +118,10 @@ def segment(
     categories: list[list[int]],
     cameras: list[Camera],
     same_object: float,
-    params: _Params,
+    params: Params,
     keep_origin: bool,
-    threads: int | None,
 ) -> SegmentationArrays: ...
-def check_params(params: _Params, threads: int | None) -> None: ...
+def check_params(params: Params) -> None: ...
 def default_threads() -> int: ...
 def panic_in_worker() -> None: ...
 def project(
@@ -131,10 +135,21 @@ def project(
 def neighbors(
     points: NDArray[np.float64], k: int, threads: int | None
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
+def ground(points: NDArray[np.float64], camera: Camera, local: bool, threads: int | None) -> NDArray[np.float64]: ...
+def depth_groups(
+    points: NDArray[np.float64],
+    pixels: NDArray[np.float64],
+    masks: Masks,
+    camera: Camera,
+    heights: NDArray[np.float64],
+    params: Params,
+) -> _Depths: ...
 def point_graph(
     points: NDArray[np.float64],
     indices: NDArray[np.uint32],
     sigma: float,
+    ground: NDArray[np.bool_] | None,
+    ground_edges: float,
     threads: int | None,
 ) -> _Csr: ...
 def pixel_labels(
@@ -142,6 +157,7 @@ def pixel_labels(
     masks: Masks,
     window: int,
     pixel_weight: float,
+    depths: _Depths | None,
     threads: int | None,
 ) -> tuple[_Csr, NDArray[np.float32]]: ...
 def direct_labels(pixels: NDArray[np.float64], masks: Masks) -> NDArray[np.int32]: ...
@@ -156,4 +172,9 @@ def diffuse(
     iterations: int | None,
     threads: int | None,
 ) -> tuple[NDArray[np.float32], int, float | None]: ...
-def largest_components(point_graph: _Csr, labels: NDArray[np.uint32]) -> NDArray[np.int32]: ...
+def remove_outliers(
+    point_graph: _Csr, labels: NDArray[np.uint32], part_size: float, depths: _Depths | None
+) -> NDArray[np.int32]: ...
+def clear_ground(
+    labels: NDArray[np.uint32], heights: NDArray[np.float64], clearance: float
+) -> NDArray[np.int32]: ...

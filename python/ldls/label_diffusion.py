@@ -54,7 +54,7 @@ def segment(
             thread must not write to it meanwhile.
         masks: Instance masks of the image; or one `View` for each of several cameras.
         camera: The camera that took the image; None beside views, which have their own.
-        params: Parameters of the method; the paper's by default.
+        params: Parameters of the method; the best known by default.
         nonfinite: Points with NaN or infinite coordinates are left out and counted ("drop") or refused ("raise").
         keep_origin: Points at exactly (0, 0, 0) are missing returns to most sensors and left out; keep them if yours
             means them.
@@ -87,7 +87,7 @@ class LabelDiffusion:
     """
 
     def __init__(self, camera: Camera | Sequence[Camera] = (), params: Params | None = None) -> None:
-        """Prepare for the images of a camera or of several; the parameters are the paper's by default.
+        """Prepare for the images of a camera or of several; the parameters are the best known by default.
 
         Without a camera, each frame brings its own: `segment(points, [View(masks, camera), ...])`.
 
@@ -161,9 +161,8 @@ def _segment(
         [view.masks.categories.tolist() for view in views],
         [view.camera.core for view in views],
         same_object,
-        params.as_tuple(),
+        params,
         keep_origin,
-        params.threads,
     )
     instances = tuple(_instance(label, parts, views) for label, parts in enumerate(arrays.objects, start=1))
     _warn(cloud, arrays.report)

@@ -1,14 +1,17 @@
 """The steps of the method one by one, arrays in and arrays out, with SciPy's sparse matrices for the graph.
 
     in_view, pixels = stages.project(points, camera, image_size=masks.image_size)
-    indices, squared_distances = stages.neighbors(points[in_view])
-    graph = stages.point_graph(points[in_view], indices)
-    A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, masks))
+    xyz = points[in_view]
+    heights = stages.ground(xyz, camera)
+    depths = stages.depth_groups(xyz, pixels, masks, camera, heights)
+    indices, squared_distances = stages.neighbors(xyz)
+    graph = stages.point_graph(xyz, indices, heights=heights)
+    A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, masks, depths=depths))
     z = stages.diffuse(A, b)
-    labels = stages.largest_components(A, z.argmax(axis=1))
+    labels = stages.remove_outliers(A, z.argmax(axis=1), depths=depths, heights=heights)
 
-equals `ldls.segment` on the points in view. Options stand for the paper's symbols as in `ldls.Params`.
-Needs the extra `eval`.
+equals `ldls.segment` on the points in view; without heights and depths, and with the options of `Params.paper()`, it is the
+paper's method. Options stand for the same as in `ldls.Params`. Needs the extra `eval`.
 """
 
 from __future__ import annotations
@@ -31,7 +34,9 @@ from ldls.params import Params, check_whole_number
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-_PAPER = Params.paper()
+_BEST = Params()
+GROUND_M = (-0.3, 0.15)
+"""Heights between which points are the ground's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,28 @@ class PixelLabels:
 
     weights: csr_array
     mass: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class DepthGroups:
+    """The object of each of M masks among n points in view, by distance to the camera.
+
+    Attributes:
+        intervals: (M, 2) float64 nearest and farthest distance of the object in metres; NaN where no point off the ground
+            falls on the mask, and all then may be of it.
+        distances: (n,) float64 distance of each point to the camera in metres.
+        unsure: (n,) bool: whether a point stands beside the edge of a mask, as far away as its object, so that
+            background pixels say nothing of it.
+    """
+
+    intervals: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    unsure: NDArray[np.bool_]
+
+    @property
+    def core(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """The arrays as the core takes them."""
+        return self.intervals, self.distances, self.unsure
 
 
 def project(
@@ -73,8 +100,59 @@ def project(
     )
 
 
+def ground(
+    points: ArrayLike, camera: Camera, *, local_ground: bool = _BEST.local_ground, threads: int | None = None
+) -> NDArray[np.float64]:
+    """Height (n,) of each point above the ground in metres; NaN for all where no ground is found.
+
+    The ground is a cubic surface through the lowest points of polar cells around the camera, fitted so that what stands
+    on it does not count, and with `local_ground` what lies level around each point. Up is z of the lidar frame. Points
+    from -0.3 m to 0.15 m are the ground's.
+
+    Args:
+        points: (n, >= 3) finite, in metres.
+        camera: The camera, for its place.
+        local_ground: As in `Params`.
+        threads: As in `Params`.
+    """
+    return _ldls.ground(_finite_xyz(points), camera.core, local_ground, threads)
+
+
+def depth_groups(
+    points: ArrayLike,
+    pixels: ArrayLike,
+    masks: InstanceMasks,
+    camera: Camera,
+    heights: ArrayLike,
+    *,
+    depth_gap: float = _BEST.depth_gap,
+    bridged_gap: float = _BEST.bridged_gap,
+    edge_margin: float = _BEST.edge_margin,
+    threads: int | None = None,
+) -> DepthGroups:
+    """The object of each mask among points by their distance to the camera.
+
+    Args:
+        points: (n, >= 3) finite, in metres.
+        pixels: (n, 2) where they fall, u and v.
+        masks: Masks of the image.
+        camera: Its camera.
+        heights: (n,) of `ground`.
+        depth_gap: As in `Params`.
+        bridged_gap: As in `Params`.
+        edge_margin: As in `Params`.
+        threads: As in `Params`.
+    """
+    xyz, uv = _finite_xyz(points), np.ascontiguousarray(pixels, np.float64)
+    above = _per_point("heights", heights, len(xyz), np.float64)
+    if uv.shape != (len(xyz), 2):
+        raise ShapeError(f"pixels: expected ({len(xyz)}, 2), one for each point, got shape {uv.shape}")
+    params = Params(depth_gap=depth_gap, bridged_gap=bridged_gap, edge_margin=edge_margin, threads=threads)
+    return DepthGroups(*_ldls.depth_groups(xyz, uv, masks.core, camera.core, above, params))
+
+
 def neighbors(
-    points: ArrayLike, k: int = _PAPER.neighbors, *, threads: int | None = None
+    points: ArrayLike, k: int = _BEST.neighbors, *, threads: int | None = None
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
     """Indices and squared distances (n, k) of the nearest other points, nearest first (step 3).
 
@@ -93,36 +171,52 @@ def point_graph(
     points: ArrayLike,
     indices: ArrayLike,
     *,
-    sigma: float = _PAPER.sigma,
+    heights: ArrayLike | None = None,
+    sigma: float = _BEST.sigma,
+    ground_edges: float = _BEST.ground_edges,
     threads: int | None = None,
 ) -> csr_array:
     """Sparse (n, n) weights: 1 to itself and exp(-d^2 / sigma) to its neighbours (step 3); rows not normalised.
 
+    With `heights`, edges between the ground and what stands on it weigh `ground_edges` times that.
+
     Args:
         points: (n, >= 3) finite, in metres.
         indices: (n, k) neighbours of each point.
+        heights: (n,) of `ground`.
         sigma: In square metres.
+        ground_edges: As in `Params`.
         threads: As in `Params`.
     """
-    Params(sigma=sigma)
+    Params(sigma=sigma, ground_edges=ground_edges)
     columns = np.ascontiguousarray(indices, np.uint32)
     if columns.ndim != 2:
         raise ShapeError(f"indices: expected (n, k), got shape {columns.shape}")
-    return _csr(_ldls.point_graph(_finite_xyz(points), columns, sigma, threads), len(columns))
+    xyz, low = _finite_xyz(points), None
+    if heights is not None:
+        above = _per_point("heights", heights, len(xyz), np.float64)
+        low = (above > GROUND_M[0]) & (above < GROUND_M[1])
+    return _csr(_ldls.point_graph(xyz, columns, sigma, low, ground_edges, threads), len(columns))
 
 
 def pixel_labels(
     pixels: ArrayLike,
     masks: InstanceMasks,
     *,
-    window: int = _PAPER.window,
-    pixel_weight: float = _PAPER.pixel_weight,
+    window: int = _BEST.window,
+    depths: DepthGroups | None = None,
+    pixel_weight: float = _BEST.pixel_weight,
     threads: int | None = None,
 ) -> PixelLabels:
-    """The pixel edges of points that fall on `pixels` (n, 2), added up by label (step 2); not normalised."""
+    """The pixel edges of points that fall on `pixels` (n, 2), added up by label (step 2); not normalised.
+
+    With `depths`, a mask labels points at the distance of its object only, and background pixels those that masks are
+    sure of; the weight of other edges counts in the mass alone.
+    """
     Params(window=window, pixel_weight=pixel_weight)
     uv = np.ascontiguousarray(pixels, np.float64)
-    weights, mass = _ldls.pixel_labels(uv, masks.core, window, pixel_weight, threads)
+    said = None if depths is None else _checked(depths, len(uv), len(masks))
+    weights, mass = _ldls.pixel_labels(uv, masks.core, window, pixel_weight, said, threads)
     return PixelLabels(_csr(weights, len(masks) + 1), mass)
 
 
@@ -142,7 +236,7 @@ def diffuse(
     A: csr_array,
     b: csr_array,
     *,
-    iterations: int | None = _PAPER.iterations,
+    iterations: int | None = _BEST.iterations,
     every: None = None,
     threads: int | None = None,
 ) -> NDArray[np.float32]: ...
@@ -153,7 +247,7 @@ def diffuse(
     A: csr_array,
     b: csr_array,
     *,
-    iterations: int | None = _PAPER.iterations,
+    iterations: int | None = _BEST.iterations,
     every: int,
     threads: int | None = None,
 ) -> Iterator[NDArray[np.float32]]: ...
@@ -163,7 +257,7 @@ def diffuse(
     A: csr_array,
     b: csr_array,
     *,
-    iterations: int | None = _PAPER.iterations,
+    iterations: int | None = _BEST.iterations,
     every: int | None = None,
     threads: int | None = None,
 ) -> NDArray[np.float32] | Iterator[NDArray[np.float32]]:
@@ -200,14 +294,57 @@ def _as_it_happens(products: _ldls.Products, every: int, threads: int | None) ->
         yield products.advance(every, threads)
 
 
-def largest_components(graph: csr_array, labels: ArrayLike) -> NDArray[np.int32]:
-    """`labels` (n,) with every point outside the largest component of its label turned into background (step 7)."""
+def remove_outliers(
+    graph: csr_array,
+    labels: ArrayLike,
+    *,
+    depths: DepthGroups | None = None,
+    heights: ArrayLike | None = None,
+    part_size: float | None = None,
+    ground_clearance: float = _BEST.ground_clearance,
+) -> NDArray[np.int32]:
+    """`labels` (n,) with every point outside the largest component of its label turned into background (step 7).
+
+    Args:
+        graph: (n, n); its edges count as undirected.
+        labels: (n,) 0 or more.
+        depths: Keeps other components of a label too, if four fifths of their points are as far away as its object.
+        heights: (n,) of `ground`: turns points nearer to the ground than `ground_clearance` into background too.
+        part_size: As in `Params`; its default with `depths`, 1 without.
+        ground_clearance: As in `Params`.
+    """
     array = np.asarray(labels)
     if array.dtype.kind not in "iu" or array.ndim != 1:
         raise DtypeError(f"labels: expected (n,) whole numbers, got {array.dtype} {array.shape}")
     if array.size and array.min() < 0:
         raise InputError("labels: expected 0 or more; pass the points in view only")
-    return _ldls.largest_components(_arrays(graph), np.ascontiguousarray(array, np.uint32))
+    said, least = None, 1.0
+    if depths is not None:
+        said, least = _checked(depths, len(array), int(array.max(initial=0))), _BEST.part_size
+    size = least if part_size is None else part_size
+    Params(part_size=size, ground_clearance=ground_clearance)
+    kept = _ldls.remove_outliers(_arrays(graph), np.ascontiguousarray(array, np.uint32), size, said)
+    if heights is None:
+        return kept
+    above = _per_point("heights", heights, len(kept), np.float64)
+    return _ldls.clear_ground(kept.astype(np.uint32), above, ground_clearance)
+
+
+def _checked(depths: DepthGroups, points: int, masks: int) -> tuple[Any, Any, Any]:
+    """The arrays of `depths`, which must be of so many points and of so many masks or more."""
+    if len(depths.distances) != points or len(depths.unsure) != points or len(depths.intervals) < masks:
+        raise ShapeError(
+            f"depths: are of {len(depths.distances)} points and {len(depths.intervals)} masks, "
+            f"expected {points} points and {masks} masks"
+        )
+    return depths.core
+
+
+def _per_point(name: str, values: ArrayLike, points: int, dtype: type) -> NDArray[Any]:
+    array = np.ascontiguousarray(values, dtype)
+    if array.shape != (points,):
+        raise ShapeError(f"{name}: expected ({points},), one for each point, got shape {array.shape}")
+    return array
 
 
 def _finite_xyz(points: ArrayLike) -> NDArray[np.float64]:

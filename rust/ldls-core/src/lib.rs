@@ -7,9 +7,11 @@
 //! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is
 //! taken by one thread in one order.
 
+mod depth;
 mod diffusion;
 mod error;
 mod graph;
+mod ground;
 mod masks;
 mod neighbors;
 mod params;
@@ -21,9 +23,11 @@ mod segment;
 #[cfg(test)]
 mod test_support;
 
+pub use depth::DepthGroups;
 pub use diffusion::{Convergence, Diffused, Products, diffuse, likelihoods};
 pub use error::Error;
-pub use graph::{PointGraph, keep_largest_components};
+pub use graph::{PointGraph, remove_outliers};
+pub use ground::{clear_ground, ground_heights, is_ground};
 pub use masks::{InstanceMasks, PixelLabels, Rle};
 pub use neighbors::Neighbors;
 pub use params::Params;

@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 
-/// Parameters of [`segment`](crate::segment()); [`Params::paper`] has the values of the paper.
+/// Parameters of [`segment`](crate::segment()): the best known by [`Params::default`], the paper's by [`Params::paper`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// K: neighbours that every point is joined to.
@@ -15,8 +15,39 @@ pub struct Params {
     pub window: usize,
     /// Number of products z <- A z + b; `None` runs them until nothing changes.
     pub iterations: Option<usize>,
-    /// Set if only the largest connected component of an instance keeps its label.
+    /// Set if only the largest connected component of an instance keeps its label, and parts like it.
     pub remove_outliers: bool,
+    /// Factor on the weight of an edge between a point of the ground and one that is not; 1 for the paper's graph.
+    pub ground_edges: f64,
+    /// Points nearer to the ground than this, in metres, become background; 0 for none.
+    pub ground_clearance: f64,
+    /// Set if the ground follows kerbs and lawns, and not a smooth surface only.
+    pub local_ground: bool,
+    /// Gap in distance, in metres, between the object of a mask and what is before and behind it; 0 for no depth groups.
+    pub depth_gap: f64,
+    /// Gap, in metres, within an object whose parts do not go on beside its mask; 0 for none.
+    pub bridged_gap: f64,
+    /// Share of the shorter side of a mask by which its edge may be off; 0 to trust it.
+    pub edge_margin: f64,
+    /// Parts of an object with at least this share of its largest component stay; 1 for that component alone.
+    pub part_size: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            sigma: 0.1,
+            iterations: Some(20),
+            ground_edges: 0.02,
+            ground_clearance: 0.04,
+            local_ground: true,
+            depth_gap: 0.6,
+            bridged_gap: 1.5,
+            edge_margin: 0.15,
+            part_size: 0.1,
+            ..Self::paper()
+        }
+    }
 }
 
 impl Params {
@@ -29,7 +60,24 @@ impl Params {
             window: 5,
             iterations: Some(200),
             remove_outliers: true,
+            ground_edges: 1.0,
+            ground_clearance: 0.0,
+            local_ground: false,
+            depth_gap: 0.0,
+            bridged_gap: 0.0,
+            edge_margin: 0.0,
+            part_size: 1.0,
         }
+    }
+
+    /// True if any step needs to know where the ground is.
+    pub(crate) fn need_ground(&self) -> bool {
+        self.ground_edges < 1.0 || self.ground_clearance > 0.0 || self.need_depth()
+    }
+
+    /// True if depth decides which points a mask labels.
+    pub(crate) fn need_depth(&self) -> bool {
+        self.depth_gap > 0.0
     }
 
     /// Refuses values outside their range.
@@ -79,6 +127,27 @@ impl Params {
             (1..=100_000).contains(&iterations),
             iterations.to_string(),
             "1 to 100000, or None for the converged solution",
-        )
+        )?;
+        for (name, value) in [
+            ("ground_edges", self.ground_edges),
+            ("edge_margin", self.edge_margin),
+            ("part_size", self.part_size),
+        ] {
+            let share = (0.0..=1.0).contains(&value);
+            check(name, share, value.to_string(), "a share from 0 to 1")?;
+        }
+        for (name, value, most, expected) in [
+            ("ground_clearance", self.ground_clearance, 1.0, "0 to 1 m"),
+            ("depth_gap", self.depth_gap, 1e3, "0 to 1000 m"),
+            ("bridged_gap", self.bridged_gap, 1e3, "0 to 1000 m"),
+        ] {
+            check(
+                name,
+                (0.0..=most).contains(&value),
+                value.to_string(),
+                expected,
+            )?;
+        }
+        Ok(())
     }
 }

@@ -39,6 +39,8 @@ pub struct Timings {
     pub project: Duration,
     /// K nearest neighbours, and the order of their tree.
     pub neighbors: Duration,
+    /// Heights above the ground, and depth groups of the masks.
+    pub depth: Duration,
     /// Labels of the pixels around each point.
     pub pixel_labels: Duration,
     /// Point graph and row sums.

@@ -1,7 +1,8 @@
 //! The method on one screen: points, masks and cameras in, one label a point out.
 
 use crate::diffusion::diffuse;
-use crate::graph::{PointGraph, keep_largest_by_index};
+use crate::graph::{PointGraph, remove_outliers_by_index};
+use crate::ground::{clear_ground, ground_heights, is_ground};
 use crate::masks::PixelLabels;
 use crate::neighbors::{Adjacency, arrange};
 use crate::projection::{Cloud, Sighting};
@@ -53,20 +54,32 @@ pub fn segment(
 ) -> Result<Segmentation> {
     check(cloud, views, params)?;
     let mut t = Timings::default();
-    let (in_view, images) = timed(&mut t.project, || {
+    let (in_view, mut images) = timed(&mut t.project, || {
         Images::project(cloud, views, same_object, keep_origin)
     })?;
+    let heights = timed(&mut t.depth, || {
+        find_ground(&in_view.points, &mut images, params)
+    });
     let k = params.neighbors;
     let nearest = timed(&mut t.neighbors, || Adjacency::search(in_view.points, k));
     let order = &nearest.order;
     let pixels = timed(&mut t.pixel_labels, || images.pixel_labels(order, params))?;
-    let (a, b) = timed(&mut t.graph, || normalize(&nearest, pixels, params))?;
-    let exact = || normalize(&nearest, images.pixel_labels(order, params)?, params);
+    let (a, b) = timed(&mut t.graph, || {
+        normalize(&nearest, pixels, &heights, params)
+    })?;
+    let exact = || {
+        normalize(
+            &nearest,
+            images.pixel_labels(order, params)?,
+            &heights,
+            params,
+        )
+    };
     let diffused = timed(&mut t.diffusion, || {
         diffuse(&a, &b, images.n_labels(), params.iterations, exact)
     })?;
     let kept = timed(&mut t.components, || {
-        remove_outliers(&a, &diffused.labels, order, params)
+        remove_outliers(&a, &diffused.labels, &heights, order, &images, params)
     })?;
 
     // back to the rows of the cloud
@@ -102,28 +115,53 @@ fn check_edges(points: usize, neighbors: usize) -> Result<()> {
     })
 }
 
+/// Heights of the points in view above the ground, and depth groups in the images; NaN where nobody needs them.
+fn find_ground(points: &[[f64; 3]], images: &mut Images, params: &Params) -> Vec<f64> {
+    if !params.need_ground() {
+        return vec![f64::NAN; points.len()];
+    }
+    let heights = ground_heights(points, &images.origin(), params.local_ground);
+    if params.need_depth() {
+        let standing: Vec<bool> = heights.iter().map(|&height| !is_ground(height)).collect();
+        images.group_by_depth(points, &standing, params);
+    }
+    heights
+}
+
 /// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
 fn normalize<T: Real>(
     nearest: &Adjacency,
     mut b: PixelLabels<T>,
+    heights: &[f64],
     params: &Params,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
     let mut a = PointGraph::from_adjacency(nearest, params.sigma);
+    if params.ground_edges < 1.0 {
+        let ground = |&point: &u32| is_ground(heights[point as usize]);
+        let ground: Vec<bool> = nearest.order.iter().map(ground).collect();
+        a.weaken_ground_edges(&ground, params.ground_edges)?;
+    }
     a.normalize_rows(&mut b)?;
     Ok((a, b))
 }
 
-/// The labels of the largest component of each instance, where the parameters ask for it.
+/// The labels of the largest component of each instance and its parts, off the ground, where the parameters ask for it.
 fn remove_outliers(
     a: &PointGraph,
     labels: &[u32],
+    heights: &[f64],
     order: &[u32],
+    images: &Images,
     params: &Params,
 ) -> Result<Vec<u32>> {
+    let mut kept = labels.to_vec();
     if params.remove_outliers {
-        return keep_largest_by_index(a, labels, order);
+        let at_depth = |row: usize, label| images.at_depth(order[row], label);
+        kept = remove_outliers_by_index(a, labels, order, params.part_size, at_depth)?;
     }
-    Ok(labels.to_vec())
+    let heights = order.iter().map(|&point| heights[point as usize]);
+    clear_ground(&mut kept, heights, params.ground_clearance);
+    Ok(kept)
 }
 
 fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32]) -> Vec<i32> {

@@ -9,19 +9,41 @@ use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The parameters of the method as Python gives them, in the order of `ldls.Params`.
+/// The parameters of the method: the attributes of `ldls.Params`.
 #[derive(FromPyObject)]
-pub struct ParamsTuple(usize, f64, f64, usize, Option<usize>, bool);
+pub struct ParamsAttributes {
+    neighbors: usize,
+    sigma: f64,
+    pixel_weight: f64,
+    window: usize,
+    iterations: Option<usize>,
+    remove_outliers: bool,
+    ground_edges: f64,
+    ground_clearance: f64,
+    local_ground: bool,
+    depth_gap: f64,
+    bridged_gap: f64,
+    edge_margin: f64,
+    part_size: f64,
+    threads: Option<usize>,
+}
 
-impl ParamsTuple {
-    fn params(&self) -> Params {
+impl ParamsAttributes {
+    pub(crate) fn params(&self) -> Params {
         Params {
-            neighbors: self.0,
-            sigma: self.1,
-            pixel_weight: self.2,
-            window: self.3,
-            iterations: self.4,
-            remove_outliers: self.5,
+            neighbors: self.neighbors,
+            sigma: self.sigma,
+            pixel_weight: self.pixel_weight,
+            window: self.window,
+            iterations: self.iterations,
+            remove_outliers: self.remove_outliers,
+            ground_edges: self.ground_edges,
+            ground_clearance: self.ground_clearance,
+            local_ground: self.local_ground,
+            depth_gap: self.depth_gap,
+            bridged_gap: self.bridged_gap,
+            edge_margin: self.edge_margin,
+            part_size: self.part_size,
         }
     }
 }
@@ -45,7 +67,7 @@ pub struct SegmentationArrays {
 
 /// Segments points by the masks of the images that one camera or several took.
 #[pyfunction]
-#[pyo3(signature = (points, masks, categories, cameras, same_object, params, keep_origin, threads))]
+#[pyo3(signature = (points, masks, categories, cameras, same_object, params, keep_origin))]
 #[expect(
     clippy::too_many_arguments,
     reason = "the face in Python has few; here each is one extraction"
@@ -57,12 +79,11 @@ pub fn segment(
     categories: Vec<Vec<i32>>,
     cameras: Vec<PyRef<'_, Camera>>,
     same_object: f64,
-    params: ParamsTuple,
+    params: ParamsAttributes,
     keep_origin: bool,
-    threads: Option<usize>,
 ) -> PyResult<SegmentationArrays> {
     let cloud = points.cloud(py)?;
-    let params = params.params();
+    let (threads, params) = (params.threads, params.params());
     let views = masks.iter().zip(&categories).zip(&cameras);
     let views: Vec<View> = views
         .map(|((masks, categories), camera)| View {
@@ -94,8 +115,8 @@ pub fn segment(
 
 /// Refuses parameters outside their range.
 #[pyfunction]
-pub fn check_params(py: Python<'_>, params: ParamsTuple, threads: Option<usize>) -> PyResult<()> {
-    checked_threads(py, threads)?;
+pub fn check_params(py: Python<'_>, params: ParamsAttributes) -> PyResult<()> {
+    checked_threads(py, params.threads)?;
     run_at_once(py, || params.params().check())
 }
 
@@ -120,6 +141,7 @@ fn timings(py: Python<'_>, timings: &Timings) -> PyResult<Py<PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("project", timings.project.as_secs_f64())?;
     dict.set_item("neighbors", timings.neighbors.as_secs_f64())?;
+    dict.set_item("depth", timings.depth.as_secs_f64())?;
     dict.set_item("pixel_labels", timings.pixel_labels.as_secs_f64())?;
     dict.set_item("graph", timings.graph.as_secs_f64())?;
     dict.set_item("diffusion", timings.diffusion.as_secs_f64())?;

@@ -7,7 +7,8 @@ use crate::arrays::{
 use crate::call::run;
 use crate::camera::Camera;
 use crate::masks::Masks;
-use ldls_core::PointGraph;
+use crate::segment::ParamsAttributes;
+use ldls_core::{DepthGroups, PointGraph};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
@@ -17,6 +18,13 @@ use pyo3::prelude::*;
 type ViewArrays = (Py<PyArray1<i64>>, Py<PyArray2<f64>>);
 /// Indices and squared distances.
 type NeighborArrays = (Py<PyArray2<u32>>, Py<PyArray2<f64>>);
+/// Near and far distance of each mask's object, distance of each point, and whether masks are not sure of it.
+type DepthArrays = (Py<PyArray2<f64>>, Py<PyArray1<f64>>, Py<PyArray1<bool>>);
+type DepthArguments<'py> = (
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, bool>,
+);
 /// Weights by label and weights of all pixel edges.
 type PixelLabelArrays = (CsrArrays, Py<PyArray1<f32>>);
 
@@ -40,6 +48,57 @@ pub fn project(
     Ok((
         indices.into_pyarray(py).unbind(),
         matrix(py, uv.into_flattened(), 2)?,
+    ))
+}
+
+/// Heights above the ground.
+#[pyfunction]
+pub fn ground(
+    py: Python<'_>,
+    points: PyReadonlyArray2<'_, f64>,
+    camera: &Camera,
+    local: bool,
+    threads: Option<usize>,
+) -> PyResult<Py<PyArray1<f64>>> {
+    let points = rows::<3>(py, "points", &points)?;
+    let heights = run(py, threads, || {
+        Ok(ldls_core::ground_heights(&points, camera.0.center(), local))
+    })?;
+    Ok(heights.into_pyarray(py).unbind())
+}
+
+/// Distances of the objects of the masks, those of the points, and which points the masks are not sure of.
+#[pyfunction]
+pub fn depth_groups(
+    py: Python<'_>,
+    points: PyReadonlyArray2<'_, f64>,
+    pixels: PyReadonlyArray2<'_, f64>,
+    masks: &Masks,
+    camera: &Camera,
+    heights: PyReadonlyArray1<'_, f64>,
+    params: ParamsAttributes,
+) -> PyResult<DepthArrays> {
+    let points = rows::<3>(py, "points", &points)?;
+    let pixels = rows::<2>(py, "pixels", &pixels)?;
+    let heights = slice(py, "heights", &heights)?;
+    let groups = run(py, None, || {
+        let distances = points
+            .iter()
+            .map(|point| camera.0.distance(point))
+            .collect();
+        let standing: Vec<bool> = heights.iter().map(|&h| !ldls_core::is_ground(h)).collect();
+        Ok(masks
+            .0
+            .depth_groups(&pixels, distances, &standing, &params.params()))
+    })?;
+    let intervals = groups
+        .intervals
+        .iter()
+        .map(|interval| interval.unwrap_or([f64::NAN; 2]));
+    Ok((
+        matrix(py, intervals.flatten().collect(), 2)?,
+        groups.distances.into_pyarray(py).unbind(),
+        groups.unsure.into_pyarray(py).unbind(),
     ))
 }
 
@@ -74,6 +133,8 @@ pub fn point_graph(
     points: PyReadonlyArray2<'_, f64>,
     indices: PyReadonlyArray2<'_, u32>,
     sigma: f64,
+    ground: Option<PyReadonlyArray1<'_, bool>>,
+    ground_edges: f64,
     threads: Option<usize>,
 ) -> PyResult<CsrArrays> {
     let points = rows::<3>(py, "points", &points)?;
@@ -82,8 +143,16 @@ pub fn point_graph(
         k,
         indices: slice(py, "indices", &indices)?.to_vec(),
     };
+    let ground = ground
+        .as_ref()
+        .map(|ground| slice(py, "ground", ground))
+        .transpose()?;
     let graph = run(py, threads, || {
-        PointGraph::<f32>::from_neighbors(&points, &neighbors, sigma)
+        let mut graph = PointGraph::<f32>::from_neighbors(&points, &neighbors, sigma)?;
+        if let Some(ground) = ground {
+            graph.weaken_ground_edges(ground, ground_edges)?;
+        }
+        Ok(graph)
     })?;
     let (offsets, columns, weights) = graph.into_csr();
     Ok(csr_arrays(py, &offsets, &columns, weights))
@@ -97,11 +166,22 @@ pub fn pixel_labels(
     masks: &Masks,
     window: usize,
     pixel_weight: f64,
+    depths: Option<DepthArguments<'_>>,
     threads: Option<usize>,
 ) -> PyResult<PixelLabelArrays> {
     let pixels = rows::<2>(py, "pixels", &pixels)?;
+    let depths = depths
+        .map(|depths| depth_groups_of(py, &depths))
+        .transpose()?;
+    let admitted = |at: usize, label| {
+        depths
+            .as_ref()
+            .is_none_or(|depths| depths.admits(at, label))
+    };
     let labels = run(py, threads, || {
-        masks.0.pixel_labels(&pixels, window, pixel_weight)
+        masks
+            .0
+            .pixel_labels(&pixels, window, pixel_weight, admitted)
     })?;
     Ok(label_arrays(py, labels))
 }
@@ -159,19 +239,58 @@ pub fn diffuse(
     ))
 }
 
-/// Labels without what is not in the largest component of each.
+/// Labels without what is not in the largest component of each, nor part of its object, and without the ground.
 #[pyfunction]
-pub fn largest_components(
+pub fn remove_outliers(
     py: Python<'_>,
     point_graph: CsrArguments<'_>,
     labels: PyReadonlyArray1<'_, u32>,
+    part_size: f64,
+    depths: Option<DepthArguments<'_>>,
 ) -> PyResult<Py<PyArray1<i32>>> {
     let graph = graph(py, &point_graph)?;
     let labels = slice(py, "labels", &labels)?;
+    let depths = depths
+        .map(|depths| depth_groups_of(py, &depths))
+        .transpose()?;
+    let at_depth = |at: usize, label| {
+        depths
+            .as_ref()
+            .is_none_or(|depths| depths.admits(at, label))
+    };
     let kept = run(py, None, || {
-        ldls_core::keep_largest_components(&graph, labels)
+        ldls_core::remove_outliers(&graph, labels, part_size, at_depth)
     })?;
     Ok(signed(&kept).into_pyarray(py).unbind())
+}
+
+/// Labels with points nearer to the ground than `clearance` turned into background.
+#[pyfunction]
+pub fn clear_ground(
+    py: Python<'_>,
+    labels: PyReadonlyArray1<'_, u32>,
+    heights: PyReadonlyArray1<'_, f64>,
+    clearance: f64,
+) -> PyResult<Py<PyArray1<i32>>> {
+    let mut cleared = slice(py, "labels", &labels)?.to_vec();
+    let heights = slice(py, "heights", &heights)?;
+    ldls_core::clear_ground(&mut cleared, heights.iter().copied(), clearance);
+    Ok(signed(&cleared).into_pyarray(py).unbind())
+}
+
+fn depth_groups_of(
+    py: Python<'_>,
+    (intervals, distances, unsure): &DepthArguments,
+) -> PyResult<DepthGroups> {
+    let interval = |&[near, far]: &[f64; 2]| (!near.is_nan()).then_some([near, far]);
+    Ok(DepthGroups {
+        intervals: rows::<2>(py, "intervals", intervals)?
+            .iter()
+            .map(interval)
+            .collect(),
+        distances: slice(py, "distances", distances)?.to_vec(),
+        unsure: slice(py, "unsure", unsure)?.to_vec(),
+    })
 }
 
 fn label_arrays(py: Python<'_>, labels: ldls_core::PixelLabels) -> PixelLabelArrays {

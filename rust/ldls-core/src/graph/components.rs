@@ -1,23 +1,36 @@
-//! Outlier removal: an instance keeps its largest connected component (method, step 7).
+//! Outlier removal: an instance keeps its largest connected component and what is certainly part of it (method, step 7).
 
 use super::point_graph::PointGraph;
 use crate::{Error, Result};
 
+/// Share of its points that a component beside the largest needs at the distance of its object.
+const LEAST_AT_DEPTH: f64 = 0.8;
+
 /// Turns every point that is not in the largest connected component of its label into background (0). Edges are
 /// taken as undirected; of components of one size, the one with the lowest point index is kept.
 ///
+/// A smaller component stays too if it has at least the share `part_size` of the points of the largest, below 1, and
+/// four fifths of its points are `at_depth`: as far away, by their row and label, as the object.
+///
 /// # Errors
 /// [`Error::Mismatch`] where `labels` is of another length than the graph.
-pub fn keep_largest_components(graph: &PointGraph, labels: &[u32]) -> Result<Vec<u32>> {
+pub fn remove_outliers(
+    graph: &PointGraph,
+    labels: &[u32],
+    part_size: f64,
+    at_depth: impl Fn(usize, u32) -> bool,
+) -> Result<Vec<u32>> {
     let indices: Vec<u32> = (0..labels.len() as u32).collect();
-    keep_largest_by_index(graph, labels, &indices)
+    remove_outliers_by_index(graph, labels, &indices, part_size, at_depth)
 }
 
 /// The same for points whose rows are not in the order of their `indices`.
-pub(crate) fn keep_largest_by_index(
+pub(crate) fn remove_outliers_by_index(
     graph: &PointGraph,
     labels: &[u32],
     indices: &[u32],
+    part_size: f64,
+    at_depth: impl Fn(usize, u32) -> bool,
 ) -> Result<Vec<u32>> {
     if labels.len() != graph.len() {
         let problem = format!(
@@ -36,23 +49,26 @@ pub(crate) fn keep_largest_by_index(
             sets.join(i as u32, j as u32);
         }
     }
-    let components: Vec<u32> = (0..labels.len() as u32).map(|i| sets.root(i)).collect();
-    let largest = largest_of_each(labels, &components, indices);
-    let kept = |(&label, &component): (&u32, &u32)| {
-        if largest[label as usize].root == component {
-            label
-        } else {
-            0
-        }
+    let roots: Vec<u32> = (0..labels.len() as u32).map(|i| sets.root(i)).collect();
+    let mut components = vec![Component::NONE; labels.len()];
+    for (i, (&root, &index)) in roots.iter().zip(indices).enumerate() {
+        components[root as usize].add(root, index, labels[i] > 0 && at_depth(i, labels[i]));
+    }
+    let largest = largest_of_each(labels, &components);
+    let stays = |label: u32, root: u32| {
+        let (component, largest) = (&components[root as usize], &largest[label as usize]);
+        root == largest.root || (part_size < 1.0 && component.is_part_of(largest, part_size))
     };
-    Ok(labels.iter().zip(&components).map(kept).collect())
+    let kept = |(&label, &root): (&u32, &u32)| if stays(label, root) { label } else { 0 };
+    Ok(labels.iter().zip(&roots).map(kept).collect())
 }
 
-/// One component: its root, its size, and the lowest index of a point in it.
+/// One component: its root, its size, the points at the distance of its object, and the lowest index of a point in it.
 #[derive(Debug, Clone, Copy)]
 struct Component {
     root: u32,
     size: u32,
+    at_depth: u32,
     first: u32,
 }
 
@@ -60,24 +76,27 @@ impl Component {
     const NONE: Self = Self {
         root: u32::MAX,
         size: 0,
+        at_depth: 0,
         first: u32::MAX,
     };
+
+    fn add(&mut self, root: u32, index: u32, at_depth: bool) {
+        self.root = root;
+        self.size += 1;
+        self.at_depth += u32::from(at_depth);
+        self.first = self.first.min(index);
+    }
+
+    fn is_part_of(&self, largest: &Self, part_size: f64) -> bool {
+        f64::from(self.size) >= part_size * f64::from(largest.size)
+            && f64::from(self.at_depth) >= LEAST_AT_DEPTH * f64::from(self.size)
+    }
 }
 
-fn largest_of_each(labels: &[u32], components: &[u32], indices: &[u32]) -> Vec<Component> {
-    let mut all = vec![Component::NONE; labels.len()];
-    for (&root, &index) in components.iter().zip(indices) {
-        let component = &mut all[root as usize];
-        let first = component.first.min(index);
-        *component = Component {
-            root,
-            size: component.size + 1,
-            first,
-        };
-    }
+fn largest_of_each(labels: &[u32], components: &[Component]) -> Vec<Component> {
     let n_labels = labels.iter().max().map_or(1, |&label| label as usize + 1);
     let mut largest = vec![Component::NONE; n_labels];
-    for &component in all.iter().filter(|component| component.size > 0) {
+    for &component in components.iter().filter(|component| component.size > 0) {
         let best = &mut largest[labels[component.root as usize] as usize];
         let larger = component.size > best.size;
         if larger || (component.size == best.size && component.first < best.first) {
@@ -124,11 +143,15 @@ mod tests {
         PointGraph::from_csr((0..=n).collect(), columns, vec![1.0; n]).unwrap()
     }
 
+    fn keep_largest(graph: &PointGraph, labels: &[u32]) -> Vec<u32> {
+        remove_outliers(graph, labels, 1.0, |_, _| true).unwrap()
+    }
+
     #[test]
     fn the_largest_run_of_a_label_stays() {
         let labels = [1, 1, 2, 1, 1, 1, 2, 2, 0];
         assert_eq!(
-            keep_largest_components(&chain(9), &labels).unwrap(),
+            keep_largest(&chain(9), &labels),
             [0, 0, 0, 1, 1, 1, 2, 2, 0]
         );
     }
@@ -148,23 +171,33 @@ mod tests {
 
     #[test]
     fn of_equal_components_the_one_with_the_lowest_index_stays() {
-        assert_eq!(
-            keep_largest_components(&chain(5), &[3, 3, 0, 3, 3]).unwrap(),
-            [3, 3, 0, 0, 0]
-        );
+        assert_eq!(keep_largest(&chain(5), &[3, 3, 0, 3, 3]), [3, 3, 0, 0, 0]);
     }
 
     #[test]
     fn rows_may_come_in_another_order_than_indices() {
-        let kept = keep_largest_by_index(&chain(5), &[3, 3, 0, 3, 3], &[4, 3, 2, 1, 0]).unwrap();
-        assert_eq!(kept, [0, 0, 0, 3, 3]);
+        let (labels, indices) = ([3, 3, 0, 3, 3], [4, 3, 2, 1, 0]);
+        let kept = remove_outliers_by_index(&chain(5), &labels, &indices, 1.0, |_, _| true);
+        assert_eq!(kept.unwrap(), [0, 0, 0, 3, 3]);
+    }
+
+    #[test]
+    fn a_part_stays_if_it_is_large_and_at_the_distance_of_the_object() {
+        let labels = [1, 1, 1, 1, 0, 1, 1, 0, 1];
+        let kept = |part_size, at_depth: &dyn Fn(usize, u32) -> bool| {
+            remove_outliers(&chain(9), &labels, part_size, at_depth).unwrap()
+        };
+        assert_eq!(kept(0.5, &|_, _| true), [1, 1, 1, 1, 0, 1, 1, 0, 0]);
+        assert_eq!(kept(0.5, &|i, _| i < 6), [1, 1, 1, 1, 0, 0, 0, 0, 0]);
+        assert_eq!(kept(0.25, &|_, _| true), labels);
+        assert_eq!(kept(1.0, &|_, _| true), [1, 1, 1, 1, 0, 0, 0, 0, 0]);
     }
 
     #[test]
     fn no_points_and_no_labels_are_fine() {
         let empty = PointGraph::from_csr(vec![0], vec![], vec![]).unwrap();
-        assert!(keep_largest_components(&empty, &[]).unwrap().is_empty());
-        assert_eq!(keep_largest_components(&chain(3), &[0; 3]).unwrap(), [0; 3]);
-        assert!(keep_largest_components(&chain(3), &[0; 2]).is_err());
+        assert!(keep_largest(&empty, &[]).is_empty());
+        assert_eq!(keep_largest(&chain(3), &[0; 3]), [0; 3]);
+        assert!(remove_outliers(&chain(3), &[0; 2], 1.0, |_, _| true).is_err());
     }
 }

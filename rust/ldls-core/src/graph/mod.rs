@@ -3,6 +3,6 @@
 mod components;
 mod point_graph;
 
-pub(crate) use components::keep_largest_by_index;
-pub use components::keep_largest_components;
+pub use components::remove_outliers;
+pub(crate) use components::remove_outliers_by_index;
 pub use point_graph::PointGraph;

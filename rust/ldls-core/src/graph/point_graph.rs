@@ -76,6 +76,34 @@ impl<T: Real> PointGraph<T> {
         ))
     }
 
+    /// Multiplies the weights of edges between a point of the ground and one that is not by `factor`.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where `ground` does not say of each point whether it belongs to the ground.
+    pub fn weaken_ground_edges(&mut self, ground: &[bool], factor: f64) -> Result<()> {
+        if ground.len() != self.len() {
+            let problem = format!(
+                "{} values, the graph has {} points",
+                ground.len(),
+                self.len()
+            );
+            return Err(Error::Mismatch {
+                name: "ground",
+                problem,
+            });
+        }
+        for (i, &here) in ground.iter().enumerate() {
+            let range = self.layout.range(i..i + 1);
+            let edges = self.weights[range.clone()]
+                .iter_mut()
+                .zip(&self.columns[range]);
+            for (weight, _) in edges.filter(|(_, j)| ground[**j as usize] != here) {
+                *weight = T::from_f64(weight.to_f64() * factor);
+            }
+        }
+        Ok(())
+    }
+
     /// The same graph from rows that begin with the point itself.
     pub(crate) fn from_adjacency(adjacency: &Adjacency, sigma: f64) -> Self {
         let points = &adjacency.points;

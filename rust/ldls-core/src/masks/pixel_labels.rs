@@ -25,7 +25,8 @@ pub struct PixelLabels<T = f32> {
 
 impl InstanceMasks {
     /// The pixel edges of points that fall on the pixels `uv`: each point is joined to the pixels of the `window` x
-    /// `window` square centred on its nearest pixel that lie in the image, each with weight `pixel_weight`.
+    /// `window` square centred on its nearest pixel that lie in the image, each with weight `pixel_weight`. Only the labels
+    /// that are `admitted` for a point, given by its row, come in; the weight of the others counts in the mass alone.
     ///
     /// # Errors
     /// [`Error::Mismatch`] where the nearest pixel of a point lies outside the image.
@@ -34,6 +35,7 @@ impl InstanceMasks {
         uv: &[[f64; 2]],
         window: usize,
         pixel_weight: f64,
+        admitted: impl Fn(usize, u32) -> bool + Sync,
     ) -> Result<PixelLabels<T>> {
         let image = LabelImage::paint(self);
         let parts: Vec<Result<PixelLabels<T>>> = uv
@@ -44,6 +46,7 @@ impl InstanceMasks {
                 let mut counts = WindowCounts::default();
                 for (i, &uv) in (task * POINTS_A_TASK..).zip(uv) {
                     image.count(self.nearest_pixel(i, uv)?, window / 2, &mut counts);
+                    counts.labels.retain(|&(label, _)| admitted(i, label));
                     labels.push(&counts, pixel_weight);
                 }
                 Ok(labels)
@@ -218,7 +221,7 @@ mod tests {
     #[test]
     fn a_window_at_the_corner_has_fewer_pixels() {
         let labels = masks(6, 6, &[vec![true; 36]])
-            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0)
+            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0, |_, _| true)
             .unwrap();
         assert_eq!(
             (labels.mass[0], labels.row(0).collect::<Vec<_>>()),
@@ -232,7 +235,7 @@ mod tests {
             pixels in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 63), 0..4),
             u in -0.5..8.49_f64, v in -0.5..6.49_f64, reach in 0_usize..4,
         ) {
-            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0).unwrap();
+            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, |_, _| true).unwrap();
             let mut expected = vec![0.0_f32; pixels.len() + 1];
             let mut mass = 0.0;
             for row in 0..7_usize {

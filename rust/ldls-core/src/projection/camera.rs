@@ -18,6 +18,8 @@ pub struct Camera {
     intrinsic: Matrix3<f64>,
     /// Points at this depth or nearer are not seen, in metres.
     min_depth_m: f64,
+    /// Place of the camera in the lidar frame, in metres.
+    center: [f64; 3],
 }
 
 /// The position of a point relative to an image.
@@ -63,6 +65,7 @@ impl Camera {
             lens: Lens::new(Distortion::None)?,
             intrinsic: Matrix3::identity(),
             min_depth_m,
+            center: center(&transform),
         })
     }
 
@@ -96,7 +99,7 @@ impl Camera {
             matrix: transform.fixed_rows::<3>(0).into(),
             lens,
             intrinsic: k,
-            min_depth_m,
+            ..pinhole
         })
     }
 
@@ -111,6 +114,18 @@ impl Camera {
         } else {
             Sight::Outside
         }
+    }
+
+    /// Place of the camera in the lidar frame, in metres.
+    pub fn center(&self) -> &[f64; 3] {
+        &self.center
+    }
+
+    /// Distance of a point in the lidar frame to the camera, in metres.
+    #[inline]
+    pub fn distance(&self, xyz: &[f64; 3]) -> f64 {
+        let [x, y, z] = [0, 1, 2].map(|axis| xyz[axis] - self.center[axis]);
+        (x * x + y * y + z * z).sqrt()
     }
 
     /// u and v in pixels, and the depth in metres, of a point in the lidar frame. Points beyond the reach of the lens
@@ -134,6 +149,13 @@ impl Camera {
             None => [f64::NAN, f64::NAN, w],
         }
     }
+}
+
+/// The origin of the camera frame in the lidar frame.
+fn center(t_camera_lidar: &Matrix4<f64>) -> [f64; 3] {
+    let rotation = t_camera_lidar.fixed_view::<3, 3>(0, 0);
+    let translation = t_camera_lidar.fixed_view::<3, 1>(0, 3);
+    (-rotation.transpose() * translation).into()
 }
 
 /// The pixel nearest to `uv`, as column and row, if it lies in an image of `height` x `width` pixels.

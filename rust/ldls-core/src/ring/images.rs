@@ -2,6 +2,7 @@
 
 use super::same_objects::{Objects, same_objects};
 use super::view::View;
+use crate::depth::DepthGroups;
 use crate::masks::PixelLabels;
 use crate::neighbors::arrange;
 use crate::projection::{Cloud, InView, Sighting, project};
@@ -19,6 +20,8 @@ pub(crate) struct Images<'a> {
     /// Label of each instance of each image, at the number of the instance; entry 0 is the background.
     labels: Vec<Vec<u32>>,
     pub(crate) objects: Objects,
+    /// What depth says of the points that each image sees; empty where nobody asked.
+    depths: Vec<DepthGroups>,
 }
 
 impl<'a> Images<'a> {
@@ -54,8 +57,53 @@ impl<'a> Images<'a> {
             slots,
             sightings,
             objects,
+            depths: Vec::new(),
         };
         Ok((in_view, images))
+    }
+
+    /// Place in the lidar frame that the images were taken from: that of the first camera.
+    pub(crate) fn origin(&self) -> [f64; 3] {
+        self.views
+            .first()
+            .map_or([0.0; 3], |view| *view.camera.center())
+    }
+
+    /// Finds the object of each mask among `points` in view, `standing` those off the ground, by depth.
+    pub(crate) fn group_by_depth(
+        &mut self,
+        points: &[[f64; 3]],
+        standing: &[bool],
+        params: &Params,
+    ) {
+        let of_view = |(view, sighting): (&View, &Sighting)| {
+            let place = |&point: &u32| view.camera.distance(&points[point as usize]);
+            let distances = sighting.seen.iter().map(place).collect();
+            let standing = arrange(&sighting.seen, standing);
+            view.masks
+                .depth_groups(&sighting.uv, distances, &standing, params)
+        };
+        self.depths = self
+            .views
+            .iter()
+            .zip(&self.sightings)
+            .map(of_view)
+            .collect();
+    }
+
+    /// True if the point at `slot` of the sighting of `image` takes `label` from the pixels around it.
+    fn admits(&self, image: usize, slot: usize, label: u32) -> bool {
+        let depths = self.depths.get(image);
+        depths.is_none_or(|depths| depths.admits(slot, label))
+    }
+
+    /// True if a point in view is as far away as object `label` in an image that shows both.
+    pub(crate) fn at_depth(&self, point: u32, label: u32) -> bool {
+        let shows = |&(image, m): &(usize, u32)| {
+            let slot = self.slots[image][point as usize];
+            slot != UNSEEN && self.admits(image, slot as usize, m)
+        };
+        self.objects[label as usize - 1].iter().any(shows)
     }
 
     /// Number of labels, the background counted.
@@ -69,22 +117,20 @@ impl<'a> Images<'a> {
         order: &[u32],
         params: &Params,
     ) -> Result<PixelLabels<T>> {
-        let of_view = |view: &View, uv: &[[f64; 2]]| {
+        let parts = self.views.iter().enumerate().map(|(image, view)| {
+            let slots = order.iter().map(|&point| self.slots[image][point as usize]);
+            let seen: Vec<u32> = slots.filter(|&slot| slot != UNSEEN).collect();
+            let uv = arrange(&seen, &self.sightings[image].uv);
+            let admitted = |at: usize, label| self.admits(image, seen[at] as usize, label);
             view.masks
-                .pixel_labels(uv, params.window, params.pixel_weight)
-        };
-        if let [view] = self.views {
-            // the image sees every point, and its instances are the labels: nothing to add up
-            return of_view(view, &arrange(order, &self.sightings[0].uv));
-        }
-        let views = self.views.iter().zip(&self.sightings).zip(&self.slots);
-        let parts = views.map(|((view, sighting), slots)| {
-            let slots = order.iter().map(|&point| slots[point as usize]);
-            let seen = slots.filter(|&slot| slot != UNSEEN);
-            let uv: Vec<[f64; 2]> = seen.map(|slot| sighting.uv[slot as usize]).collect();
-            of_view(view, &uv)
+                .pixel_labels(&uv, params.window, params.pixel_weight, admitted)
         });
-        Ok(self.together(order, &parts.collect::<Result<Vec<_>>>()?))
+        let mut parts = parts.collect::<Result<Vec<_>>>()?;
+        if parts.len() == 1 {
+            // the image sees every point, and its instances are the labels: nothing to add up
+            return Ok(parts.remove(0));
+        }
+        Ok(self.together(order, &parts))
     }
 
     /// Rows of all images that see a point added up, their instances named by the objects they show.

@@ -1,0 +1,91 @@
+//! The local offset of the ground from its smooth surface: kerbs, lawns, ramps.
+
+use std::collections::HashMap;
+
+/// Side of a cell, in metres; a cell looks at itself and the eight around it.
+const CELL_M: f64 = 1.0;
+/// Heights, in metres, among which the ground is looked for, below and above the surface.
+const NEAR_M: f64 = 0.2;
+/// Steps in which heights are counted, and how many of them are as thick as the ground.
+const STEP_M: f64 = 0.02;
+const STEPS: usize = (2.0 * NEAR_M / STEP_M + 0.5) as usize;
+const THICKNESS: usize = 3;
+/// Points that the ground must have, and their share of those near the surface: the foot of an object is no ground.
+const LEAST_POINTS: u32 = 20;
+const LEAST_SHARE: f64 = 0.5;
+
+type Cell = [i64; 2];
+type Histogram = [u32; STEPS];
+
+/// Turns `heights` of `places` above the smooth surface, in metres, into those above the ground around each.
+pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64]) {
+    let (numbers, cells) = number_cells(places);
+    let mut counts = vec![[0; STEPS]; cells.len()];
+    for (&number, height) in numbers.iter().zip(heights.iter()) {
+        let step = (height + NEAR_M) / STEP_M;
+        if (0.0..STEPS as f64).contains(&step) {
+            counts[number][step as usize] += 1;
+        }
+    }
+    let mut offsets = vec![0.0; cells.len()];
+    for (&cell, &number) in &cells {
+        offsets[number] = offset(&around(&counts, &cells, cell));
+    }
+    for (height, number) in heights.iter_mut().zip(numbers) {
+        *height -= offsets[number];
+    }
+}
+
+/// The number of the cell of each place, and of each cell that has one.
+fn number_cells(places: &[[f64; 3]]) -> (Vec<usize>, HashMap<Cell, usize>) {
+    let mut cells = HashMap::new();
+    let mut last = ([i64::MIN; 2], 0);
+    let number = |place: &[f64; 3]| {
+        let cell = cell(place);
+        // neighbours on a scan line share a cell
+        if cell != last.0 {
+            let next = cells.len();
+            last = (cell, *cells.entry(cell).or_insert(next));
+        }
+        last.1
+    };
+    (places.iter().map(number).collect(), cells)
+}
+
+fn cell([x, y, _]: &[f64; 3]) -> Cell {
+    [x, y].map(|along| (along / CELL_M).floor() as i64)
+}
+
+/// The heights counted in a cell and the eight around it.
+fn around(counts: &[Histogram], cells: &HashMap<Cell, usize>, [column, row]: Cell) -> Histogram {
+    let mut sum = [0; STEPS];
+    for at in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [column + dx, row + dy])) {
+        let Some(&number) = cells.get(&at) else {
+            continue;
+        };
+        sum.iter_mut()
+            .zip(&counts[number])
+            .for_each(|(sum, count)| *sum += count);
+    }
+    sum
+}
+
+/// The mean height of the fullest layer, the lowest of equals, where it is full enough to be the ground; 0 elsewhere.
+fn offset(histogram: &Histogram) -> f64 {
+    let points = |layer: &[u32]| layer.iter().sum::<u32>();
+    let layers = histogram.windows(THICKNESS).enumerate();
+    let fullest = layers.rev().max_by_key(|(_, layer)| points(layer));
+    let Some((first, layer)) = fullest else {
+        return 0.0;
+    };
+    let full = points(layer);
+    if full < LEAST_POINTS || f64::from(full) < LEAST_SHARE * f64::from(points(histogram)) {
+        return 0.0;
+    }
+    let height = |step: usize| (step as f64 + 0.5) * STEP_M - NEAR_M;
+    let sum: f64 = (first..)
+        .zip(layer)
+        .map(|(step, &count)| f64::from(count) * height(step))
+        .sum();
+    sum / f64::from(full)
+}
