@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import distance_transform_cdt
 from scipy.sparse import coo_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import cdist
@@ -16,13 +17,32 @@ class Expected:
     labels: np.ndarray
     likelihood: np.ndarray
     edges: coo_array
+    admitted: np.ndarray
+    heights: np.ndarray
+
+    def remove_outliers(self, labels, params):
+        """Step 7, and the clearance of the ground."""
+        part_size = params.part_size if params.remove_outliers else None
+        kept = labels if part_size is None else largest_components(self.edges, labels, part_size, self.admitted)
+        low = (self.heights > -0.3) & (self.heights < params.ground_clearance) & (params.ground_clearance > 0)
+        return np.where(low, 0, kept)
 
 
-def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1):
-    """`points` (N, 3), `masks` (M, H, W) bool, `camera_matrix` (3, 4) from lidar to homogeneous pixels."""
+def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1, heights=None, center=None):
+    """`points` (N, 3), `masks` (M, H, W) bool, `camera_matrix` (3, 4) from lidar to homogeneous pixels.
+
+    `heights` of the points in view above the ground and the `center` (3,) of the camera matter where `params` ask.
+    """
     in_view, pixels = project(points, camera_matrix, masks.shape[1:], min_depth_m)
-    edges = point_edges(points[in_view].astype(np.float64), params.neighbors, params.sigma)
+    xyz = points[in_view].astype(np.float64)
+    heights = np.full(len(xyz), np.nan) if heights is None else heights
+    ground = (heights > -0.3) & (heights < 0.15)
+    edges = point_edges(xyz, params.neighbors, params.sigma, ground, params.ground_edges)
+    admitted = np.ones((len(xyz), len(masks) + 1), bool)
+    if params.depth_gap > 0:
+        admitted = depth_groups(np.linalg.norm(xyz - center, axis=1), pixels, masks, ~ground, params)
     labels, mass = pixel_edges(pixels, masks, params.window, params.pixel_weight)
+    labels = labels * admitted
     row_sums = edges.sum(axis=1) + mass
     A = diags_array(1 / row_sums, shape=edges.shape) @ edges
     b = labels / row_sums[:, None]
@@ -30,8 +50,9 @@ def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1):
     for _ in range(params.iterations):
         z = A @ z + b
     diffused = z.argmax(axis=1) if len(z) else np.zeros(0, int)
-    kept = largest_components(edges, diffused) if params.remove_outliers else diffused
-    return Expected(in_view, pixels, diffused, kept, z, edges)
+    expected = Expected(in_view, pixels, diffused, diffused, z, edges, admitted, heights)
+    expected.labels = expected.remove_outliers(diffused, params)
+    return expected
 
 
 def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1):
@@ -54,7 +75,7 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1):
     z = np.zeros_like(b)
     for _ in range(params.iterations):
         z = A @ z + b
-    kept = largest_components(edges, z.argmax(axis=1))
+    kept = largest_components(edges, z.argmax(axis=1))  # of the paper's parameters
     whole = np.full(len(points), -1)
     whole[in_view] = kept
     return whole, groups
@@ -99,7 +120,62 @@ def project(points, camera_matrix, image_size, min_depth_m):
     return rows[inside], pixels[inside]
 
 
-def point_edges(xyz, k, sigma):
+def depth_groups(distances, pixels, masks, standing, params):
+    """(n, M + 1) whether each point takes each label from pixels: the background and the masks."""
+    admitted = np.ones((len(distances), len(masks) + 1), bool)
+    column, row = np.floor(pixels + 0.5).astype(int).reshape(-1, 2).T
+    for m, mask in enumerate(masks):
+        if not mask.any():
+            continue
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        shorter = min(np.ptp(rows), np.ptp(columns)) + 1
+        margin = min(max(int(params.edge_margin * shorter), 3), 10)
+        # a transform of an image without the other kind of pixel has no meaning
+        inside = np.full(mask.shape, 10) if mask.all() else np.minimum(distance_transform_cdt(mask, "chessboard"), 10)
+        outside = distance_transform_cdt(~mask, "chessboard") if not mask.all() else np.zeros(mask.shape)
+        depth, beside = inside[row, column], outside[row, column]
+        on_it = np.flatnonzero(standing & mask[row, column])
+        near_it = standing & (beside > 0) & (beside <= margin)
+        if not len(on_it):
+            continue
+        near, far = object_interval(distances[on_it], depth[on_it], distances[near_it], params)
+        inside = (near <= distances) & (distances <= far)
+        admitted[:, m + 1] = inside
+        if params.edge_margin > 0:
+            admitted[near_it & inside, 0] = False
+    return admitted
+
+
+def object_interval(distances, weights, beside, params):
+    """Nearest and farthest distance of the heaviest group, with slack."""
+    order = np.argsort(distances, kind="stable")
+    groups = [[order[0]]]
+    for point in order[1:]:
+        last = distances[groups[-1][-1]]
+        if distances[point] - last <= max(params.depth_gap, 0.03 * last):
+            groups[-1].append(point)
+        else:
+            groups.append([point])
+
+    def goes_on(group):
+        low, high = distances[group[0]] - 0.3, distances[group[-1]] + 0.3
+        others = ((beside >= low) & (beside <= high)).sum()
+        return others > 0.25 * (others + len(group))
+
+    chains = [[groups[0]]]
+    for before, group in zip(groups, groups[1:], strict=False):
+        last = distances[before[-1]]
+        near = distances[group[0]] - last <= max(params.bridged_gap, 0.1 * last)
+        lighter = group if weights[group].sum() <= weights[before].sum() else before
+        if params.bridged_gap > 0 and near and not goes_on(lighter):
+            chains[-1].append(group)
+        else:
+            chains.append([group])
+    best = max(chains, key=lambda chain: sum(weights[group].sum() for group in chain))
+    return distances[best[0][0]] - 0.3, distances[best[-1][-1]] + 0.3
+
+
+def point_edges(xyz, k, sigma, ground=None, ground_edges=1.0):
     n = len(xyz)
     k = min(k, max(n - 1, 0))
     squared = cdist(xyz, xyz, "sqeuclidean") if n else np.zeros((0, 0))
@@ -109,6 +185,8 @@ def point_edges(xyz, k, sigma):
     np.fill_diagonal(squared, 0)
     rows = np.repeat(np.arange(n), nearest.shape[1])
     weights = np.exp(-squared[rows, nearest.ravel()] / sigma)
+    if ground is not None:
+        weights[ground[rows] != ground[nearest.ravel()]] *= ground_edges
     return coo_array((weights, (rows, nearest.ravel())), shape=(n, n)).tocsr()
 
 
@@ -126,12 +204,17 @@ def pixel_edges(pixels, masks, window, pixel_weight):
     return labels, mass
 
 
-def largest_components(edges, labels):
+def largest_components(edges, labels, part_size=1.0, admitted=None):
     kept = np.zeros_like(labels)
     for m in range(1, labels.max(initial=0) + 1):
         members = np.flatnonzero(labels == m)
         _, component = connected_components(edges[members][:, members], directed=False)
         if len(members):
             # components are numbered by their first member, and argmax takes the first of equals
-            kept[members[component == np.bincount(component).argmax()]] = m
+            sizes = np.bincount(component)
+            stays = np.arange(len(sizes)) == sizes.argmax()
+            if part_size < 1:
+                at_depth = np.ones(len(members)) if admitted is None else admitted[members, m]
+                stays |= (sizes >= part_size * sizes.max()) & (np.bincount(component, at_depth) >= 0.8 * sizes)
+            kept[members[stays[component]]] = m
     return kept

@@ -1,14 +1,18 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import ldls
 
 
-def test_defaults_are_the_papers():
-    params = ldls.Params()
-    assert params == ldls.Params.paper()
+def test_the_papers_parameters_add_nothing_to_its_method():
+    params = ldls.Params.paper()
     assert (params.neighbors, params.sigma, params.pixel_weight) == (10, 1.0, 0.001)
     assert (params.window, params.iterations, params.remove_outliers) == (5, 200, True)
+    assert (params.ground_edges, params.ground_clearance, params.local_ground) == (1.0, 0.0, False)
+    assert (params.depth_gap, params.bridged_gap, params.edge_margin, params.part_size) == (0.0, 0.0, 0.0, 1.0)
+    assert ldls.Params.paper(threads=2) == replace(params, threads=2)
 
 
 @pytest.mark.parametrize(
@@ -34,6 +38,16 @@ def test_defaults_are_the_papers():
         ("threads", 0),
         ("threads", 10**6),
         ("remove_outliers", 1),
+        ("local_ground", 0),
+        ("ground_edges", 1.5),
+        ("ground_edges", -0.1),
+        ("ground_clearance", 2.0),
+        ("ground_clearance", None),
+        ("depth_gap", -1.0),
+        ("depth_gap", float("inf")),
+        ("bridged_gap", float("nan")),
+        ("edge_margin", "wide"),
+        ("part_size", 2),
     ],
 )
 def test_values_out_of_range_are_refused_by_name(name, value):
@@ -50,7 +64,7 @@ def test_an_unknown_parameter_is_a_type_error():
 
 def test_numpy_numbers_are_numbers():
     params = ldls.Params(neighbors=np.int64(5), sigma=np.float32(2), iterations=np.uint8(7))
-    assert params.as_tuple()[0] == 5
+    assert params.neighbors == 5
 
 
 @pytest.mark.parametrize("value", ["0", "many", "-2", ""])

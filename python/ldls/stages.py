@@ -341,7 +341,7 @@ def _checked(depths: DepthGroups, points: int, masks: int) -> tuple[Any, Any, An
 
 
 def _per_point(name: str, values: ArrayLike, points: int, dtype: type) -> NDArray[Any]:
-    array = np.ascontiguousarray(values, dtype)
+    array: NDArray[Any] = np.ascontiguousarray(values, dtype)
     if array.shape != (points,):
         raise ShapeError(f"{name}: expected ({points},), one for each point, got shape {array.shape}")
     return array

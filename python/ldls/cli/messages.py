@@ -21,6 +21,7 @@ R = TypeVar("R")
 STAGES = {
     "project": "project points",
     "pixel_labels": "pixel labels",
+    "depth": "ground and depth groups",
     "neighbors": "nearest neighbours",
     "graph": "point graph",
     "diffusion": "diffusion",

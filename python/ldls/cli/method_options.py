@@ -1,52 +1,88 @@
-"""The parameters of the method, as commands take them; the defaults are the paper's."""
+"""The parameters of the method as options of a command."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 from ldls.params import Params
 
-NeighborsOption = Annotated[int, typer.Option(help="K: nearest neighbours a point.")]
-SigmaOption = Annotated[float, typer.Option(help="Reach of point edges exp(-d^2/sigma), in square metres.")]
-PixelWeightOption = Annotated[float, typer.Option(help="lambda: weight of pixel edges.")]
-WindowOption = Annotated[int, typer.Option(help="Side of the pixel window of a point, odd.")]
-IterationsOption = Annotated[int, typer.Option(help="Diffusion steps.")]
-ConvergeOption = Annotated[
-    bool, typer.Option("--converge", help="Diffuse until nothing changes, however many steps it takes.")
-]
-OutliersOption = Annotated[
-    bool, typer.Option("--keep-outliers/--remove-outliers", help="Keep points off an object's main part?")
-]
+R = TypeVar("R")
 
-PAPER = Params.paper()
-ITERATIONS = 200
-"""The paper's, beside --converge, which has none."""
+HELP = {
+    "neighbors": "K: nearest neighbours a point.",
+    "sigma": "Reach of point edges exp(-d^2/sigma), in square metres.",
+    "pixel_weight": "lambda: weight of pixel edges.",
+    "window": "Side of the pixel window of a point, odd.",
+    "iterations": "Diffusion steps.",
+    "remove_outliers": "Take an object's label from points off its main part and parts like it?",
+    "ground_edges": "Factor on edges between the ground and what stands on it; 1 for none of it.",
+    "ground_clearance": "Points nearer to the ground than this many metres become background; 0 for none of it.",
+    "local_ground": "Does the ground follow kerbs and lawns, or is it smooth?",
+    "depth_gap": "Gap in metres before and behind the object of a mask; 0 for no depth groups.",
+    "bridged_gap": "Gap in metres within an object that does not go on beside its mask; 0 for none of it.",
+    "edge_margin": "Share of a mask's shorter side by which its edge may be off; 0 for none of it.",
+    "part_size": "Share of an object's main part that other parts need; 1 for none of it.",
+}
+SWITCHES = {
+    "remove_outliers": "--remove-outliers/--keep-outliers",
+    "local_ground": "--local-ground/--smooth-ground",
+}
+PANEL = "Method"
 
 
-def params_of(
-    *,
-    neighbors: int,
-    sigma: float,
-    pixel_weight: float,
-    window: int,
-    iterations: int,
-    converge: bool,
-    keep_outliers: bool,
-    threads: int | None = None,
-) -> Params:
+def takes_params(command: Callable[..., R]) -> Callable[..., R]:
+    """`command` with an option for each parameter of the method, and --paper, in place of its keyword `params`."""
+    own = inspect.signature(command, eval_str=True)
+    options = [
+        _flag("paper", "The method as published: no ground, no depth."),
+        *(_parameter_option(name) for name in HELP),
+        _flag("converge", "Diffuse until nothing changes, however many steps it takes."),
+    ]
+    kept = [parameter for parameter in own.parameters.values() if parameter.name != "params"]
+    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in kept] + options
+
+    @functools.wraps(command)
+    def with_options(**given: Any) -> R:  # noqa: ANN401 - what Typer parsed
+        chosen = {name: given.pop(name) for name in ("paper", *HELP, "converge")}
+        return command(**given, params=_params_of(**chosen))
+
+    with_options.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    with_options.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_options
+
+
+def _params_of(*, paper: bool, converge: bool, **given: Any) -> Params:  # noqa: ANN401 - values of many types
     """The parameters that the options give.
 
     Raises:
         ParameterError: One is out of range.
     """
-    return Params(
-        neighbors=neighbors,
-        sigma=sigma,
-        pixel_weight=pixel_weight,
-        window=window,
-        iterations=None if converge else iterations,
-        remove_outliers=not keep_outliers,
-        threads=threads,
-    )
+    base = Params.paper() if paper else Params()
+    values = {field.name: getattr(base, field.name) for field in fields(Params)}
+    values |= {name: value for name, value in given.items() if value is not None}
+    return Params(**values | ({"iterations": None} if converge else {}))
+
+
+def _parameter_option(name: str) -> inspect.Parameter:
+    best, published = (getattr(params, name) for params in (Params(), Params.paper()))
+    if name in SWITCHES:
+        shown = SWITCHES[name].split("/")[not best].removeprefix("--")
+        option = typer.Option(SWITCHES[name], help=HELP[name], show_default=shown, rich_help_panel=PANEL)
+    else:
+        shown = f"{best:g}" if best == published else f"{best:g}, the paper's {published:g}"
+        option = typer.Option(help=HELP[name], show_default=shown, rich_help_panel=PANEL)
+    return _keyword(name, Annotated[type(best) | None, option], None)
+
+
+def _flag(name: str, text: str) -> inspect.Parameter:
+    return _keyword(name, Annotated[bool, typer.Option(f"--{name}", help=text, rich_help_panel=PANEL)], False)
+
+
+def _keyword(name: str, annotation: Any, default: Any) -> inspect.Parameter:  # noqa: ANN401 - of any type
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)

@@ -9,21 +9,11 @@ import typer
 
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.method_options import (
-    ITERATIONS,
-    PAPER,
-    ConvergeOption,
-    IterationsOption,
-    NeighborsOption,
-    OutliersOption,
-    PixelWeightOption,
-    SigmaOption,
-    WindowOption,
-    params_of,
-)
+from ldls.cli.method_options import takes_params
 from ldls.cli.options import FRAMES_FAILED, words
 from ldls.cli.progress import frame_progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, StoredMasksOption
+from ldls.params import Params
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -34,7 +24,9 @@ MOST_LISTED = 10
 
 
 @speaks_plainly
+@takes_params
 def run(
+    *,
     source: SourceArgument,
     out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
     masks: StoredMasksOption = None,
@@ -50,13 +42,6 @@ def run(
         typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
     ] = None,
     dataset: DatasetOption = None,
-    neighbors: NeighborsOption = PAPER.neighbors,
-    sigma: SigmaOption = PAPER.sigma,
-    pixel_weight: PixelWeightOption = PAPER.pixel_weight,
-    window: WindowOption = PAPER.window,
-    iterations: IterationsOption = ITERATIONS,
-    converge: ConvergeOption = False,
-    keep_outliers: OutliersOption = False,
     workers: Annotated[
         int | None, typer.Option(help="Frames at a time, one a core.", min=1, show_default="all cores")
     ] = None,
@@ -66,6 +51,7 @@ def run(
         typer.Option(help="Cluster to join, as auto or ray://HOST:10001.", show_default="one on this machine"),
     ] = None,
     gpus: Annotated[float, typer.Option(help="GPUs of each worker of a Ray cluster, for its segmenter.")] = 0.0,
+    params: Params,
 ) -> None:
     """Label all frames of a source; a run that was interrupted goes on where it stopped.
 
@@ -86,15 +72,7 @@ def run(
         segmenter=segmenter,
         min_score=min_score,
         categories=chosen_categories(categories),
-        params=params_of(
-            neighbors=neighbors,
-            sigma=sigma,
-            pixel_weight=pixel_weight,
-            window=window,
-            iterations=iterations,
-            converge=converge,
-            keep_outliers=keep_outliers,
-        ),
+        params=params,
         formats=words(formats),
     )
     opened = open_source(source, kind=dataset, truth=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -15,25 +16,17 @@ from ldls.cli.mask_options import (
     masks_of,
 )
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
-from ldls.cli.method_options import (
-    ITERATIONS,
-    PAPER,
-    ConvergeOption,
-    IterationsOption,
-    NeighborsOption,
-    OutliersOption,
-    PixelWeightOption,
-    SigmaOption,
-    WindowOption,
-    params_of,
-)
+from ldls.cli.method_options import takes_params
 from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, PictureOption, write_outputs
 from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
 from ldls.io import read_image, save
+from ldls.params import Params
 
 
 @speaks_plainly
+@takes_params
 def segment(
+    *,
     points: Annotated[Path, POINTS],
     calib: Annotated[Path, CALIB],
     out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
@@ -59,16 +52,10 @@ def segment(
         typer.Option("--format", help="What to write; may be repeated.", show_default="npz, label, ply, png"),
     ] = None,
     picture: PictureOption = None,
-    neighbors: NeighborsOption = PAPER.neighbors,
-    sigma: SigmaOption = PAPER.sigma,
-    pixel_weight: PixelWeightOption = PAPER.pixel_weight,
-    window: WindowOption = PAPER.window,
-    iterations: IterationsOption = ITERATIONS,
-    converge: ConvergeOption = False,
-    keep_outliers: OutliersOption = False,
     threads: Annotated[int | None, typer.Option(help="Threads.", show_default="all cores")] = None,
     rerun: RerunOption = None,
     diffusion: DiffusionOption = None,
+    params: Params,
 ) -> None:
     """Label the points of one lidar sweep by the instance masks of one image.
 
@@ -86,16 +73,6 @@ def segment(
     --segmenter boxes:label_2/000001.txt --out results
     """
     check_recording(rerun)
-    params = params_of(
-        neighbors=neighbors,
-        sigma=sigma,
-        pixel_weight=pixel_weight,
-        window=window,
-        iterations=iterations,
-        converge=converge,
-        keep_outliers=keep_outliers,
-        threads=threads,
-    )
     pixels = None if image is None else read_image(image)
     chosen = masks_of(
         pixels,
@@ -107,7 +84,7 @@ def segment(
     )
     if save_masks is not None:
         save(chosen, save_masks)
-    result = segment_files(points, chosen, calib, camera=camera, params=params)
+    result = segment_files(points, chosen, calib, camera=camera, params=replace(params, threads=threads))
     name = points.stem.removesuffix(".pcd")
     written = write_outputs(out, name, result, pixels, formats or DEFAULT_OUTPUTS)
     if picture is not None:
