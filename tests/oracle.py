@@ -55,29 +55,39 @@ def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1, heights=No
     return expected
 
 
-def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1):
+def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, heights=None, centers=None):
     """`views` holds masks (M, H, W), categories (M,) and a camera matrix for each camera. Labels, and the instances
-    (camera, mask), both from 0, of each label from 1."""
+    (camera, mask), both from 0, of each label from 1. `heights` and the `centers` of the cameras are as in `segment`."""
     seen = [project(points, matrix, masks.shape[1:], min_depth_m) for masks, _, matrix in views]
     in_view = np.unique(np.concatenate([rows for rows, _ in seen]))
+    xyz = points[in_view, :3].astype(np.float64)
+    heights = np.full(len(xyz), np.nan) if heights is None else heights
+    ground = (heights > -0.3) & (heights < 0.15)
     groups = same_objects(views, seen, same_object)
     labels, mass = np.zeros((len(in_view), len(groups) + 1)), np.zeros(len(in_view))
+    at_depth = np.zeros(labels.shape, bool)
     for camera, ((masks, _, _), (rows, pixels)) in enumerate(zip(views, seen, strict=True)):
         of_instance = [0] + [1 + [(camera, m) in group for group in groups].index(True) for m in range(len(masks))]
-        own, own_mass = pixel_edges(pixels, masks, params.window, params.pixel_weight)
         at = np.searchsorted(in_view, rows)
+        admitted = np.ones((len(at), len(masks) + 1), bool)
+        if params.depth_gap > 0:
+            distances = np.linalg.norm(xyz[at] - centers[camera], axis=1)
+            admitted = depth_groups(distances, pixels, masks, ~ground[at], params)
+        own, own_mass = pixel_edges(pixels, masks, params.window, params.pixel_weight)
         for instance, label in enumerate(of_instance):
-            labels[at, label] += own[:, instance]
+            labels[at, label] += own[:, instance] * admitted[:, instance]
+            at_depth[at, label] |= admitted[:, instance]
         mass[at] += own_mass
-    edges = point_edges(points[in_view, :3].astype(np.float64), params.neighbors, params.sigma)
+    edges = point_edges(xyz, params.neighbors, params.sigma, ground, params.ground_edges)
     row_sums = edges.sum(axis=1) + mass
     A, b = diags_array(1 / row_sums, shape=edges.shape) @ edges, labels / row_sums[:, None]
     z = np.zeros_like(b)
     for _ in range(params.iterations):
         z = A @ z + b
-    kept = largest_components(edges, z.argmax(axis=1))  # of the paper's parameters
+    diffused = z.argmax(axis=1)
+    expected = Expected(in_view, None, diffused, diffused, z, edges, at_depth, heights)
     whole = np.full(len(points), -1)
-    whole[in_view] = kept
+    whole[in_view] = expected.remove_outliers(diffused, params)
     return whole, groups
 
 

@@ -54,7 +54,8 @@ def test_rings(run, capsys):
     names = run("docs/rings.md")
     result = names["result"]
     assert result.sources == (((0, 0), (1, 0)),)
-    assert (result.labels[: len(names["car"])] == 1).mean() > 0.9
+    # its lowest row in ten is where the ground is taken to be
+    assert (result.labels[: len(names["car"])] == 1).mean() >= 0.9
     assert "left" in capsys.readouterr().out
 
 
@@ -72,7 +73,7 @@ def test_own_sensors(own_demo, run, tmp_path):
     (recipe, _) = pages.recipes(pages.ROOT / "docs/own-sensors.md")
     (folder / "ldls.toml").write_text(recipe.commands.partition("<<'END'\n")[2].partition("END\n")[0])
     names = run("docs/own-sensors.md")
-    assert sum(found.n_points > 0 for found in names["result"].objects) == 14
+    assert sum(found.n_points > 0 for found in names["result"].objects) == 15
     # the page's transform is that of the demo, put together from a pose and a turn
     image = names["frame"].images[0]
     np.testing.assert_allclose(names["T_camera_lidar"], image.camera.T_camera_lidar, atol=1e-12)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from ring_samples import as_views, random_ring
 WALL = np.stack(np.meshgrid(np.linspace(-3, 3, 90), np.linspace(-0.6, 0.6, 25), [1.0]), axis=-1).reshape(-1, 3)
 
 # the wall is flat, so only a short reach keeps its rectangles apart
-PARAMS = ldls.Params(sigma=0.002, pixel_weight=0.1)
+PARAMS = replace(ldls.Params.paper(), sigma=0.002, pixel_weight=0.1)
 
 
 def segment(views, **options):
@@ -121,12 +123,17 @@ def test_threads_do_not_change_a_bit(threads):
     np.testing.assert_array_equal(one.confidence, other.confidence)
 
 
+@pytest.mark.parametrize("base", [ldls.Params.paper(), ldls.Params()], ids=["paper", "best"])
 @pytest.mark.parametrize("seed", range(40))
-def test_labels_equal_those_of_plain_double_precision(seed):
+def test_labels_equal_those_of_plain_double_precision(seed, base):
     points, views = random_ring(seed)
-    params = ldls.Params(neighbors=6, sigma=0.3, pixel_weight=0.01, iterations=40)
+    params = replace(base, neighbors=6, sigma=0.3, pixel_weight=0.01, iterations=40)
     plain = [(pixels, categories, one.projection @ one.T_camera_lidar) for pixels, categories, one in views]
-    labels, groups = oracle.segment_ring(points, plain, params)
     result = ldls.segment(points, as_views(views), params=params)
+    asked = {}
+    if params.depth_gap:
+        asked["heights"] = ldls.stages.ground(points[result.in_view], views[0][2])
+        asked["centers"] = [np.linalg.inv(one.T_camera_lidar)[:3, 3] for _, _, one in views]
+    labels, groups = oracle.segment_ring(points, plain, params, **asked)
     assert [list(sources) for sources in result.sources] == groups
     np.testing.assert_array_equal(result.labels, labels)

@@ -20,6 +20,7 @@ __all__ = [
     "__version__",
     "check_params",
     "clear_ground",
+    "confidence",
     "default_threads",
     "depth_groups",
     "diffuse",
@@ -116,6 +117,7 @@ def segment(
     points: _Points,
     masks: list[Masks],
     categories: list[list[int]],
+    scores: list[list[float]],
     cameras: list[Camera],
     same_object: float,
     params: Params,
@@ -175,6 +177,10 @@ def diffuse(
 def remove_outliers(
     point_graph: _Csr, labels: NDArray[np.uint32], part_size: float, depths: _Depths | None
 ) -> NDArray[np.int32]: ...
-def clear_ground(
-    labels: NDArray[np.uint32], heights: NDArray[np.float64], clearance: float
-) -> NDArray[np.int32]: ...
+def confidence(
+    shares: NDArray[np.float32],
+    diffused: NDArray[np.uint32],
+    labels: NDArray[np.uint32],
+    scores: NDArray[np.float32],
+) -> NDArray[np.float32]: ...
+def clear_ground(labels: NDArray[np.uint32], heights: NDArray[np.float64], clearance: float) -> NDArray[np.int32]: ...

@@ -159,6 +159,7 @@ def _segment(
         cloud,
         [view.masks.core for view in views],
         [view.masks.categories.tolist() for view in views],
+        [view.masks.scores.tolist() for view in views],
         [view.camera.core for view in views],
         same_object,
         params,

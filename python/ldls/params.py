@@ -39,6 +39,9 @@ class Params:
             decide. 0 for none of it. Part of the depth groups.
         part_size: Outlier removal also keeps components of at least this share of the largest one's points that are as
             far away as the object: a pole splits a car, and the lines of 16 beams fall apart. 1 for the largest alone.
+        calibrated: Whether confidence is the probability that a label is of the right class, from the winner's share of
+            the likelihoods and the score of its mask, as fitted on simulated frames of four lidars; else the share.
+        abstain: Labels of less confidence become background, 0 to 1: `Segmentation.abstained` says which. 0 for none.
         threads: Threads to use; `None` for the environment variable `LDLS_NUM_THREADS` or else all cores that the
             process may use. Results do not depend on it.
 
@@ -59,6 +62,8 @@ class Params:
     bridged_gap: float = 1.5
     edge_margin: float = 0.15
     part_size: float = 0.1
+    calibrated: bool = True
+    abstain: float = 0.0
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -87,6 +92,7 @@ class Params:
             bridged_gap=0.0,
             edge_margin=0.0,
             part_size=1.0,
+            calibrated=False,
             threads=threads,
         )
 

@@ -9,6 +9,7 @@
     A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, masks, depths=depths))
     z = stages.diffuse(A, b)
     labels = stages.remove_outliers(A, z.argmax(axis=1), depths=depths, heights=heights)
+    confidence = stages.confidence(z, labels, masks)
 
 equals `ldls.segment` on the points in view; without heights and depths, and with the options of `Params.paper()`, it is the
 paper's method. Options stand for the same as in `ldls.Params`. Needs the extra `eval`.
@@ -106,12 +107,13 @@ def ground(
     """Height (n,) of each point above the ground in metres; NaN for all where no ground is found.
 
     The ground is a cubic surface through the lowest points of polar cells around the camera, fitted so that what stands
-    on it does not count, and with `local_ground` what lies level around each point. Up is z of the lidar frame. Points
-    from -0.3 m to 0.15 m are the ground's.
+    on it does not count, and with `local_ground` what lies level around each point. Up is z of the lidar frame, or -y
+    where the camera looks along its z, as in clouds that are in the frame of the camera. Points from -0.3 m to 0.15 m
+    are the ground's.
 
     Args:
         points: (n, >= 3) finite, in metres.
-        camera: The camera, for its place.
+        camera: The camera, for its place and for where up is.
         local_ground: As in `Params`.
         threads: As in `Params`.
     """
@@ -328,6 +330,24 @@ def remove_outliers(
         return kept
     above = _per_point("heights", heights, len(kept), np.float64)
     return _ldls.clear_ground(kept.astype(np.uint32), above, ground_clearance)
+
+
+def confidence(z: ArrayLike, labels: ArrayLike, masks: InstanceMasks) -> NDArray[np.float32]:
+    """Probability (n,) that each label is of the right class, as fitted on simulated frames.
+
+    Args:
+        z: (n, M + 1) likelihoods of `diffuse`.
+        labels: (n,) of `remove_outliers`, 0 to M.
+        masks: The M masks, for their scores.
+    """
+    likelihoods = np.asarray(z, np.float32)
+    kept = _per_point("labels", labels, len(likelihoods), np.uint32)
+    if likelihoods.ndim != 2 or likelihoods.shape[1] != len(masks) + 1 or kept.max(initial=0) > len(masks):
+        raise ShapeError(f"z: expected (n, {len(masks) + 1}) and labels up to {len(masks)}, got {likelihoods.shape}")
+    total = likelihoods.sum(axis=1)
+    best = likelihoods.max(axis=1, initial=0)
+    shares = np.divide(best, total, out=np.zeros_like(best), where=total > 0)
+    return _ldls.confidence(shares, likelihoods.argmax(axis=1).astype(np.uint32), kept, masks.scores)
 
 
 def _checked(depths: DepthGroups, points: int, masks: int) -> tuple[Any, Any, Any]:

@@ -69,7 +69,7 @@ def test_real_frame(frame_571, tmp_path):
         app,
         ["segment", "--points", str(frame_571.points_path), "--calib", str(frame_571.calib_path),
          "--masks", str(frame_571.masks_path), "--image", str(frame_571.image_path),
-         "--out", str(tmp_path / "new/folder")],
+         "--out", str(tmp_path / "new/folder"), "--paper"],
     )  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
     assert "17 of 19 objects found" in outcome.output

@@ -26,7 +26,7 @@ def test_shapes_and_types_of_the_result(small_scene):
     assert ((in_view > 0) & (in_view <= 1)).all()
     assert "2 of 2 objects found" in repr(result)
     assert set(result.timings) == {
-        "project", "pixel_labels", "neighbors", "graph", "diffusion", "components",
+        "project", "depth", "pixel_labels", "neighbors", "graph", "diffusion", "components",
     }  # fmt: skip
 
 
@@ -237,7 +237,8 @@ def test_no_masks_make_everything_background(small_scene):
 def test_empty_and_total_masks_are_reported_and_used(small_scene):
     points, masks, camera = small_scene
     pixels = np.stack([np.zeros(masks.image_size, bool), np.ones(masks.image_size, bool)])
-    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera)
+    params = ldls.Params.paper()
+    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera, params=params)
     assert result.report.empty_masks == (1,)
     assert (result.diffused_labels[result.in_view] == 2).all()
     assert result.objects[0].box is None

@@ -28,10 +28,13 @@ HELP = {
     "bridged_gap": "Gap in metres within an object that does not go on beside its mask; 0 for none of it.",
     "edge_margin": "Share of a mask's shorter side by which its edge may be off; 0 for none of it.",
     "part_size": "Share of an object's main part that other parts need; 1 for none of it.",
+    "calibrated": "Is confidence the probability that a label is right, or the winner's share of likelihoods?",
+    "abstain": "Labels of less confidence become background, 0 to 1.",
 }
 SWITCHES = {
     "remove_outliers": "--remove-outliers/--keep-outliers",
     "local_ground": "--local-ground/--smooth-ground",
+    "calibrated": "--calibrated/--shares",
 }
 PANEL = "Method"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from os import PathLike
 from typing import Any
 
@@ -117,7 +117,8 @@ def _result(arrays: Arrays) -> Segmentation:
         report=Report(**report | {"empty_masks": tuple(report["empty_masks"])}),
         timings=json.loads(str(arrays["timings"])),
         points=as_points(arrays["points"]),
-        params=Params(**json.loads(str(arrays["params"]))),
+        # results from before a parameter was there knew the paper's method only
+        params=replace(Params.paper(), **json.loads(str(arrays["params"]))),
     )
 
 

@@ -48,7 +48,8 @@ class Segmentation:
         labels: (N,) int32: -1 out of view, 0 background, m instance m, which is `instances[m - 1]`, and with one camera
             `masks[m - 1]`.
         diffused_labels: (N,) int32: the same before outlier removal.
-        confidence: (N,) float32 in [0, 1]: likelihood of the diffused label over the sum of all; 0 out of view.
+        confidence: (N,) float32 in [0, 1]: probability that the label is of the right class, or, where the parameters are
+            not `calibrated`, likelihood of the diffused label over the sum of all; 0 out of view.
         in_view: (n,) int64: indices of the points that any camera sees, ascending.
         instances: What the labels 1, 2, ... stand for.
         views: Each camera's masks, points and pixels.
@@ -117,6 +118,12 @@ class Segmentation:
         # label -1 picks the last entry
         of_points: NDArray[Any] = np.concatenate([by_label, last])[self.labels]
         return of_points
+
+    @property
+    def abstained(self) -> NDArray[np.bool_]:
+        """(N,) bool: whether a point in view is too doubtful for a label and left at 0 (`Params.abstain`)."""
+        doubtful: NDArray[np.bool_] = (self.labels >= 0) & (self.confidence < self.params.abstain)
+        return doubtful
 
     @cached_property
     def direct_labels(self) -> NDArray[np.int32]:

@@ -76,6 +76,7 @@ fn stages(criterion: &mut Criterion) {
     let view = View {
         masks: &masks,
         categories: &[0; INSTANCES],
+        scores: &[1.0; INSTANCES],
         camera: &camera,
     };
     for n in SIZES {

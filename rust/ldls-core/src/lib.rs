@@ -7,6 +7,7 @@
 //! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is
 //! taken by one thread in one order.
 
+mod confidence;
 mod depth;
 mod diffusion;
 mod error;
@@ -23,6 +24,7 @@ mod segment;
 #[cfg(test)]
 mod test_support;
 
+pub use confidence::calibrated_confidence;
 pub use depth::DepthGroups;
 pub use diffusion::{Convergence, Diffused, Products, diffuse, likelihoods};
 pub use error::Error;

@@ -31,6 +31,10 @@ pub struct Params {
     pub edge_margin: f64,
     /// Parts of an object with at least this share of its largest component stay; 1 for that component alone.
     pub part_size: f64,
+    /// Set if confidence is the probability that a label is right, not the winner's share of the likelihoods.
+    pub calibrated: bool,
+    /// Labels of less confidence become background; 0 for none.
+    pub abstain: f64,
 }
 
 impl Default for Params {
@@ -45,6 +49,7 @@ impl Default for Params {
             bridged_gap: 1.5,
             edge_margin: 0.15,
             part_size: 0.1,
+            calibrated: true,
             ..Self::paper()
         }
     }
@@ -67,6 +72,8 @@ impl Params {
             bridged_gap: 0.0,
             edge_margin: 0.0,
             part_size: 1.0,
+            calibrated: false,
+            abstain: 0.0,
         }
     }
 
@@ -132,6 +139,7 @@ impl Params {
             ("ground_edges", self.ground_edges),
             ("edge_margin", self.edge_margin),
             ("part_size", self.part_size),
+            ("abstain", self.abstain),
         ] {
             let share = (0.0..=1.0).contains(&value);
             check(name, share, value.to_string(), "a share from 0 to 1")?;

@@ -1,8 +1,9 @@
 //! The method on one screen: points, masks and cameras in, one label a point out.
 
+use crate::confidence::judge;
 use crate::diffusion::diffuse;
 use crate::graph::{PointGraph, remove_outliers_by_index};
-use crate::ground::{clear_ground, ground_heights, is_ground};
+use crate::ground::{clear_ground, is_ground};
 use crate::masks::PixelLabels;
 use crate::neighbors::{Adjacency, arrange};
 use crate::projection::{Cloud, Sighting};
@@ -22,7 +23,7 @@ pub struct Segmentation {
     pub labels: Vec<i32>,
     /// Labels before outlier removal.
     pub diffused_labels: Vec<i32>,
-    /// Share of the winner in the values of all labels at a point; 0 out of view.
+    /// How sure each label is, from 0 to 1; 0 out of view.
     pub confidence: Vec<f32>,
     /// Rows of the points in view, ascending.
     pub in_view: Vec<u32>,
@@ -78,17 +79,21 @@ pub fn segment(
     let diffused = timed(&mut t.diffusion, || {
         diffuse(&a, &b, images.n_labels(), params.iterations, exact)
     })?;
-    let kept = timed(&mut t.components, || {
+    let mut kept = timed(&mut t.components, || {
         remove_outliers(&a, &diffused.labels, &heights, order, &images, params)
     })?;
+
+    let diffused_labels = diffused.labels.clone();
+    let report = Report::new(in_view.counts, &nearest, diffused.convergence);
+    let confidence = judge(&mut kept, diffused, &images.scores(), params);
 
     // back to the rows of the cloud
     let rows = arrange(order, &in_view.indices);
     Ok(Segmentation {
         labels: labels_of_cloud(cloud.len(), &rows, &kept),
-        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels),
-        confidence: scatter(cloud.len(), &rows, 0.0, diffused.confidence),
-        report: Report::new(in_view.counts, &nearest, diffused.convergence),
+        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused_labels),
+        confidence: scatter(cloud.len(), &rows, 0.0, confidence),
+        report,
         in_view: in_view.indices,
         sightings: images.sightings,
         objects: images.objects,
@@ -120,7 +125,7 @@ fn find_ground(points: &[[f64; 3]], images: &mut Images, params: &Params) -> Vec
     if !params.need_ground() {
         return vec![f64::NAN; points.len()];
     }
-    let heights = ground_heights(points, &images.origin(), params.local_ground);
+    let heights = images.ground_heights(points, params.local_ground);
     if params.need_depth() {
         let standing: Vec<bool> = heights.iter().map(|&height| !is_ground(height)).collect();
         images.group_by_depth(points, &standing, params);
@@ -203,6 +208,7 @@ mod tests {
         let mut turned = View {
             masks: &masks,
             categories: &[1, 1],
+            scores: &[1.0, 1.0],
             camera: &camera,
         };
         let alone = segment(&[turned]);

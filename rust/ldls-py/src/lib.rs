@@ -31,8 +31,8 @@ mod _ldls {
     use crate::segment::{SegmentationArrays, check_params, segment};
     #[pymodule_export]
     use crate::stages::{
-        clear_ground, depth_groups, diffuse, direct_labels, ground, neighbors, normalize_rows,
-        pixel_labels, point_graph, project, remove_outliers,
+        clear_ground, confidence, depth_groups, diffuse, direct_labels, ground, neighbors,
+        normalize_rows, pixel_labels, point_graph, project, remove_outliers,
     };
 
     #[pymodule_init]

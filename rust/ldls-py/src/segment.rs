@@ -25,6 +25,8 @@ pub struct ParamsAttributes {
     bridged_gap: f64,
     edge_margin: f64,
     part_size: f64,
+    calibrated: bool,
+    abstain: f64,
     threads: Option<usize>,
 }
 
@@ -44,6 +46,8 @@ impl ParamsAttributes {
             bridged_gap: self.bridged_gap,
             edge_margin: self.edge_margin,
             part_size: self.part_size,
+            calibrated: self.calibrated,
+            abstain: self.abstain,
         }
     }
 }
@@ -67,7 +71,7 @@ pub struct SegmentationArrays {
 
 /// Segments points by the masks of the images that one camera or several took.
 #[pyfunction]
-#[pyo3(signature = (points, masks, categories, cameras, same_object, params, keep_origin))]
+#[pyo3(signature = (points, masks, categories, scores, cameras, same_object, params, keep_origin))]
 #[expect(
     clippy::too_many_arguments,
     reason = "the face in Python has few; here each is one extraction"
@@ -77,6 +81,7 @@ pub fn segment(
     points: Points<'_>,
     masks: Vec<PyRef<'_, Masks>>,
     categories: Vec<Vec<i32>>,
+    scores: Vec<Vec<f32>>,
     cameras: Vec<PyRef<'_, Camera>>,
     same_object: f64,
     params: ParamsAttributes,
@@ -84,11 +89,12 @@ pub fn segment(
 ) -> PyResult<SegmentationArrays> {
     let cloud = points.cloud(py)?;
     let (threads, params) = (params.threads, params.params());
-    let views = masks.iter().zip(&categories).zip(&cameras);
+    let views = masks.iter().zip(&categories).zip(&scores).zip(&cameras);
     let views: Vec<View> = views
-        .map(|((masks, categories), camera)| View {
+        .map(|(((masks, categories), scores), camera)| View {
             masks: &masks.0,
             categories,
+            scores,
             camera: &camera.0,
         })
         .collect();

@@ -62,7 +62,7 @@ pub fn ground(
 ) -> PyResult<Py<PyArray1<f64>>> {
     let points = rows::<3>(py, "points", &points)?;
     let heights = run(py, threads, || {
-        Ok(ldls_core::ground_heights(&points, camera.0.center(), local))
+        Ok(ldls_core::ground_heights(&points, &camera.0, local))
     })?;
     Ok(heights.into_pyarray(py).unbind())
 }
@@ -276,6 +276,23 @@ pub fn clear_ground(
     let heights = slice(py, "heights", &heights)?;
     ldls_core::clear_ground(&mut cleared, heights.iter().copied(), clearance);
     Ok(signed(&cleared).into_pyarray(py).unbind())
+}
+
+/// Confidence of labels from the likelihoods' shares.
+#[pyfunction]
+pub fn confidence(
+    py: Python<'_>,
+    shares: PyReadonlyArray1<'_, f32>,
+    diffused: PyReadonlyArray1<'_, u32>,
+    labels: PyReadonlyArray1<'_, u32>,
+    scores: PyReadonlyArray1<'_, f32>,
+) -> PyResult<Py<PyArray1<f32>>> {
+    let shares = slice(py, "shares", &shares)?;
+    let diffused = slice(py, "diffused", &diffused)?;
+    let labels = slice(py, "labels", &labels)?;
+    let scores = slice(py, "scores", &scores)?;
+    let found = ldls_core::calibrated_confidence(shares, diffused, labels, scores);
+    Ok(found.into_pyarray(py).unbind())
 }
 
 fn depth_groups_of(

@@ -1,11 +1,12 @@
 //! The ground below a cloud: how high each point lies above it.
 //!
 //! A cubic surface through the lowest points follows slopes and bends where lines are sparse and where objects hide the
-//! ground; a local offset follows kerbs and lawns where enough of the ground is seen. Up is the z axis of the lidar frame.
+//! ground; a local offset follows kerbs and lawns where enough of the ground is seen.
 
 mod local;
 mod surface;
 
+use crate::Camera;
 use surface::Surface;
 
 /// Points up to this height above the ground, in metres, belong to it: the noise of a lidar and a tuft of grass.
@@ -13,14 +14,11 @@ const TOP_M: f64 = 0.15;
 /// Points lower than this, in metres, lie in a pit or under a surface that is not the ground.
 const BOTTOM_M: f64 = -0.3;
 
-/// Height of each of `points` (metres) above the ground, NaN where none is found.
+/// Height of each of `points` (metres) above the ground that `camera` stands on, NaN where none is found.
 ///
-/// `origin` is the place, in the lidar frame, that the cloud was seen from; `local` asks for the local offset.
-pub fn ground_heights(points: &[[f64; 3]], origin: &[f64; 3], local: bool) -> Vec<f64> {
-    let places: Vec<[f64; 3]> = points
-        .iter()
-        .map(|point| [0, 1, 2].map(|axis| point[axis] - origin[axis]))
-        .collect();
+/// Up is z of the lidar frame, or -y where the camera looks along its z. `local` asks for the local offset.
+pub fn ground_heights(points: &[[f64; 3]], camera: &Camera, local: bool) -> Vec<f64> {
+    let places: Vec<[f64; 3]> = points.iter().map(|point| camera.upright(point)).collect();
     let Some(surface) = Surface::fit(&places) else {
         return vec![f64::NAN; points.len()];
     };
@@ -51,6 +49,15 @@ pub fn clear_ground(labels: &mut [u32], heights: impl IntoIterator<Item = f64>, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_support;
+
+    /// A camera at the origin of a lidar frame with z upwards that looks along x.
+    fn camera_ahead() -> Camera {
+        let t = [
+            0., -1., 0., 0., 0., 0., -1., 0., 1., 0., 0., 0., 0., 0., 0., 1.,
+        ];
+        Camera::new(&[1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0.], &t, 0.1).unwrap()
+    }
 
     /// A plain that rises by 5 %, with a pavement 0.12 m higher beside it and a wall.
     fn street() -> Vec<([f64; 3], f64)> {
@@ -73,7 +80,7 @@ mod tests {
     #[test]
     fn heights_are_those_above_road_and_pavement() {
         let (points, truth): (Vec<_>, Vec<_>) = street().into_iter().unzip();
-        let heights = ground_heights(&points, &[0.0; 3], true);
+        let heights = ground_heights(&points, &camera_ahead(), true);
         let off = |tolerance: f64| {
             let pairs = heights.iter().zip(&truth);
             pairs
@@ -91,11 +98,30 @@ mod tests {
             .collect();
         for points in [&wall[..2], &[]] {
             assert!(
-                ground_heights(points, &[0.0; 3], true)
+                ground_heights(points, &camera_ahead(), true)
                     .iter()
                     .all(|height| height.is_nan())
             );
         }
+    }
+
+    #[test]
+    fn a_cloud_in_the_frame_of_the_camera_is_upright_too() {
+        let (points, _): (Vec<_>, Vec<_>) = street().into_iter().unzip();
+        let turned: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [-y, -z, x]).collect();
+        let own = test_support::camera(20.0);
+        assert_eq!(
+            ground_heights(&turned, &own, true),
+            ground_heights(&points, &camera_ahead(), true)
+        );
+    }
+
+    #[test]
+    fn a_ground_above_the_camera_is_none() {
+        let (points, _): (Vec<_>, Vec<_>) = street().into_iter().unzip();
+        let above: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [x, y, z + 3.0]).collect();
+        let heights = ground_heights(&above, &camera_ahead(), true);
+        assert!(heights.iter().all(|height| height.is_nan()));
     }
 
     #[test]

@@ -47,7 +47,7 @@ pub(super) struct Surface {
 
 impl Surface {
     /// The surface below `places`, relative to where they were seen from; none where too few of the lowest places lie on
-    /// one.
+    /// one, or where it lies above.
     pub(super) fn fit(places: &[[f64; 3]]) -> Option<Self> {
         let cells = lowest(places);
         if cells.len() < LEAST_CELLS {
@@ -78,7 +78,8 @@ impl Surface {
         let on_it = cells
             .iter()
             .filter(|place| surface.height(place).abs() < ON_SURFACE_M);
-        (on_it.count() >= LEAST_CELLS).then_some(surface)
+        let below = surface.height(&[0.0; 3]) > 0.0;
+        (below && on_it.count() >= LEAST_CELLS).then_some(surface)
     }
 
     /// Height of a place above the surface, in metres.

@@ -20,6 +20,8 @@ pub struct Camera {
     min_depth_m: f64,
     /// Place of the camera in the lidar frame, in metres.
     center: [f64; 3],
+    /// Set if the camera looks along z of the lidar frame, so that this is no lidar's but like the camera's own.
+    camera_like: bool,
 }
 
 /// The position of a point relative to an image.
@@ -66,6 +68,7 @@ impl Camera {
             intrinsic: Matrix3::identity(),
             min_depth_m,
             center: center(&transform),
+            camera_like: transform[(2, 2)] > std::f64::consts::FRAC_1_SQRT_2,
         })
     }
 
@@ -116,15 +119,25 @@ impl Camera {
         }
     }
 
-    /// Place of the camera in the lidar frame, in metres.
-    pub fn center(&self) -> &[f64; 3] {
-        &self.center
+    /// A point of the lidar frame relative to the camera, in metres, with z upwards: that of the lidar frame, and -y where
+    /// the camera looks along its z, as in clouds that are in the camera's own frame.
+    pub(crate) fn upright(&self, xyz: &[f64; 3]) -> [f64; 3] {
+        let [x, y, z] = self.relative(xyz);
+        if self.camera_like {
+            [z, -x, -y]
+        } else {
+            [x, y, z]
+        }
+    }
+
+    fn relative(&self, xyz: &[f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| xyz[axis] - self.center[axis])
     }
 
     /// Distance of a point in the lidar frame to the camera, in metres.
     #[inline]
     pub fn distance(&self, xyz: &[f64; 3]) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|axis| xyz[axis] - self.center[axis]);
+        let [x, y, z] = self.relative(xyz);
         (x * x + y * y + z * z).sqrt()
     }
 

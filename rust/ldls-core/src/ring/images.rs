@@ -3,6 +3,7 @@
 use super::same_objects::{Objects, same_objects};
 use super::view::View;
 use crate::depth::DepthGroups;
+use crate::ground::ground_heights;
 use crate::masks::PixelLabels;
 use crate::neighbors::arrange;
 use crate::projection::{Cloud, InView, Sighting, project};
@@ -62,11 +63,11 @@ impl<'a> Images<'a> {
         Ok((in_view, images))
     }
 
-    /// Place in the lidar frame that the images were taken from: that of the first camera.
-    pub(crate) fn origin(&self) -> [f64; 3] {
-        self.views
-            .first()
-            .map_or([0.0; 3], |view| *view.camera.center())
+    /// Heights of `points` in view above the ground, by the first camera; NaN where there is none.
+    pub(crate) fn ground_heights(&self, points: &[[f64; 3]], local: bool) -> Vec<f64> {
+        let heights = |view: &View| ground_heights(points, view.camera, local);
+        let unknown = || vec![f64::NAN; points.len()];
+        self.views.first().map_or_else(unknown, heights)
     }
 
     /// Finds the object of each mask among `points` in view, `standing` those off the ground, by depth.
@@ -109,6 +110,15 @@ impl<'a> Images<'a> {
     /// Number of labels, the background counted.
     pub(crate) fn n_labels(&self) -> usize {
         self.objects.len() + 1
+    }
+
+    /// Score of each object, the highest of its masks.
+    pub(crate) fn scores(&self) -> Vec<f32> {
+        let score = |&(image, m): &(usize, u32)| self.views[image].scores[m as usize - 1];
+        let objects = self.objects.iter();
+        objects
+            .map(|masks| masks.iter().map(score).fold(0.0, f32::max))
+            .collect()
     }
 
     /// The pixel edges of the points in view, in `order`.

@@ -141,7 +141,8 @@ mod tests {
         let (left, right) = (camera(40.0), camera(20.0));
         let first = masks(&[[5, 24, 12, 10], [5, 2, 8, 8]]);
         let second = masks(&[[5, 4, 12, 10], [5, 5, 12, 10], [5, 30, 8, 8]]);
-        let view = |masks, camera, categories| View {
+        let view = |masks, camera, categories: &'static [i32]| View {
+            scores: &[1.0; 9][..categories.len()],
             masks,
             categories,
             camera,
@@ -169,6 +170,7 @@ mod tests {
         let (first, second) = (masks(&[[5, 8, 6, 8]]), masks(&[[5, 8, 6, 4]]));
         let camera = camera(20.0);
         let view = |masks| View {
+            scores: &[1.0],
             masks,
             categories: &[1],
             camera: &camera,
@@ -191,7 +193,7 @@ mod tests {
             let cameras = [camera(30.0), camera(20.0)];
             let categories = [1; 6];
             let views: Vec<View> = parts.iter().zip(&cameras).map(|(masks, camera)| View {
-                masks, camera, categories: &categories[..masks.len()],
+                masks, camera, categories: &categories[..masks.len()], scores: &[1.0; 9][..masks.len()],
             }).collect();
             let found = segment(&views);
             let mut members: Vec<(usize, u32)> = found.objects.concat();

@@ -11,19 +11,22 @@ pub struct View<'a> {
     pub masks: &'a InstanceMasks,
     /// Category of each of them: only instances of one category become one object.
     pub categories: &'a [i32],
+    /// Score of each of them, 0 to 1.
+    pub scores: &'a [f32],
     /// The camera.
     pub camera: &'a Camera,
 }
 
 impl View<'_> {
-    /// Refuses a view that has not one category a mask.
+    /// Refuses a view that has not one category and one score a mask.
     pub(crate) fn check(&self) -> Result<()> {
-        if self.masks.len() == self.categories.len() {
-            return Ok(());
+        let (categories, scores) = (self.categories.len(), self.scores.len());
+        for (name, found) in [("categories", categories), ("scores", scores)] {
+            if self.masks.len() != found {
+                let problem = format!("{found} for {} masks", self.masks.len());
+                return Err(Error::Mismatch { name, problem });
+            }
         }
-        Err(Error::Mismatch {
-            name: "categories",
-            problem: format!("{} for {} masks", self.categories.len(), self.masks.len()),
-        })
+        Ok(())
     }
 }

@@ -1,0 +1,107 @@
+//! Confidence: how likely the label of a point is of the right class.
+//!
+//! Logistic functions of the winner's share of the likelihoods and of the score of its mask, fitted to the labels of
+//! simulated frames of four lidars whose truth is known.
+
+use crate::Params;
+use crate::diffusion::Diffused;
+
+/// Constant, and the slope of the share and of the score, for points of objects.
+const OBJECT: [f64; 3] = [-2.41, 0.27, 2.48];
+/// Constant and the slope of the share for points that diffusion gave to the background.
+const BACKGROUND: [f64; 2] = [2.22, 0.24];
+/// The same for points that outlier removal or the ground made background: the surer diffusion was, the less sure.
+const REMOVED: [f64; 2] = [2.27, -0.28];
+/// Shares and scores beyond these say no more.
+const SHARES: [f64; 2] = [0.01, 0.999];
+const SCORES: [f64; 2] = [0.05, 0.95];
+
+/// The confidence of each label, by the share of its winner in the likelihoods, the label that diffusion gave and the
+/// score of the object of each label from 1.
+pub fn calibrated_confidence(
+    shares: &[f32],
+    diffused: &[u32],
+    labels: &[u32],
+    scores: &[f32],
+) -> Vec<f32> {
+    let probability = |((&share, &diffused), &label): ((&f32, &u32), &u32)| {
+        let share = log_odds(share, SHARES);
+        let odds = match (diffused, label) {
+            (0, _) => BACKGROUND[0] + BACKGROUND[1] * share,
+            (_, 0) => REMOVED[0] + REMOVED[1] * share,
+            (_, label) => {
+                let score = log_odds(scores[label as usize - 1], SCORES);
+                OBJECT[0] + OBJECT[1] * share + OBJECT[2] * score
+            }
+        };
+        (1.0 / (1.0 + (-odds).exp())) as f32
+    };
+    let points = shares.iter().zip(diffused).zip(labels);
+    points.map(probability).collect()
+}
+
+fn log_odds(probability: f32, [low, high]: [f64; 2]) -> f64 {
+    let clamped = f64::from(probability).clamp(low, high);
+    (clamped / (1.0 - clamped)).ln()
+}
+
+/// The confidence of each of `labels`, which is the share of the winner where the parameters ask for no more. Labels of
+/// which it is below the parameters' become background.
+pub(crate) fn judge(
+    labels: &mut [u32],
+    diffused: Diffused,
+    scores: &[f32],
+    params: &Params,
+) -> Vec<f32> {
+    let confidence = if params.calibrated {
+        calibrated_confidence(&diffused.confidence, &diffused.labels, labels, scores)
+    } else {
+        diffused.confidence
+    };
+    let doubtful = |(_, confidence): &(_, &f32)| f64::from(**confidence) < params.abstain;
+    let doubtful = labels.iter_mut().zip(&confidence).filter(doubtful);
+    doubtful.for_each(|(label, _)| *label = 0);
+    confidence
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn confidence(share: f32, diffused: u32, label: u32, score: f32) -> f32 {
+        calibrated_confidence(&[share], &[diffused], &[label], &[score])[0]
+    }
+
+    #[test]
+    fn more_share_and_more_score_are_surer() {
+        assert!(confidence(0.9, 1, 1, 0.9) > confidence(0.6, 1, 1, 0.9));
+        assert!(confidence(0.9, 1, 1, 0.9) > confidence(0.9, 1, 1, 0.6));
+        assert!(confidence(0.9, 0, 0, 0.5) > confidence(0.6, 0, 0, 0.5));
+        assert!(confidence(0.9, 1, 0, 0.5) < confidence(0.6, 1, 0, 0.5));
+    }
+
+    #[test]
+    fn confidence_is_a_probability_whatever_comes() {
+        for value in [f32::NAN, f32::INFINITY, -1.0, 0.0, 1.0] {
+            let found = confidence(value, 1, 1, value);
+            assert!((0.0..=1.0).contains(&found) || value.is_nan());
+        }
+    }
+
+    #[test]
+    fn doubtful_labels_are_left_out() {
+        let diffused = Diffused {
+            labels: vec![1, 1],
+            confidence: vec![0.99, 0.4],
+            convergence: crate::Convergence::default(),
+        };
+        let params = Params {
+            calibrated: false,
+            abstain: 0.5,
+            ..Params::paper()
+        };
+        let mut labels = [1, 1];
+        assert_eq!(judge(&mut labels, diffused, &[1.0], &params), [0.99, 0.4]);
+        assert_eq!(labels, [1, 0]);
+    }
+}
