@@ -1,6 +1,7 @@
 """The method as slow, plain float64 NumPy and SciPy, straight from its definition: what is right."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import distance_transform_cdt
@@ -57,7 +58,7 @@ def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1, heights=No
 
 def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, heights=None, centers=None):
     """`views` holds masks (M, H, W), categories (M,) and a camera matrix for each camera. Labels, and the instances
-    (camera, mask), both from 0, of each label from 1. `heights` and the `centers` of the cameras are as in `segment`."""
+    (camera, mask), both from 0, of each label from 1. `heights`, and `centers` of the cameras, are as in `segment`."""
     seen = [project(points, matrix, masks.shape[1:], min_depth_m) for masks, _, matrix in views]
     in_view = np.unique(np.concatenate([rows for rows, _ in seen]))
     xyz = points[in_view, :3].astype(np.float64)
@@ -173,7 +174,7 @@ def object_interval(distances, weights, beside, params):
         return others > 0.25 * (others + len(group))
 
     chains = [[groups[0]]]
-    for before, group in zip(groups, groups[1:], strict=False):
+    for before, group in pairwise(groups):
         last = distances[before[-1]]
         near = distances[group[0]] - last <= max(params.bridged_gap, 0.1 * last)
         lighter = group if weights[group].sum() <= weights[before].sum() else before

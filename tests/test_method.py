@@ -50,7 +50,8 @@ def test_random_scenes_equal_the_oracle(seed, added):
 
 
 def random_scene(generator, added=False):
-    """A scene, with the parameters of the paper's method or with those `added` to it, and with what goes wrong in life: overlapping and empty masks, points behind, missing and doubled."""
+    """A scene with what goes wrong in life: overlapping and empty masks, points behind, missing and doubled; with the
+    parameters of the paper's method or with those `added` to it too."""
     height, width = generator.integers(8, 60, 2)
     focal_px = generator.uniform(0.5, 1.5) * width
     camera = ldls.Camera(

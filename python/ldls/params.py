@@ -21,19 +21,19 @@ class Params:
         iterations: Number of products z <- A z + b, 1 to 100000; `None` for the converged solution.
         remove_outliers: Whether an instance keeps only its largest connected component, and parts like it.
         ground_edges: Factor on the weight of an edge between a point of the ground and one that is not, 0 to 1: labels
-            leak along the ground, whose points lie close together along a scan line. 1 for none of it. Needs the ground,
-            which takes about 1 ms for 20,000 points in view.
-        ground_clearance: Points nearer to the ground than this, in metres, become background in the end: what touches the
-            ground cannot be told from it; 0 to 1, 0 for none of it.
+            leak along the ground, whose points lie close together along a scan line. 1 for none of it. Needs the
+            ground, which takes about 1 ms for 20,000 points in view.
+        ground_clearance: Points nearer to the ground than this, in metres, become background in the end: what touches
+            the ground cannot be told from it; 0 to 1, 0 for none of it.
         local_ground: Whether the ground follows kerbs and lawns where enough of it is seen, and not a smooth surface
             only. Costs about as much again as the surface.
-        depth_gap: Gap in metres between the object of a mask and what is seen before and behind it: of the mask's points
-            off the ground, in groups by their distance to the camera, the group with the most weight is the object, and
-            others get no label from the mask. From 20 m on gaps are 3 % of the distance. 0 for no depth groups. Costs
-            about 1 ms for 20 masks.
+        depth_gap: Gap in metres between the object of a mask and what is seen before and behind it: of the mask's
+            points off the ground, in groups by their distance to the camera, the group with the most weight is the
+            object, and others get no label from the mask. From 20 m on gaps are 3 % of the distance. 0 for no depth
+            groups. Costs about 2 ms for 20 masks.
         bridged_gap: Gap in metres, 10 % of the distance from 15 m on, across which groups are one object unless the
-            lighter one goes on beside the mask: the long side of a bus has such gaps, and a wall behind a person goes on.
-            0 for none of it. Part of the depth groups.
+            lighter one goes on beside the mask: the long side of a bus has such gaps, and a wall behind a person goes
+            on. 0 for none of it. Part of the depth groups.
         edge_margin: Share of the shorter side of a mask by which its edge may be off, at least 3 pixels and at most 10.
             Points so near to it and as far away as its object get no label from background pixels, and their neighbours
             decide. 0 for none of it. Part of the depth groups.

@@ -11,8 +11,8 @@
     labels = stages.remove_outliers(A, z.argmax(axis=1), depths=depths, heights=heights)
     confidence = stages.confidence(z, labels, masks)
 
-equals `ldls.segment` on the points in view; without heights and depths, and with the options of `Params.paper()`, it is the
-paper's method. Options stand for the same as in `ldls.Params`. Needs the extra `eval`.
+equals `ldls.segment` on the points in view; without heights and depths, and with the options of `Params.paper()`, it is
+the paper's method. Options stand for the same as in `ldls.Params`. Needs the extra `eval`.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class DepthGroups:
     """The object of each of M masks among n points in view, by distance to the camera.
 
     Attributes:
-        intervals: (M, 2) float64 nearest and farthest distance of the object in metres; NaN where no point off the ground
-            falls on the mask, and all then may be of it.
+        intervals: (M, 2) float64 nearest and farthest distance of the object in metres; NaN where no point off the
+            ground falls on the mask, and all then may be of it.
         distances: (n,) float64 distance of each point to the camera in metres.
         unsure: (n,) bool: whether a point stands beside the edge of a mask, as far away as its object, so that
             background pixels say nothing of it.

@@ -3,8 +3,8 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use ldls_core::{
-    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, View, diffuse,
-    keep_largest_components, project, segment,
+    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, View, diffuse, project,
+    remove_outliers, segment,
 };
 use rayon::prelude::*;
 use std::hint::black_box;
@@ -89,7 +89,7 @@ fn stages(criterion: &mut Criterion) {
         let in_view = project(cloud, &images, false).expect("points in view");
         let (points, uv) = (&in_view.points, &in_view.sightings[0].uv);
         let mut labels = masks
-            .pixel_labels(uv, params.window, params.pixel_weight)
+            .pixel_labels(uv, params.window, params.pixel_weight, |_, _| true)
             .expect("labels");
         let neighbors = Neighbors::search(points, params.neighbors);
         let mut graph =
@@ -97,7 +97,7 @@ fn stages(criterion: &mut Criterion) {
         graph.normalize_rows(&mut labels).expect("rows");
         let exact = || {
             let mut a = PointGraph::<f64>::from_neighbors(points, &neighbors, params.sigma)?;
-            let mut b = masks.pixel_labels(uv, params.window, params.pixel_weight)?;
+            let mut b = masks.pixel_labels(uv, params.window, params.pixel_weight, |_, _| true)?;
             a.normalize_rows(&mut b)?;
             Ok((a, b))
         };
@@ -112,7 +112,14 @@ fn stages(criterion: &mut Criterion) {
             b.iter(|| black_box(project(cloud, &images, false)));
         });
         group.bench_function(BenchmarkId::new("pixel labels", n), |b| {
-            b.iter(|| black_box(masks.pixel_labels::<f32>(uv, params.window, params.pixel_weight)));
+            b.iter(|| {
+                black_box(masks.pixel_labels::<f32>(
+                    uv,
+                    params.window,
+                    params.pixel_weight,
+                    |_, _| true,
+                ))
+            });
         });
         group.bench_function(BenchmarkId::new("neighbors", n), |b| {
             b.iter(|| black_box(Neighbors::search(points, params.neighbors)));
@@ -142,7 +149,7 @@ fn stages(criterion: &mut Criterion) {
             });
         });
         group.bench_function(BenchmarkId::new("components", n), |b| {
-            b.iter(|| black_box(keep_largest_components(&graph, &diffused.labels)));
+            b.iter(|| black_box(remove_outliers(&graph, &diffused.labels, 1.0, |_, _| true)));
         });
         group.bench_function(BenchmarkId::new("whole frame", n), |b| {
             b.iter(|| black_box(segment(cloud, &[view], 0.5, &params, false)));

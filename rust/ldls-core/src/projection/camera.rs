@@ -21,7 +21,7 @@ pub struct Camera {
     /// Place of the camera in the lidar frame, in metres.
     center: [f64; 3],
     /// Set if the camera looks along z of the lidar frame, so that this is no lidar's but like the camera's own.
-    camera_like: bool,
+    looks_along_z: bool,
 }
 
 /// The position of a point relative to an image.
@@ -68,7 +68,7 @@ impl Camera {
             intrinsic: Matrix3::identity(),
             min_depth_m,
             center: center(&transform),
-            camera_like: transform[(2, 2)] > std::f64::consts::FRAC_1_SQRT_2,
+            looks_along_z: transform[(2, 2)] > std::f64::consts::FRAC_1_SQRT_2,
         })
     }
 
@@ -123,7 +123,7 @@ impl Camera {
     /// the camera looks along its z, as in clouds that are in the camera's own frame.
     pub(crate) fn upright(&self, xyz: &[f64; 3]) -> [f64; 3] {
         let [x, y, z] = self.relative(xyz);
-        if self.camera_like {
+        if self.looks_along_z {
             [z, -x, -y]
         } else {
             [x, y, z]
