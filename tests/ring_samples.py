@@ -3,6 +3,7 @@
 import numpy as np
 
 import ldls
+from ldls.simulation import sample_frame
 
 
 def random_ring(seed):
@@ -25,6 +26,21 @@ def random_ring(seed):
                 mask[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = True
         views.append((pixels, generator.integers(1, 3, 4), one))
     return points, views
+
+
+def street_ring(overlap_px=160):
+    """Points of the simulated street, and its image as those of two cameras that look apart."""
+    frame = sample_frame()
+    (image,) = frame.images
+    pixels, camera = image.masks.to_array(), image.camera
+    width = pixels.shape[2]
+    views = []
+    for columns in (slice(0, (width + overlap_px) // 2), slice((width - overlap_px) // 2, width)):
+        projection = camera.projection.copy()
+        projection[0] -= columns.start * projection[2]
+        masks = ldls.InstanceMasks.from_array(pixels[:, :, columns], categories=image.masks.categories)
+        views.append(ldls.View(masks, ldls.Camera(projection=projection, T_camera_lidar=camera.T_camera_lidar)))
+    return frame.points, views
 
 
 def as_views(views):

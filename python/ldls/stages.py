@@ -74,6 +74,19 @@ class DepthGroups:
         """The arrays as the core takes them."""
         return self.intervals, self.distances, self.unsure
 
+    def of_point(self, row: int) -> DepthGroups:
+        """The depth groups of one of the points alone."""
+        return DepthGroups(self.intervals, self.distances[row : row + 1], self.unsure[row : row + 1])
+
+    def behind_m(self, mask: int) -> NDArray[np.float64]:
+        """How far behind the object of a mask, numbered from 0, each point (n,) is, in metres; negative before it.
+
+        0 as far away as the object, and for all where it has no interval: the mask may label these points.
+        """
+        near, far = self.intervals[mask]
+        behind = np.maximum(self.distances - far, 0.0) + np.minimum(self.distances - near, 0.0)
+        return np.where(np.isnan(behind), 0.0, behind)
+
 
 def project(
     points: ArrayLike,

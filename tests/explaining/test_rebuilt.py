@@ -8,7 +8,7 @@ import ldls
 from ldls import stages
 from ldls.explaining import rebuild
 from ldls.simulation import sample_frame
-from ring_samples import as_views, random_ring
+from ring_samples import as_views, random_ring, street_ring
 
 
 def winners(result):
@@ -17,10 +17,10 @@ def winners(result):
     return z.argmax(axis=1)
 
 
-def street():
+def street(params=None):
     frame = sample_frame()
     (image,) = frame.images
-    return ldls.segment(frame.points, image.masks, image.camera)
+    return ldls.segment(frame.points, image.masks, image.camera, params=params)
 
 
 def ring(seed):
@@ -33,6 +33,10 @@ def ring(seed):
     "result",
     [
         pytest.param(street, id="one camera, a simulated street"),
+        pytest.param(lambda: street(ldls.Params.paper()), id="the paper's method"),
+        pytest.param(lambda: street(ldls.Params(depth_gap=0)), id="ground alone"),
+        pytest.param(lambda: street(ldls.Params(ground_edges=1, ground_clearance=0)), id="depth groups alone"),
+        pytest.param(lambda: ldls.segment(*street_ring()), id="two cameras in a street"),
         *(pytest.param(lambda seed=seed: ring(seed), id=f"ring {seed}") for seed in range(5)),
     ],
 )
@@ -53,6 +57,38 @@ def test_rows_sum_to_one_and_a_point_that_two_cameras_see_has_the_pixels_of_both
     row_sums = system.graph.sum(axis=1) + system.pixel_labels.mass
     np.testing.assert_allclose(system.A.sum(axis=1) + system.pixel_labels.mass / row_sums, 1, rtol=1e-5)
     np.testing.assert_allclose((system.A.multiply(row_sums[:, None]) - system.graph).max(), 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("params", [ldls.Params(), ldls.Params.paper()], ids=["best", "paper"])
+def test_outlier_removal_by_heights_and_depth_groups_has_the_labels_of_the_result(params):
+    result = street(params)
+    system = rebuild(result)
+    diffused = result.diffused_labels[result.in_view]
+    depths = system.depths[0]
+    labels = stages.remove_outliers(system.A, diffused, depths=depths, heights=system.heights)
+    np.testing.assert_array_equal(labels, result.labels[result.in_view])
+    assert (system.heights is None) == (depths is None) == (params == ldls.Params.paper())
+
+
+def test_each_view_has_depth_groups_of_the_points_that_it_sees():
+    result = ldls.segment(*street_ring())
+    system = rebuild(result)
+    assert system.heights.shape == result.in_view.shape
+    for seen, depths in zip(result.views, system.depths, strict=True):
+        assert len(depths.distances) == len(seen.in_view)
+        assert len(depths.intervals) == len(seen.view.masks)
+        xyz = seen.view.camera.T_camera_lidar @ np.c_[result.points[seen.in_view, :3], np.ones(len(seen.in_view))].T
+        place = np.linalg.solve(seen.view.camera.projection[:, :3], seen.view.camera.projection[:, 3])
+        np.testing.assert_allclose(depths.distances, np.linalg.norm(xyz[:3].T + place, axis=1), rtol=1e-5)
+
+
+def test_points_before_and_behind_an_object_are_as_far_from_it_as_they_lie():
+    intervals = np.array([[5.0, 7.0], [np.nan, np.nan]])
+    depths = stages.DepthGroups(intervals, np.array([4.5, 5, 6, 7, 9]), np.array([0, 0, 0, 0, 1], bool))
+    np.testing.assert_array_equal(depths.behind_m(0), [-0.5, 0, 0, 0, 2])
+    np.testing.assert_array_equal(depths.behind_m(1), np.zeros(5))
+    np.testing.assert_array_equal(depths.of_point(4).behind_m(0), [2])
+    assert depths.of_point(4).unsure.tolist() == [True]
 
 
 @pytest.mark.parametrize("kept", [0, 1], ids=["no point in view", "one point in view"])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import ldls.stages as stages
 from ldls._optional import require
+from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView
 
@@ -30,6 +31,9 @@ class Rebuilt:
 
     Attributes:
         in_view: (n,) int64: row in the cloud of each point of the graph.
+        heights: (n,) float64 height of each point above the ground in metres; NaN where no ground is found. None where
+            the parameters need none.
+        depths: Depth groups of each view, of the points that it sees; None where the parameters ask for none.
         graph: (n, n) sparse: weights of the point edges, 1 to the point itself; not normalised.
         pixel_labels: Weights of the pixel edges by label, those of all cameras added up; not normalised.
         A: (n, n) sparse: the point edges, normalised together with the pixel edges.
@@ -37,6 +41,8 @@ class Rebuilt:
     """
 
     in_view: NDArray[np.int64]
+    heights: NDArray[np.float64] | None
+    depths: tuple[stages.DepthGroups | None, ...]
     graph: csr_array
     pixel_labels: stages.PixelLabels
     A: csr_array
@@ -50,19 +56,57 @@ def rebuild(result: Segmentation) -> Rebuilt:
         ImportError: The extra `eval` is not installed.
     """
     points, params = result.points[result.in_view], result.params
+    heights = _heights(result)
+    depths = tuple(depth_groups_of(result, seen, heights) for seen in result.views)
     indices, _ = stages.neighbors(points, params.neighbors, threads=params.threads)
-    graph = stages.point_graph(points, indices, sigma=params.sigma, threads=params.threads)
-    labels = _pixel_labels(result)
+    graph = stages.point_graph(
+        points,
+        indices,
+        heights=heights,
+        sigma=params.sigma,
+        ground_edges=params.ground_edges,
+        threads=params.threads,
+    )
+    labels = _pixel_labels(result, depths)
     A, b = stages.normalize_rows(graph, labels)
-    return Rebuilt(in_view=result.in_view, graph=graph, pixel_labels=labels, A=A, b=b)
+    return Rebuilt(in_view=result.in_view, heights=heights, depths=depths, graph=graph, pixel_labels=labels, A=A, b=b)
 
 
-def _pixel_labels(result: Segmentation) -> stages.PixelLabels:
+def _heights(result: Segmentation) -> NDArray[np.float64] | None:
+    params = result.params
+    needed = params.ground_edges < 1 or params.ground_clearance > 0 or params.depth_gap > 0
+    if not needed or not result.views:
+        return None
+    points, camera = result.points[result.in_view], result.views[0].view.camera
+    return stages.ground(points, camera, local_ground=params.local_ground, threads=params.threads)
+
+
+def depth_groups_of(
+    result: Segmentation, seen: SeenView, heights: NDArray[np.float64] | None, masks: InstanceMasks | None = None
+) -> stages.DepthGroups | None:
+    """The depth groups of a view, or of some of its `masks`; None where the parameters ask for none."""
+    params = result.params
+    if heights is None or not params.depth_gap > 0:
+        return None
+    return stages.depth_groups(
+        result.points[seen.in_view],
+        seen.pixels,
+        seen.view.masks if masks is None else masks,
+        seen.view.camera,
+        heights[np.searchsorted(result.in_view, seen.in_view)],
+        depth_gap=params.depth_gap,
+        bridged_gap=params.bridged_gap,
+        edge_margin=params.edge_margin,
+        threads=params.threads,
+    )
+
+
+def _pixel_labels(result: Segmentation, depths: tuple[stages.DepthGroups | None, ...]) -> stages.PixelLabels:
     sparse = require("scipy.sparse", "eval")
     shape = (len(result.in_view), len(result.instances) + 1)
     weights, mass = sparse.csr_array(shape, dtype=np.float32), np.zeros(shape[0], np.float32)
-    for seen in result.views:
-        own = _pixel_labels_of(seen, result)
+    for seen, groups in zip(result.views, depths, strict=True):
+        own = _pixel_labels_of(seen, groups, result)
         rows = np.searchsorted(result.in_view, seen.in_view)
         entries = own.weights.tocoo()
         place = (rows[entries.row], np.array([0, *seen.labels])[entries.col])
@@ -71,12 +115,13 @@ def _pixel_labels(result: Segmentation) -> stages.PixelLabels:
     return stages.PixelLabels(weights, mass)
 
 
-def _pixel_labels_of(seen: SeenView, result: Segmentation) -> stages.PixelLabels:
+def _pixel_labels_of(seen: SeenView, depths: stages.DepthGroups | None, result: Segmentation) -> stages.PixelLabels:
     params = result.params
     return stages.pixel_labels(
         seen.pixels,
         seen.view.masks,
         window=params.window,
+        depths=depths,
         pixel_weight=params.pixel_weight,
         threads=params.threads,
     )
