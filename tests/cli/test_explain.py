@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 import ldls
 from ldls.cli import app
 from ldls.cli.chosen_point import chosen_point
+from ldls.simulation import sample_frame
 from ring_samples import as_views, random_ring
 
 run = CliRunner().invoke
@@ -31,10 +32,25 @@ def frame(tmp_path_factory):
     pixels[0, 23:38, 33:47] = True
     masks = ldls.InstanceMasks.from_array(pixels, categories=[1], scores=[0.9])
     camera = ldls.Camera(projection=[[100, 0, 40], [0, 100, 30], [0, 0, 1]])
-    result = ldls.segment(points, masks, camera)
+    result = ldls.segment(points, masks, camera, params=ldls.Params.paper())
     path = tmp_path_factory.mktemp("explain") / "frame.npz"
     ldls.save(result, path)
     return result, path
+
+
+@pytest.fixture(scope="module")
+def street(tmp_path_factory):
+    """A result of the best known parameters and its file, with the explanation of some of its points."""
+    sample = sample_frame()
+    (image,) = sample.images
+    result = ldls.segment(sample.points, image.masks, image.camera)
+    path = tmp_path_factory.mktemp("explain") / "street.npz"
+    ldls.save(result, path)
+    points = [
+        *np.flatnonzero(result.labels < result.diffused_labels)[::15],
+        *np.flatnonzero(result.direct_labels > result.labels)[::40],
+    ]
+    return path, [ldls.explain(result, int(point)) for point in points]
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +94,58 @@ def test_a_point_that_outlier_removal_took_away(frame):
         "the largest has 120: removed."
     )
     assert "this point's, removed" in outcome.output
-    assert "background, person (label 1) before outlier removal" in outcome.output
+    assert "background, person (label 1) after diffusion" in outcome.output
+
+
+def test_a_point_near_the_ground_says_how_near(street):
+    path, explanations = street
+    found = next(each for each in explanations if each.cleared)
+    verdict, place, course, *_ = explain(found.point, path).output.splitlines()
+    assert verdict.startswith(f"Point {found.point} is background: diffusion gave it to ")
+    assert verdict.endswith(" the ground, nearer than 4 cm.")
+    assert f"{abs(found.height_m):.2f} m {'above' if found.height_m >= 0 else 'below'} the ground." in place
+    kept = f"{found.names[found.diffused_label]} (label {found.diffused_label})"
+    assert f"After diffusion: {kept}. After outlier removal: {kept}" in course
+    assert course.endswith(". Near the ground: background.")
+
+
+def test_a_mask_that_does_not_count_says_how_far_its_object_is(street):
+    path, explanations = street
+    found = next(each for each in explanations if "outside the depth group" in each.verdict)
+    verdict, *lines = explain(found.point, path).output.splitlines()
+    offset = verdict.partition("it is ")[2].rstrip(".")
+    name = offset.removeprefix("outside the depth group of ").rpartition(", ")[0]
+    assert f"It is {offset}: pixels of {name} do not count." in lines
+    assert any(f"{name}, not counted" in line for line in lines)
+    assert any("label counts" in line or "not all labels count" in line for line in lines)
+
+
+def test_background_beside_a_mask_does_not_count(street):
+    path, explanations = street
+    found = next(each for each in explanations if each.sights[0].beside and each.sights[0].window[0].label == 0)
+    objects = " and of ".join(f"{found.names[label]} (label {label})" for label in found.sights[0].beside)
+    output = explain(found.point, path).output
+    assert f"It is beside the edge of {objects}, as far away: background pixels do not count." in output
+    assert "background, not counted" in output
+
+
+def test_parts_are_said_to_be_kept_and_others_why_not(street):
+    path, explanations = street
+    removed = next(each for each in explanations if each.components and each.components.removed)
+    output = explain(removed.point, path).output
+    assert "less than 10 % of the largest, which has" in output.splitlines()[0]
+    assert "this point's, removed: too small" in output
+    # the truck behind a pole
+    course, *lines = explain(16999, path).output.splitlines()[2:]
+    assert course.endswith("After outlier removal: truck (label 6), a part kept beside the largest.")
+    assert any("this point's, kept: as far away" in line for line in lines)
+    assert any("100.0 %" in line for line in lines)
+
+
+def test_edges_that_leave_the_ground_are_said_to_be_weakened(street):
+    path, explanations = street
+    found = next(each for each in explanations if any(near.leaves_ground for near in each.neighbors))
+    assert ", weakened: leaves the ground" in explain(found.point, path).output
 
 
 def test_a_background_point_has_no_components(frame):

@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import ldls
 from ldls.explaining import Explanation
 from ring_samples import as_views, random_ring
 
-PARAMS = ldls.Params(neighbors=6, sigma=0.3, pixel_weight=0.01, iterations=40)
+PARAMS = replace(ldls.Params.paper(), neighbors=6, sigma=0.3, pixel_weight=0.01, iterations=40)
 
 
 @pytest.fixture(scope="module", params=[0, 7], ids="ring {}".format)
@@ -263,21 +264,33 @@ def test_verdicts_are_sentences_with_both_sizes(ring):
 
 
 def explanation(**changes):
-    from ldls.explaining import Components, Likelihood
+    from ldls.explaining import Likelihood
 
     fields = {
         "point": 7, "xyz": (1.0, 2.0, 3.0), "label": 1, "diffused_label": 1, "sights": (),
         "names": {-1: "out of view", 0: "background", 1: "car"},
         "likelihoods": (Likelihood(label=1, value=0.5, share=1.0),),
-        "components": Components(label=1, sizes=(5,), own=0, removal=True),
+        "components": components(5, own=0),
     }  # fmt: skip
     return Explanation(**fields | changes)
 
 
-def tied(own):
+def components(*sizes, own, at_depth=None, part_size=1.0):
     from ldls.explaining import Components
 
-    return Components(label=1, sizes=(5, 5, 1), own=own, removal=True)
+    return Components(label=1, sizes=sizes, at_depth=at_depth or sizes, own=own, removal=True, part_size=part_size)
+
+
+def sight(direct_label, *window, **changes):
+    from ldls.explaining import Sight, WindowCount
+
+    counts = tuple(
+        WindowCount(label=m, mask=m - 1 if m else None, pixels=9, counts=not b, behind_m=b) for m, b in window
+    )
+    return Sight(
+        camera="c", outcome="in view", image_size=(9, 9), depth_m=8.0, pixel=(3.0, 4.0), nearest_pixel=(3, 4),
+        direct_label=direct_label, window_pixels=25, window=counts, **changes,
+    )  # fmt: skip
 
 
 def likelihoods(*values):
@@ -292,13 +305,13 @@ def likelihoods(*values):
     [
         pytest.param({}, "Point 7 is car (label 1): no other label reached it.", id="alone"),
         pytest.param(
-            {"label": 0, "components": tied(1)},
+            {"label": 0, "components": components(5, 5, 1, own=1)},
             "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 5 points, "
             "as large as the one kept, which has the lowest row: removed.",
             id="as large as the kept one",
         ),
         pytest.param(
-            {"label": 0, "components": tied(2)},
+            {"label": 0, "components": components(5, 5, 1, own=2)},
             "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 1 point, "
             "the largest has 5: removed.",
             id="one point",
@@ -328,6 +341,52 @@ def likelihoods(*values):
             "Point 7 is car (label 1): no label reached it.",
             id="nothing",
         ),
+        pytest.param(
+            {"label": 0, "components": components(1200, 85, own=1, part_size=0.1)},
+            "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 85 points, less "
+            "than 10 % of the largest, which has 1,200: removed.",
+            id="too small for a part",
+        ),
+        pytest.param(
+            {"label": 0, "components": components(90, 90, own=1, part_size=0.1, at_depth=(90, 18))},
+            "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 90 points, of "
+            "which 20.0 % are as far away as the object: removed.",
+            id="not as far away",
+        ),
+        pytest.param(
+            {"components": components(1200, 180, own=1, part_size=0.1, at_depth=(1200, 144))},
+            "Point 7 is car (label 1): no other label reached it.",
+            id="a part, four fifths as far away",
+        ),
+        pytest.param(
+            {"label": 0, "height_m": 0.0396, "clearance_m": 0.04},
+            "Point 7 is background: diffusion gave it to car (label 1), but it is 3.9 cm above the ground, nearer than "
+            "4 cm.",
+            id="near the ground",
+        ),
+        pytest.param(
+            {"label": 0, "height_m": -0.12, "clearance_m": 0.055},
+            "Point 7 is background: diffusion gave it to car (label 1), but it is 12 cm below the ground, nearer than "
+            "5.5 cm.",
+            id="below the ground",
+        ),
+        pytest.param(
+            {"label": 0, "diffused_label": 0, "components": None, "sights": (sight(1, (0, None), (1, 7.94)),)},
+            "Point 7 is background: no label reached it; it is outside the depth group of car (label 1), 7.9 m "
+            "behind it.",
+            id="behind the object",
+        ),
+        pytest.param(
+            {"label": 0, "diffused_label": 0, "components": None, "sights": (sight(1, (1, -0.04)),) * 2},
+            "Point 7 is background: no label reached it; it is outside the depth group of car (label 1), less than "
+            "0.1 m before it.",
+            id="before the object, said once",
+        ),
+        pytest.param(
+            {"sights": (sight(0, (0, None), (1, -1.2)),)},
+            "Point 7 is car (label 1): no other label reached it.",
+            id="beside a mask that does not count",
+        ),
     ],
 )
 def test_rare_verdicts(changes, verdict):
@@ -336,7 +395,7 @@ def test_rare_verdicts(changes, verdict):
 
 def test_without_outlier_removal_nothing_is_removed(ring):
     points, views, result = ring
-    kept = ldls.segment(points, as_views(views), params=ldls.Params(**{**vars(PARAMS), "remove_outliers": False}))
+    kept = ldls.segment(points, as_views(views), params=replace(PARAMS, remove_outliers=False))
     point = int(np.flatnonzero(result.labels < result.diffused_labels)[0])
     found = ldls.explain(kept, point)
     assert found.components.own > 0
@@ -377,7 +436,7 @@ def test_provenance_is_where_the_pixels_are_that_decide(ring):
 
 
 def test_a_real_frame_explains_its_labels(frame_571):
-    result = ldls.segment(frame_571.points, frame_571.masks, frame_571.camera)
+    result = ldls.segment(frame_571.points, frame_571.masks, frame_571.camera, params=ldls.Params.paper())
     z = frame_571.expected["likelihood"]
     for row in range(0, len(result.in_view), 4001):
         found = ldls.explain(result, int(result.in_view[row]))

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ldls.explaining import Components, Explanation, Likelihood, Neighbor, Sight
-from ldls.explaining.explanation import count_points, named, percent
+from ldls.explaining.explanation import away, count_points, named, percent
 
 SHOWN_SHARE = 0.0005
 """Share below which a likelihood is not listed, for it would read 0.0 %."""
@@ -22,6 +22,7 @@ def tables_of(explanation: Explanation) -> Iterator[Table | str]:
     yield _place(explanation)
     yield _course(explanation)
     yield sight_table(explanation)
+    yield from depth_sentences(explanation)
     if explanation.edges is None:
         return
     yield likelihood_table(explanation)
@@ -49,6 +50,19 @@ def sight_table(explanation: Explanation) -> Table:
             escape(_window(explanation, sight)),
         )
     return table
+
+
+def depth_sentences(explanation: Explanation) -> Iterator[str]:
+    """A sentence on each label of a window that does not count, for each camera."""
+    for sight in explanation.sights:
+        who = f"By {sight.camera} it is" if len(explanation.sights) > 1 else "It is"
+        for each in sight.window:
+            name = named(explanation, each.label)
+            if each.behind_m:
+                yield f"{who} outside the depth group of {name}, {away(each.behind_m)}: pixels of {name} do not count."
+            elif not each.counts:
+                objects = " and of ".join(named(explanation, label) for label in sight.beside)
+                yield f"{who} beside the edge of {objects}, as far away: background pixels do not count."
 
 
 def likelihood_table(explanation: Explanation) -> Table:
@@ -89,23 +103,27 @@ def edge_table(explanation: Explanation) -> Table:
             f"{each.distance_m:.3f} m",
             f"{each.weight:.4f}",
             percent(each.share),
-            escape(_object(explanation, each)),
+            escape(_object(explanation, each)) + (", weakened: leaves the ground" if each.leaves_ground else ""),
         )
-    table.add_row(f"its {pixels} pixels", "", "", percent(explanation.edges.pixels), "")
+    table.add_row(f"its {pixels} pixels", "", "", percent(explanation.edges.pixels), _labels_of_pixels(explanation))
     return table
 
 
 def component_table(explanation: Explanation, components: Components) -> Table:
     """The components of the points that diffusion gave one label, the largest and that of the point."""
     table = Table(title=escape(f"components of {named(explanation, components.label)}"))
+    parts = components.removal and components.part_size < 1
     table.add_column("points", justify="right")
+    if parts:
+        table.add_column("as far away", justify="right")
     table.add_column("")
     listed = sorted({*range(min(SHOWN_COMPONENTS, len(components.sizes))), components.own})
     for number in listed:
-        table.add_row(f"{components.sizes[number]:,}", _component(components, number))
+        as_far = [percent(components.at_depth[number] / components.sizes[number])] if parts else []
+        table.add_row(f"{components.sizes[number]:,}", *as_far, _component(components, number))
     rest = sum(components.sizes) - sum(components.sizes[number] for number in listed)
     if rest:
-        table.add_row(f"{rest:,}", f"in {len(components.sizes) - len(listed)} more")
+        table.add_row(f"{rest:,}", *([""] if parts else []), f"in {len(components.sizes) - len(listed)} more")
     return table
 
 
@@ -113,7 +131,10 @@ def _place(explanation: Explanation) -> str:
     x, y, z = explanation.xyz
     place = f"It lies at x {x:.2f}, y {y:.2f}, z {z:.2f} m in the lidar frame"
     distance = math.hypot(x, y, z)
-    return f"{place}, {distance:.1f} m away." if math.isfinite(distance) else f"{place}."
+    away = f", {distance:.1f} m away" if math.isfinite(distance) else ""
+    height = explanation.height_m
+    side = "" if height is None else f", {abs(height):.2f} m {'above' if height >= 0 else 'below'} the ground"
+    return f"{place}{away}{side}."
 
 
 def _course(explanation: Explanation) -> str:
@@ -123,10 +144,12 @@ def _course(explanation: Explanation) -> str:
     direct = (
         named(explanation, label) + (f" by {camera}" if len(labels) > 1 else "") for camera, label in labels.items()
     )
-    diffused, final = (named(explanation, label) for label in (explanation.diffused_label, explanation.label))
+    components, diffused = explanation.components, named(explanation, explanation.diffused_label)
     course = f"Direct projection: {', '.join(direct)}. After diffusion: {diffused}."
-    removal = explanation.components is not None and explanation.components.removal
-    return f"{course} After outlier removal: {final}." if removal else course
+    if components is not None and components.removal:
+        part = ", a part kept beside the largest" if components.own and not components.removed else ""
+        course += f" After outlier removal: {named(explanation, 0) if components.removed else diffused}{part}."
+    return f"{course} Near the ground: {named(explanation, 0)}." if explanation.cleared else course
 
 
 def _nearest_pixel(explanation: Explanation, sight: Sight) -> str:
@@ -136,7 +159,11 @@ def _nearest_pixel(explanation: Explanation, sight: Sight) -> str:
 
 
 def _window(explanation: Explanation, sight: Sight) -> str:
-    lines = (f"{each.pixels} of {sight.window_pixels}: {named(explanation, each.label)}" for each in sight.window)
+    lines = (
+        f"{each.pixels} of {sight.window_pixels}: {named(explanation, each.label)}"
+        + ("" if each.counts else ", not counted")
+        for each in sight.window
+    )
     return "\n".join(lines) or "-"
 
 
@@ -165,7 +192,14 @@ def _provenance(explanation: Explanation) -> str:
 
 def _object(explanation: Explanation, each: Neighbor) -> str:
     given = named(explanation, each.diffused_label)
-    return given if each.label == each.diffused_label else f"background, {given} before outlier removal"
+    return given if each.label == each.diffused_label else f"background, {given} after diffusion"
+
+
+def _labels_of_pixels(explanation: Explanation) -> str:
+    counts = {each.counts for sight in explanation.sights for each in sight.window}
+    if False not in counts:
+        return ""
+    return "not all labels count" if True in counts else "no label counts"
 
 
 def _island(explanation: Explanation) -> str:
@@ -182,5 +216,8 @@ def _component(components: Components, number: int) -> str:
     own = "this point's" if number == components.own else ""
     if not components.removal:
         return own
-    fate = "kept" if number == 0 else "removed"
+    fate = "kept" if components.keeps(number) else "removed"
+    if components.part_size < 1 and number > 0:
+        too_small = components.too_small(number)
+        fate += ": too small" if too_small else f": {'' if components.keeps(number) else 'not '}as far away"
     return f"{own}, {fate}" if own else fate

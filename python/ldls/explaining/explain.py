@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+import ldls.stages as stages
 from ldls._optional import require
 from ldls.errors import InputError, ParameterError
 from ldls.explaining.explanation import Components, Edges, Explanation, Island, Likelihood, Neighbor, Provenance
@@ -38,7 +39,7 @@ def explain(result: Segmentation, point: int) -> Explanation:
     if len(result.labels) != len(result.points):
         raise InputError(f"result: {len(result.labels)} labels, expected one for each of {len(result.points)} points")
     x, y, z = result.points[point, :3].astype(np.float64).tolist()
-    seen: dict[str, Any] = {}
+    seen: dict[str, Any] = {"sights": sights_of(result, point, None)}
     row = int(np.searchsorted(result.in_view, point))
     if row < len(result.in_view) and result.in_view[row] == point:
         seen = _in_the_graph(result, rebuild(result), row)
@@ -48,7 +49,6 @@ def explain(result: Segmentation, point: int) -> Explanation:
         label=int(result.labels[point]),
         diffused_label=int(result.diffused_labels[point]),
         names={-1: "out of view", 0: "background", **{each.label: each.name for each in result.instances}},
-        sights=sights_of(result, point),
         **seen,
     )
 
@@ -73,12 +73,15 @@ def _in_the_graph(result: Segmentation, system: Rebuilt, row: int) -> dict[str, 
     own = float(_entries(system.A, row)[row])
     flowing = sum(each.share for each in neighbors)
     return {
+        "sights": sights_of(result, int(system.in_view[row]), system),
         "edges": Edges(own=own, neighbors=flowing, pixels=max(0.0, 1.0 - own - flowing)),
         "neighbors": neighbors,
         "likelihoods": _likelihoods(weights @ system.b.astype(np.float64), int(diffused[row])),
         "provenance": _provenance(weights * _column(system.b, int(diffused[row])), distances, row),
-        "components": _components(system.graph, result, row) if diffused[row] else None,
+        "components": _components(system, result, row) if diffused[row] else None,
         "island": _island(system.graph, row),
+        "height_m": None if system.heights is None or np.isnan(system.heights[row]) else float(system.heights[row]),
+        "clearance_m": result.params.ground_clearance,
     }
 
 
@@ -94,18 +97,28 @@ def _column(matrix: csr_array, column: int) -> NDArray[np.float64]:
 
 def _neighbors(result: Segmentation, system: Rebuilt, row: int, distances: NDArray[np.float64]) -> tuple[Neighbor, ...]:
     shares = _entries(system.A, row)
+    ground = _ground(result, system)
     edges = [(j, weight) for j, weight in _entries(system.graph, row).items() if j != row]
     return tuple(
         Neighbor(
             point=int(system.in_view[j]),
             distance_m=float(distances[j]),
             weight=weight,
+            leaves_ground=bool(ground[j] != ground[row]),
             share=shares[j],
             label=int(result.labels[system.in_view[j]]),
             diffused_label=int(result.diffused_labels[system.in_view[j]]),
         )
         for j, weight in sorted(edges, key=lambda edge: (distances[edge[0]], edge[0]))
     )
+
+
+def _ground(result: Segmentation, system: Rebuilt) -> NDArray[np.bool_]:
+    """(n,) True for points of the ground, where edges that leave it are weakened."""
+    if system.heights is None or result.params.ground_edges == 1:
+        return np.zeros(len(system.in_view), bool)
+    lowest, highest = stages.GROUND_M
+    return (system.heights > lowest) & (system.heights < highest)
 
 
 def _likelihoods(z: NDArray[np.float64], diffused_label: int) -> tuple[Likelihood, ...]:
@@ -129,20 +142,32 @@ def _provenance(parts: NDArray[np.float64], distances: NDArray[np.float64], row:
     return Provenance(own_share=float(parts[row] / total), half_within_m=float(distances[nearest_half]))
 
 
-def _components(graph: csr_array, result: Segmentation, row: int) -> Components:
+def _components(system: Rebuilt, result: Segmentation, row: int) -> Components:
     diffused = result.diffused_labels[result.in_view]
     members = np.flatnonzero(diffused == diffused[row])
-    component = _connected(_structure(graph)[members][:, members])
+    component = _connected(_structure(system.graph)[members][:, members])
     sizes = np.bincount(component)
+    at_depth = np.bincount(component[_at_depth(system, result, int(diffused[row]))[members]], minlength=len(sizes))
     # numbers are given in the order of the first members, and a stable sort keeps it among equals
     in_order = np.argsort(-sizes, kind="stable")
     own = component[np.searchsorted(members, row)]
     return Components(
         label=int(diffused[row]),
         sizes=tuple(sizes[in_order].tolist()),
+        at_depth=tuple(at_depth[in_order].tolist()),
         own=int(np.flatnonzero(in_order == own)[0]),
         removal=result.params.remove_outliers,
+        part_size=result.params.part_size,
     )
+
+
+def _at_depth(system: Rebuilt, result: Segmentation, label: int) -> NDArray[np.bool_]:
+    """(n,) True for points as far away as an object in a view that shows both."""
+    found = np.zeros(len(system.in_view), bool)
+    for number, mask in result.instances[label - 1].sources:
+        depths, rows = system.depths[number], np.searchsorted(system.in_view, result.views[number].in_view)
+        found[rows] |= True if depths is None else depths.behind_m(mask) == 0
+    return found
 
 
 def _island(graph: csr_array, row: int) -> Island:

@@ -9,6 +9,9 @@ from typing import Any
 
 from ldls.explaining.sight import Sight
 
+LEAST_AT_DEPTH = 0.8
+"""Share of its points that a part needs as far away as the object, to be kept."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Neighbor:
@@ -17,15 +20,18 @@ class Neighbor:
     Attributes:
         point: Its row in the cloud.
         distance_m: How far it is, in metres.
-        weight: exp(-d^2 / sigma).
+        weight: exp(-d^2 / sigma), times `ground_edges` of the parameters where the edge leaves the ground.
+        leaves_ground: Whether one of both belongs to the ground and the other does not, and edges between them are
+            weakened.
         share: That weight over the sum of all edges of the point, its pixel edges included.
         label: Its label in the result.
-        diffused_label: The same before outlier removal.
+        diffused_label: The same after diffusion.
     """
 
     point: int
     distance_m: float
     weight: float
+    leaves_ground: bool
     share: float
     label: int
     diffused_label: int
@@ -53,7 +59,7 @@ class Edges:
     Attributes:
         own: Edge to itself.
         neighbors: Edges to its nearest neighbours.
-        pixels: Edges to the pixels of its windows.
+        pixels: Edges to the pixels of its windows, of those too whose label does not count.
     """
 
     own: float
@@ -81,19 +87,34 @@ class Components:
     Attributes:
         label: The label.
         sizes: Points of each, the largest first; of equal ones the one with the lowest row of the cloud first.
+        at_depth: Points of each that are as far away as the object.
         own: Which of them the point lies in, from 0.
-        removal: Whether outliers were removed, so that number 0 alone was kept.
+        removal: Whether outliers were removed, so that number 0 was kept, and parts like it.
+        part_size: Share of the largest one's points from which on a part was kept; 1 for the largest alone.
     """
 
     label: int
     sizes: tuple[int, ...]
+    at_depth: tuple[int, ...]
     own: int
     removal: bool
+    part_size: float
 
     @property
     def removed(self) -> bool:
-        """True if the point lost its label."""
-        return self.removal and self.own > 0
+        """True if the point lost its label to outlier removal."""
+        return not self.keeps(self.own)
+
+    def keeps(self, number: int) -> bool:
+        """True if the component of that number kept its label: the largest, and parts of it as far away."""
+        if not self.removal or number == 0:
+            return True
+        as_far = self.at_depth[number] >= LEAST_AT_DEPTH * self.sizes[number]
+        return self.part_size < 1 and not self.too_small(number) and as_far
+
+    def too_small(self, number: int) -> bool:
+        """True if the component of that number has too few points for a part of the largest."""
+        return self.sizes[number] < self.part_size * self.sizes[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +138,7 @@ class Explanation:
         point: Its row in the cloud.
         xyz: Its coordinates in the lidar frame in metres.
         label: Its label: -1 out of view, 0 background, m instance m.
-        diffused_label: The same before outlier removal.
+        diffused_label: The same after diffusion.
         names: Name of every label of the result, -1 and 0 included.
         sights: What each camera has of it.
         edges: What its edges weigh; None out of view, as all that follows.
@@ -126,6 +147,8 @@ class Explanation:
         provenance: Where the likelihood of the diffused label comes from.
         components: Those of its diffused label, if that is an instance.
         island: The part of the graph it lies in.
+        height_m: Its height above the ground in metres; None where the parameters need no ground or none was found.
+        clearance_m: Height in metres below which points became background; 0 for none.
     """
 
     point: int
@@ -140,6 +163,8 @@ class Explanation:
     provenance: Provenance | None = None
     components: Components | None = None
     island: Island | None = None
+    height_m: float | None = None
+    clearance_m: float = 0.0
 
     @property
     def winner(self) -> Likelihood | None:
@@ -152,6 +177,12 @@ class Explanation:
         return next((each for each in self.likelihoods if each.label != self.diffused_label), None)
 
     @property
+    def cleared(self) -> bool:
+        """True if the point kept its label in outlier removal and lost it for it is near to the ground."""
+        components = self.components
+        return components is not None and not components.removed and self.label == 0
+
+    @property
     def verdict(self) -> str:
         """The reason for the label of the point, in a sentence."""
         point = f"Point {self.point}"
@@ -161,7 +192,10 @@ class Explanation:
         if components is not None and components.removed:
             given = named(self, components.label)
             return f"{point} is background: diffusion gave it to {given}, but it lies in a {_where(components)}."
-        return f"{point} is {named(self, self.label)}: {_lead(self)}."
+        if components is not None and self.cleared:
+            near = f"{_height(self.height_m)}, nearer than {100 * self.clearance_m:g} cm"
+            return f"{point} is background: diffusion gave it to {named(self, components.label)}, but it is {near}."
+        return f"{point} is {named(self, self.label)}: {_lead(self)}{_refused(self)}."
 
     def to_dict(self) -> dict[str, Any]:
         """The same as plain values that JSON can hold, the verdict first; numbers that are not finite are None."""
@@ -189,9 +223,15 @@ def count_points(count: int) -> str:
 
 def _where(components: Components) -> str:
     own, largest = components.sizes[components.own], components.sizes[0]
-    if own == largest:
+    if components.part_size == 1 and own == largest:
         return f"component of {count_points(own)}, as large as the one kept, which has the lowest row: removed"
-    return f"component of {count_points(own)}, the largest has {largest:,}: removed"
+    if components.part_size == 1:
+        return f"component of {count_points(own)}, the largest has {largest:,}: removed"
+    if components.too_small(components.own):
+        least = f"less than {100 * components.part_size:g} % of the largest, which has {largest:,}"
+        return f"component of {count_points(own)}, {least}: removed"
+    at_depth = percent(components.at_depth[components.own] / own)
+    return f"component of {count_points(own)}, of which {at_depth} are as far away as the object: removed"
 
 
 def _lead(explanation: Explanation) -> str:
@@ -202,6 +242,31 @@ def _lead(explanation: Explanation) -> str:
         return "no other label reached it"
     next_one = f"{named(explanation, other.label)} {_behind(winner, other)}"
     return f"{percent(winner.share)} of its likelihood, {next_one}"
+
+
+def away(behind_m: float) -> str:
+    """How far a point is behind the object of a mask, or before it."""
+    metres = f"{abs(behind_m):.1f}" if abs(behind_m) >= 0.1 else "less than 0.1"
+    return f"{metres} m {'behind' if behind_m > 0 else 'before'} it"
+
+
+def _height(height_m: float | None) -> str:
+    assert height_m is not None
+    # rounded down, for what is below a bound to read so
+    tenths_cm = math.floor(1000 * height_m)
+    return f"{abs(tenths_cm) / 10:g} cm {'above' if tenths_cm >= 0 else 'below'} the ground"
+
+
+def _refused(explanation: Explanation) -> str:
+    """The objects that direct projection gives the point to and depth does not."""
+    refused = (
+        f"{named(explanation, each.label)}, {away(each.behind_m)}"
+        for sight in explanation.sights
+        for each in sight.window
+        if each.label == sight.direct_label != explanation.label and each.behind_m
+    )
+    words = " and of ".join(dict.fromkeys(refused))
+    return f"; it is outside the depth group of {words}" if words else ""
 
 
 def _behind(winner: Likelihood, other: Likelihood) -> str:
