@@ -20,7 +20,7 @@ def test_commands_print_what_is_shown(own_demo, monkeypatch):
     monkeypatch.chdir(own_demo.parent)
     blocks = re.findall(r"```(sh|text)\n(.*?)```", DOC, re.DOTALL)
     commands = [line for kind, text in blocks if kind == "sh" for line in text.splitlines()]
-    assert len(commands) == 8
+    assert len(commands) == 10
     output = ""
     for kind, text in blocks:
         if kind == "text":
@@ -43,5 +43,5 @@ def test_the_examples_run(own_demo, monkeypatch, capsys):
         exec(example, names)
     printed = capsys.readouterr().out.splitlines()
     assert printed[0] == names["found"].verdict
-    assert [line.split()[0] for line in printed[-4:]] == ["50", "100", "150", "200"]
+    assert [line.split()[0] for line in printed[-4:]] == ["5", "10", "15", "20"]
     assert printed[-1].split()[1] == "12"

@@ -58,9 +58,9 @@ def explain(
     """Say why a point has its label.
 
     The first line is the verdict. Then come what each camera sees of the point (its pixel, what masks cover the window
-    around it, and whether the point is as far away as their objects), the likelihood of every label, the edges over which
-    labels flow to it, and, for a point of an object, the connected components of which outlier removal keeps the largest
-    and parts like it. Points out of view get a reason.
+    around it, and which of them count for a point so far away), the likelihood of every label, the edges over which
+    labels flow to it, and, for a point of an object, the connected components of which outlier removal keeps the
+    largest and parts like it. Points out of view get a reason.
 
     The point is one of a result that ldls wrote (.npz), or of a sweep that is segmented on the spot with the best known
     parameters. Needs the extra eval.
