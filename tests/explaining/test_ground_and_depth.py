@@ -7,7 +7,7 @@ import pytest
 
 import ldls
 from ldls import stages
-from ldls.explaining import rebuild
+from ldls.explaining import rebuild, refused_labels
 from ldls.simulation import sample_frame
 from ring_samples import street_ring
 
@@ -128,6 +128,21 @@ def test_points_beside_masks_name_those_masks(street):
             assert bool(found) == depths.unsure[at]
             named += bool(set(found) & set(exact))
     assert named > 3
+
+
+def test_labels_that_depth_refuses_are_those_of_the_verdicts(street):
+    result, _, explanations = street
+    refused, said = refused_labels(result), 0
+    for point, found in explanations.items():
+        words = found.verdict.partition("outside the depth group of ")[2]
+        if words:
+            said += 1
+            assert f"(label {refused[point]}), " in words
+        elif result.labels[point] == result.diffused_labels[point]:
+            assert refused[point] in (0, result.labels[point])
+    assert said
+    paper = ldls.segment(*street_ring(), params=ldls.Params.paper())
+    assert not refused_labels(paper).any()
 
 
 def test_edges_that_leave_the_ground_are_told_apart(street):

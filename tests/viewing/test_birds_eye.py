@@ -6,7 +6,7 @@ import pytest
 import ldls
 from ldls.palette import instance_colours
 from ldls.viewing import birds_eye_view
-from ldls.viewing.birds_eye import BACKGROUND, OUT_OF_VIEW, RINGS
+from ldls.viewing.birds_eye import BACKGROUND, DIM, OUT_OF_VIEW, RINGS
 from ldls.viewing.ground import corners_of, ground_of
 
 # camera axes (x right, y down, z forward) of a lidar whose x is forward and z up, and of one whose y is forward
@@ -30,7 +30,7 @@ def street(T_camera_lidar, shift_m: float = 0.0) -> ldls.Segmentation:
         projection=[[200, 0, 200], [0, 200, 80], [0, 0, 1]], T_camera_lidar=np.array(T_camera_lidar, float)
     )
     masks = ldls.InstanceMasks.from_boxes([[128, 82, 164, 104]], (160, 400), categories=[3])
-    return ldls.segment(points, masks, camera)
+    return ldls.segment(points, masks, camera, params=ldls.Params.paper())
 
 
 @pytest.mark.parametrize(
@@ -78,6 +78,26 @@ def test_points_in_view_and_out_of_it_are_two_greys() -> None:
     assert {BACKGROUND, OUT_OF_VIEW} <= often
 
 
+def test_points_behind_the_object_of_their_mask_are_dim_in_its_colour() -> None:
+    # a person, and fewer points on the same mask beyond
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-0.4, 0.4, 20), np.linspace(0.2, 1.2, 20)))
+    person, beyond = np.stack([x, y, np.full(400, 10)], axis=1), np.stack([x, y, np.full(400, 19)], axis=1)[::9]
+    in_camera = np.vstack([person, beyond])
+    points = (in_camera @ np.array(X_FORWARD, float)[:3, :3]).astype(np.float32)
+    camera = ldls.Camera(projection=[[200, 0, 200], [0, 200, 80], [0, 0, 1]], T_camera_lidar=np.array(X_FORWARD, float))
+    masks = ldls.InstanceMasks.from_boxes([[190, 82, 210, 106]], (160, 400), categories=[1])
+    dim = (instance_colours([1])[0] * DIM).astype(int)
+
+    def shows_dim(params: ldls.Params) -> bool:
+        result = ldls.segment(points, masks, camera, params=params)
+        picture = np.asarray(birds_eye_view(result, range_m=25, boxes=False)).astype(int)
+        x, y = np.floor(ground_of(result, 25).at(np.array([[19.0, 0.0]]))[0]).astype(int)
+        return bool((np.abs(picture[y - 2 : y + 3, x - 2 : x + 3] - dim).max(axis=2) < 12).any())
+
+    assert shows_dim(ldls.Params())
+    assert not shows_dim(ldls.Params.paper())
+
+
 @pytest.mark.parametrize("first", [pytest.param(0, id="the low first"), pytest.param(1, id="the high first")])
 @pytest.mark.parametrize(
     ("masks", "on_top"),
@@ -94,7 +114,7 @@ def test_the_drawing_has_an_order(first, masks, on_top) -> None:
     points = (in_camera @ np.array(X_FORWARD, float)[:3, :3]).astype(np.float32)
     camera = ldls.Camera(projection=[[200, 0, 200], [0, 200, 80], [0, 0, 1]], T_camera_lidar=np.array(X_FORWARD, float))
     boxes = ldls.InstanceMasks.from_boxes(list(masks.values()), (160, 400), categories=list(masks))
-    result = ldls.segment(points, boxes, camera)
+    result = ldls.segment(points, boxes, camera, params=ldls.Params.paper())
     assert (np.bincount(result.labels, minlength=len(masks) + 1)[1:] == len(x)).all()
     picture = np.asarray(birds_eye_view(result, boxes=False)).astype(int)
     ground = ground_of(result)

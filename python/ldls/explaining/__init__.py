@@ -2,7 +2,7 @@
 
 from ldls.explaining.explain import explain, influences
 from ldls.explaining.explanation import Components, Edges, Explanation, Island, Likelihood, Neighbor, Provenance
-from ldls.explaining.rebuilt import Rebuilt, rebuild
+from ldls.explaining.rebuilt import Rebuilt, rebuild, refused_labels
 from ldls.explaining.sight import Sight, WindowCount
 
 __all__ = [
@@ -19,4 +19,5 @@ __all__ = [
     "explain",
     "influences",
     "rebuild",
+    "refused_labels",
 ]

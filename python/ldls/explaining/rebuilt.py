@@ -72,6 +72,20 @@ def rebuild(result: Segmentation) -> Rebuilt:
     return Rebuilt(in_view=result.in_view, heights=heights, depths=depths, graph=graph, pixel_labels=labels, A=A, b=b)
 
 
+def refused_labels(result: Segmentation) -> NDArray[np.int32]:
+    """(N,) int32: label of the object that direct projection gives each point to and depth does not; 0 where none."""
+    labels, heights = np.zeros(len(result.labels), np.int32), _heights(result)
+    for seen in result.views:
+        depths = depth_groups_of(result, seen, heights)
+        if depths is None:
+            return labels
+        direct = stages.direct_labels(seen.pixels, seen.view.masks)
+        for mask, label in enumerate(seen.labels.tolist()):
+            refused = (direct == mask + 1) & (depths.behind_m(mask) != 0)
+            labels[seen.in_view[refused]] = label
+    return labels
+
+
 def _heights(result: Segmentation) -> NDArray[np.float64] | None:
     params = result.params
     needed = params.ground_edges < 1 or params.ground_clearance > 0 or params.depth_gap > 0

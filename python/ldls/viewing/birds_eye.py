@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from ldls.cloud import finite_rows
+from ldls.explaining import refused_labels
 from ldls.palette import Colour
 from ldls.segmentation import Segmentation
 from ldls.viewing.drawing import INK, MARK, PAPER, disc, stamp
@@ -24,6 +25,8 @@ RIM_PX = 3
 """Paper left around the range of a ring."""
 OUT_OF_VIEW: Colour = (66, 66, 76)
 BACKGROUND: Colour = (135, 135, 140)
+DIM = 0.6
+"""Brightness of points on a mask that are outside its depth group."""
 PEN_PX = 1.15
 AVERSION = 40.0
 """Heights of a name that it goes aside rather than lie on an object."""
@@ -36,7 +39,8 @@ def birds_eye_view(
 ) -> Image.Image:
     """The cloud from above, the first camera looking up: points, oriented boxes, names and rings of equal range.
 
-    Points that no camera sees are dark, the background is grey.
+    Points that no camera sees are dark, the background is grey. Points of the background that fall on a mask, but lie
+    before or behind its object, are dim in its colour.
 
     Args:
         result: The segmentation.
@@ -118,6 +122,10 @@ def _with_points(fine: Image.Image, shown: Shown, ground: Ground) -> Image.Image
     size = float(np.clip(ground.px_per_m / 14, 0.7, 1.8))
     for label, colour in ((-1, OUT_OF_VIEW), (0, BACKGROUND)):
         stamp(canvas, at_px[labels == label], colour, disc(0.55 * FINE * size))
+    refused = refused_labels(shown.result)[rows]
+    outside = (labels == 0) & (refused > 0)
+    dim = (shown.colours_of(refused[outside]) * DIM).astype(np.uint8)
+    stamp(canvas, at_px[outside], dim, disc(0.8 * FINE * size))
     own = labels > 0
     stamp(canvas, at_px[own & marked], MARK, disc((1.2 * size + 0.8) * FINE))
     stamp(canvas, at_px[own], shown.colours_of(labels[own]), disc(1.2 * FINE * size))
