@@ -6,16 +6,36 @@ from PIL import Image
 
 from ldls.errors import ParameterError
 from ldls.evaluation import Counts
-from ldls.evaluation.figures import COLORS, iou_against_iterations, iou_against_range, scores_against_range
+from ldls.evaluation.figures import (
+    COLORS,
+    iou_against_iterations,
+    iou_against_range,
+    precision_against_coverage,
+    right_against_confidence,
+    scores_against_range,
+)
+from ldls.evaluation.reliability import Reliability
 
 RANGES = {"Car": {10.0: Counts(9, 1, 1), 30.0: Counts(8, 2, 4)}, "Pedestrian": {10.0: Counts(), 30.0: Counts(1, 3, 1)}}
 OBJECTS = {"Car": [(5.0, 0.9), (20.0, 0.4)], "Pedestrian": [(8.0, 0.0)]}
 STEPS = {"Car": {200: 0.8, 0: 0.6, 50: None}, "Pedestrian": {0: 0.5, 200: 0.7}}
 
+
+def reliability(seed):
+    """Of points whose labels are right as often as they say."""
+    generator, found = np.random.default_rng(seed), Reliability()
+    for bins in (found.points, found.objects, found.by_threshold):
+        sure = generator.random(500)
+        bins.add(sure, generator.random(500) < sure)
+    return found
+
+
+TOLD = {"Car": reliability(1), "Pedestrian": reliability(2)}
 FIGURES = [
     pytest.param(scores_against_range, RANGES, id="scores against range"),
     pytest.param(iou_against_range, OBJECTS, id="IoU against range"),
     pytest.param(iou_against_iterations, STEPS, id="IoU against iterations"),
+    pytest.param(precision_against_coverage, TOLD, id="precision against coverage"),
 ]
 
 
@@ -39,7 +59,25 @@ def test_every_name_is_drawn_in_its_colour(draw, values, tmp_path):
     assert n_pixels(alone, COLORS[1]) == 0
 
 
-@pytest.mark.parametrize(("draw", "values"), FIGURES)
+def test_right_against_confidence_has_a_line_for_all_points_and_one_for_objects(tmp_path):
+    right_against_confidence(TOLD, tmp_path / "a.png")
+    no_objects = reliability(1)
+    no_objects.objects.points[:] = 0
+    right_against_confidence({"ldls": no_objects}, tmp_path / "b.png")
+    with Image.open(tmp_path / "a.png") as image, Image.open(tmp_path / "b.png") as one:
+        both, alone = np.asarray(image.convert("RGB")), np.asarray(one.convert("RGB"))
+    assert [n_pixels(both, color) > 100 for color in COLORS[:5]] == [True] * 4 + [False]
+    assert [n_pixels(alone, color) > 100 for color in COLORS[:2]] == [True, False]
+
+
+def test_precision_that_is_always_1_can_be_drawn(tmp_path):
+    certain = Reliability()
+    certain.by_threshold.add(np.array([0.3, 0.9]), np.array([True, True]))
+    precision_against_coverage({"ldls": certain, "no objects": Reliability()}, tmp_path / "a.png")
+    assert (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize(("draw", "values"), [*FIGURES, pytest.param(right_against_confidence, TOLD, id="right")])
 def test_nothing_to_draw_is_an_error_and_leaves_no_file(draw, values, tmp_path):
     for nothing in ({}, {name: type(found)() for name, found in values.items()}):
         with pytest.raises(ParameterError, match="nothing to draw"):

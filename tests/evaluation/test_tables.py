@@ -18,8 +18,9 @@ from ldls.evaluation import (
     panoptic_table,
     semantic_table,
 )
+from ldls.evaluation.tables import coverage_table, reliability_table
 
-TABLES = [semantic_table, instance_table, panoptic_table, ablation_table]
+TABLES = [semantic_table, instance_table, panoptic_table, ablation_table, reliability_table, coverage_table]
 SMALL = Table("Cars | more", ("method", "IoU", "n"), (("a|b", 61.25, 3), ("c", None, 0)), "a note")
 
 
@@ -76,14 +77,18 @@ def test_methods_stand_side_by_side(methods):
 
 def test_instances_have_a_row_a_class_and_threshold(methods):
     rows = instance_table(methods).rows
-    assert rows[0] == ("direct projection", "Car", "0.50", 1, 0, 0, 100.0, 100.0)
-    assert rows[1] == ("direct projection", "Car", "0.70", 0, 1, 1, 0.0, 0.0)
-    assert rows[2] == ("direct projection", "Pedestrian", "0.50", 0, 0, 0, None, None)
+    assert rows[0] == ("direct projection", "Car", "0.50", 1, 0, 0, 100.0, 100.0, None)
+    assert rows[1] == ("direct projection", "Car", "0.70", 0, 1, 1, 0.0, 0.0, 0.0)
+    assert rows[2] == ("direct projection", "Pedestrian", "0.50", 0, 0, 0, None, None, None)
     assert len(rows) == 8
 
 
 def test_panoptic_quality_has_its_parts(methods):
-    assert panoptic_table(methods).rows[2] == ("full method", "Car", 100.0, 100.0, 100.0, 1, 0, 0)
+    rows = panoptic_table(methods).rows
+    assert rows[3] == ("full method", "Car", 100.0, 100.0, 100.0, 1, 0, 0)
+    # the class that is not there is not in the mean
+    assert rows[5] == ("full method", "mean", 100.0, None, None, None, None, None)
+    assert [row[2] for row in rows if row[1] == "mean"] == [100 * each.panoptic.mean_pq for each in methods.values()]
 
 
 def test_frames_have_a_row_each(methods):
@@ -94,8 +99,41 @@ def test_frames_have_a_row_each(methods):
 
 def test_ablation_tells_the_gain(methods):
     table = ablation_table(methods)
-    assert table.columns == ("variant", "Car IoU", "Pedestrian IoU", "mean IoU", "gain")
-    assert [row[-1] for row in table.rows] == [0.0, 50.0]
+    assert table.columns == ("variant", "Car IoU", "Pedestrian IoU", "mean IoU", "gain", "mean PQ")
+    assert [row[-2:] for row in table.rows] == [(0.0, 0.0), (50.0, 100.0)]
+
+
+def test_recall_is_told_of_well_seen_instances_too():
+    # of a car of 20 points half are found, of one of 19 all
+    truth = labeling([1] * 39, [1] * 20 + [2] * 19)
+    prediction = labeling([1] * 11 + [0] * 9 + [1] * 19, [1] * 11 + [0] * 9 + [2] * 19)
+    rows = instance_table({"m": evaluation(prediction, truth)}).rows
+    assert [row[-2:] for row in rows[:2]] == [(100.0, 100.0), (50.0, 0.0)]
+
+
+@pytest.fixture
+def told(methods):
+    """Two methods, of which the second tells a confidence."""
+    truth, prediction = labeling([1, 1, 1, 1, 0]), labeling([1, 1, 1, 1, 1])
+    pair = Pair("a", prediction, truth, confidence=np.array([0.96, 0.96, 0.94, 0.5, 0.05]))
+    return methods | {"sure": evaluate([pair], classes=ClassSet(names=("Car", "Pedestrian")))}
+
+
+def test_reliability_has_a_row_for_all_points_and_one_for_objects(told):
+    table = reliability_table(told)
+    assert table.columns == ("method", "points", "number", "confidence", "right", "calibration error")
+    # bins of 0.933 to 1, of 0.467 to 0.533, and of 0 to 0.067
+    error = 100 * (3 * (1 - 2.86 / 3) + 0.5 + 0.05) / 5
+    assert [row[:3] for row in table.rows] == [("sure", "in view", 5), ("sure", "of objects", 5)]
+    for row in table.rows:
+        assert row[3:] == pytest.approx((100 * 3.41 / 5, 80.0, error))
+
+
+def test_coverage_falls_and_precision_is_of_what_is_kept(told):
+    rows = coverage_table(told).rows
+    assert rows[0] == ("sure", "0.00", 100.0, 80.0)
+    assert rows[1] == ("sure", "0.20", 80.0, 100.0)
+    assert rows[-1] == ("sure", "0.95", 40.0, 100.0)  # no point has 0.99
 
 
 @pytest.mark.parametrize("make", [semantic_table, ablation_table])
@@ -110,7 +148,8 @@ def test_no_cell_is_ever_nan(make):
     generator = np.random.default_rng(6)
     for _ in range(50):
         truth = random_labeling(generator, int(generator.integers(0, 12)))
-        pair = Pair("a", disturbed(generator, truth, generator.random()), truth)
+        sure = generator.random(len(truth))
+        pair = Pair("a", disturbed(generator, truth, generator.random()), truth, confidence=sure)
         table = make({"m": evaluate([pair], classes=ClassSet(names=("class 1", "class 2", "class 3")))})
         for text in (table.markdown(), table.csv(), table.json()):
             assert "nan" not in text.lower()

@@ -8,6 +8,7 @@ Needs the extra `eval`.
 """
 
 from ldls.evaluation.annotation import Annotation, annotate
+from ldls.evaluation.bound import bound_labels
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.evaluation import Evaluation, FrameCounts, evaluate
@@ -15,6 +16,7 @@ from ldls.evaluation.figures import iou_against_iterations, iou_against_range, s
 from ldls.evaluation.instance import InstanceScores, ObjectScore, object_scores
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticQuality, PanopticScores
+from ldls.evaluation.reliability import Reliability
 from ldls.evaluation.semantic import SemanticScores
 from ldls.evaluation.tables import Table, ablation_table, frame_table, instance_table, panoptic_table, semantic_table
 from ldls.labeling import Labeling
@@ -31,10 +33,12 @@ __all__ = [
     "Pair",
     "PanopticQuality",
     "PanopticScores",
+    "Reliability",
     "SemanticScores",
     "Table",
     "ablation_table",
     "annotate",
+    "bound_labels",
     "evaluate",
     "frame_table",
     "instance_table",

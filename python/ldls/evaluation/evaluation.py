@@ -11,8 +11,12 @@ from ldls.evaluation.counts import Counts
 from ldls.evaluation.instance import PAPER_THRESHOLDS, InstanceScores
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticScores
+from ldls.evaluation.reliability import Reliability
 from ldls.evaluation.semantic import SemanticScores
 from ldls.labeling import Labeling
+
+WELL_SEEN_POINTS = 20
+"""Points from which on a true instance is well seen: of fewer, chance decides."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +44,19 @@ class Evaluation:
         names: The scored classes.
         semantic: Points by class.
         instance: Instances at each threshold.
+        well_seen: The same, of true instances with 20 points or more.
         panoptic: Panoptic quality.
         frames: One record a frame.
+        reliability: Confidence against truth; None where a frame has no confidence.
     """
 
     names: tuple[str, ...]
     semantic: SemanticScores
     instance: InstanceScores
+    well_seen: InstanceScores
     panoptic: PanopticScores
     frames: tuple[FrameCounts, ...]
+    reliability: Reliability | None
 
 
 def evaluate(
@@ -77,17 +85,27 @@ def evaluate(
         raise ParameterError(f"max_range_m: got {max_range_m}, expected more than 0")
     semantic = SemanticScores(classes.names)
     instance = InstanceScores(classes.names, thresholds=thresholds, minimum_points=minimum_points)
+    well_seen = InstanceScores(
+        classes.names, thresholds=thresholds, minimum_points=max(minimum_points, WELL_SEEN_POINTS)
+    )
     panoptic = PanopticScores(classes.names, minimum_points=minimum_points)
+    reliability: Reliability | None = Reliability()
     frames = []
     for item in pairs:
         pair = (item if isinstance(item, Pair) else Pair(*item)).mapped(classes, max_range_m=max_range_m)
         of_frame = SemanticScores(classes.names)
         of_frame.add(pair.prediction, pair.truth)
         semantic.merge(of_frame)
-        instance.add(pair.prediction, pair.truth)
-        panoptic.add(pair.prediction, pair.truth)
+        for scores in (instance, well_seen, panoptic):
+            scores.add(pair.prediction, pair.truth)
+        if pair.confidence is None:
+            reliability = None
+        elif reliability is not None:
+            reliability.add(pair.prediction, pair.truth, pair.confidence)
         frames.append(_frame_counts(pair, of_frame))
-    return Evaluation(classes.names, semantic, instance, panoptic, tuple(frames))
+    return Evaluation(
+        classes.names, semantic, instance, well_seen, panoptic, tuple(frames), reliability if frames else None
+    )
 
 
 def _frame_counts(pair: Pair, scores: SemanticScores) -> FrameCounts:

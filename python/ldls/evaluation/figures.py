@@ -5,13 +5,17 @@ Drawn by matplotlib's own objects on its Agg canvas, so that no window opens and
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
+import numpy as np
+
 from ldls._optional import require
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts
+from ldls.evaluation.reliability import Reliability
 from ldls.io.files import whole_file
 
 DPI = 150
@@ -20,6 +24,8 @@ COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#00
 """Okabe and Ito's, which colour-blind readers can tell apart."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 IOU_LABEL = "IoU (%)"
+LEAST_SHARE = 0.001
+"""Share of the points from which on a bin is drawn."""
 
 
 def scores_against_range(curves: Mapping[str, Mapping[float, Counts]], path: str | PathLike[str]) -> None:
@@ -76,6 +82,61 @@ def iou_against_iterations(curves: Mapping[str, Mapping[int, float | None]], pat
     for k, (name, scores) in enumerate(curves.items()):
         _line(axes, k, name, {steps: scores[steps] for steps in sorted(scores)})
     _dress(axes, "diffusion steps", IOU_LABEL)
+    axes.set_xscale("symlog")
+    steps = sorted({count for scores in curves.values() for count in scores})
+    axes.set_xticks(steps, [str(count) for count in steps], minor=False)
+    axes.set_xticks([], minor=True)
+    axes.set_xlim(0.85 * steps[0], 1.15 * steps[-1])
+    _save(figure, path)
+
+
+def right_against_confidence(reliabilities: Mapping[str, Reliability], path: str | PathLike[str]) -> None:
+    """Draw the share of right labels against confidence, by bins; those of hardly a point are left out.
+
+    Args:
+        reliabilities: By method; each has a line for all points in view and one for those of objects.
+        path: PNG file to write.
+
+    Raises:
+        ParameterError: There is nothing to draw.
+    """
+    kinds = {"in view": "points", "of objects": "objects"}
+    named = {f"{m}, {kind}": getattr(each, at) for m, each in reliabilities.items() for kind, at in kinds.items()}
+    curves = {name: bins for name, bins in named.items() if bins.points.any()}
+    figure = _figure(curves, width=7.0)
+    axes = figure.subplots()
+    axes.plot([0, 100], [0, 100], color="0.6", linestyle="--", linewidth=1)
+    for k, (name, bins) in enumerate(curves.items()):
+        there = np.flatnonzero(bins.points >= LEAST_SHARE * bins.points.sum())
+        mean, right = (each[there] / bins.points[there] for each in (bins.confidence, bins.right))
+        _line(axes, k, name, dict(zip(100 * mean, right, strict=True)))
+    _dress(axes, "confidence (%)", "right (%)")
+    _save(figure, path, columns=2)
+
+
+def precision_against_coverage(reliabilities: Mapping[str, Reliability], path: str | PathLike[str]) -> None:
+    """Draw the precision of the points of objects against how many of them a threshold on confidence keeps.
+
+    Args:
+        reliabilities: By method.
+        path: PNG file to write.
+
+    Raises:
+        ParameterError: There is nothing to draw.
+    """
+    found = {method: each.by_threshold.from_thresholds() for method, each in reliabilities.items()}
+    curves = {method: curve for method, curve in found.items() if curve}
+    figure = _figure(curves, width=7.0)
+    axes = figure.subplots()
+    for k, (name, curve) in enumerate(curves.items()):
+        shares = [(100 * coverage, 100 * precision) for _, coverage, precision in curve]
+        # thresholds are 0.01 apart
+        axes.plot(*zip(*shares, strict=True), label=name, markevery=10, **_style(k))
+    _dress(axes, "points of objects kept (%), marks at confidences of 0, 10, 20 ... %", "precision (%)")
+    least = min(precision for curve in curves.values() for *_, precision in curve)
+    # there is nothing below
+    low = min(5 * math.floor(20 * least), 95)
+    axes.set_ylim(low - 0.03 * (100 - low), 100 + 0.03 * (100 - low))
     _save(figure, path)
 
 
@@ -89,8 +150,11 @@ def _figure(named: Mapping[str, Any], *, width: float) -> Any:  # noqa: ANN401
 
 def _line(axes: Any, k: int, name: str, scores: Mapping[float, float | None]) -> None:  # noqa: ANN401
     there = {x: 100 * score for x, score in scores.items() if score is not None}
-    style = {"color": COLORS[k % len(COLORS)], "marker": MARKERS[k % len(MARKERS)], "markersize": 5}
-    axes.plot(list(there), list(there.values()), label=name, **style)
+    axes.plot(list(there), list(there.values()), label=name, **_style(k))
+
+
+def _style(k: int) -> dict[str, Any]:
+    return {"color": COLORS[k % len(COLORS)], "marker": MARKERS[k % len(MARKERS)], "markersize": 5}
 
 
 def _dress(axes: Any, x_label: str, y_label: str) -> None:  # noqa: ANN401
@@ -103,9 +167,9 @@ def _dress(axes: Any, x_label: str, y_label: str) -> None:  # noqa: ANN401
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _save(figure: Any, path: str | PathLike[str]) -> None:  # noqa: ANN401
+def _save(figure: Any, path: str | PathLike[str], *, columns: int = 4) -> None:  # noqa: ANN401
     handles, names = figure.axes[0].get_legend_handles_labels()
     # below the axes, where it can cover no curve
-    figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), 4), fontsize=FONT_SIZE)
+    figure.legend(handles, names, loc="outside lower center", ncols=min(len(names), columns), fontsize=FONT_SIZE)
     with whole_file(path) as file:
         figure.savefig(file, format="png", dpi=DPI)

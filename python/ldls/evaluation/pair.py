@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +23,18 @@ class Pair:
         truth: Their true labels.
         ranges_m: (N,) distance of each point from the lidar in metres, where it is known. Points whose distance is not
             finite then do not count.
+        confidence: (N,) confidence in each predicted label, 0 to 1, where the method tells one.
 
     Raises:
         ShapeError: The lengths differ.
+        InputError: A confidence is not from 0 to 1.
     """
 
     name: str
     prediction: Labeling
     truth: Labeling
     ranges_m: NDArray[np.floating] | None = None
+    confidence: NDArray[np.floating] | None = None
 
     def __post_init__(self) -> None:
         n_predicted, n_true = len(self.prediction), len(self.truth)
@@ -40,8 +43,12 @@ class Pair:
                 f"frame {self.name}: prediction has {n_predicted:,} points, truth {n_true:,}; "
                 "both must label the whole cloud in its order"
             )
-        if self.ranges_m is not None and np.shape(self.ranges_m) != (n_true,):
-            raise ShapeError(f"frame {self.name}: ranges_m has shape {np.shape(self.ranges_m)}, expected ({n_true},)")
+        for name in ("ranges_m", "confidence"):
+            values = getattr(self, name)
+            if values is not None and np.shape(values) != (n_true,):
+                raise ShapeError(f"frame {self.name}: {name} has shape {np.shape(values)}, expected ({n_true},)")
+        if self.confidence is not None and not ((self.confidence >= 0) & (self.confidence <= 1)).all():
+            raise InputError(f"frame {self.name}: expected confidence from 0 to 1")
 
     def mapped(self, classes: ClassSet, *, max_range_m: float | None = None) -> Pair:
         """This pair in the vocabulary of `classes`; points farther than `max_range_m` are ignored.
@@ -58,7 +65,7 @@ class Pair:
             truth = truth.restricted(np.asarray(self.ranges_m) <= farthest)
         elif max_range_m is not None:
             raise InputError(f"frame {self.name}: max_range_m needs the points' ranges_m, got none")
-        return Pair(self.name, classes.map(self.prediction), truth, self.ranges_m)
+        return replace(self, prediction=classes.map(self.prediction), truth=truth)
 
 
 def ranges_of(points: Points) -> NDArray[np.float64]:

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ldls.errors import ParameterError
-from ldls.evaluation.evaluation import Evaluation
+from ldls.evaluation.evaluation import WELL_SEEN_POINTS, Evaluation
+from ldls.evaluation.reliability import BINS
 from ldls.io.files import whole_file
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 Cell = str | int | float | None
 UNDEFINED = "-"
+SHOWN_THRESHOLDS = (0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 PERCENT = "Scores in percent; '-': neither truth nor prediction has the class."
 
 
@@ -116,26 +118,28 @@ def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
         for name in evaluation.names:
             for threshold in evaluation.instance.thresholds:
                 c = evaluation.instance[name, threshold]
-                scores = percent(c.precision), percent(c.recall)
-                rows.append((method, name, f"{threshold:.2f}", c.tp, c.fp, c.fn, *scores))
-    columns = ("method", "class", "IoU from", "TP", "FP", "FN", "precision", "recall")
-    return Table("Instances", columns, tuple(rows), PERCENT)
+                recalls = percent(c.recall), percent(evaluation.well_seen[name, threshold].recall)
+                rows.append((method, name, f"{threshold:.2f}", c.tp, c.fp, c.fn, percent(c.precision), *recalls))
+    columns = ("method", "class", "IoU from", "TP", "FP", "FN", "precision", "recall", f"recall {WELL_SEEN_POINTS}+")
+    return Table("Instances", columns, tuple(rows), f"{PERCENT} {WELL_SEEN_POINTS}+: of instances of so many points.")
 
 
 def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
-    """Panoptic, segmentation and recognition quality by method and class."""
+    """Panoptic, segmentation and recognition quality by method and class, and the mean of the classes."""
     rows: list[tuple[Cell, ...]] = []
     for method, evaluation in evaluations.items():
         for name in evaluation.names:
             q = evaluation.panoptic[name]
             scores = percent(q.pq), percent(q.sq), percent(q.rq)
             rows.append((method, name, *scores, q.counts.tp, q.counts.fp, q.counts.fn))
+        if len(evaluation.names) > 1:
+            rows.append((method, "mean", percent(evaluation.panoptic.mean_pq), None, None, None, None, None))
     columns = ("method", "class", "PQ", "SQ", "RQ", "TP", "FP", "FN")
     return Table("Panoptic quality", columns, tuple(rows), PERCENT)
 
 
 def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
-    """IoU of each class by variant of the method, and the gain in mean IoU over the first (Table III)."""
+    """IoU of each class by variant, the gain in mean IoU over the first (Table III), and mean panoptic quality."""
     names = _classes(evaluations)
     rows: list[tuple[Cell, ...]] = []
     first: float | None = None
@@ -143,8 +147,9 @@ def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
         mean = percent(evaluation.semantic.mean_iou)
         first = mean if not rows else first
         gain = None if mean is None or first is None else mean - first
-        rows.append((variant, *(percent(evaluation.semantic[name].iou) for name in names), mean, gain))
-    columns = ("variant", *(f"{name} IoU" for name in names), "mean IoU", "gain")
+        pq = percent(evaluation.panoptic.mean_pq)
+        rows.append((variant, *(percent(evaluation.semantic[name].iou) for name in names), mean, gain, pq))
+    columns = ("variant", *(f"{name} IoU" for name in names), "mean IoU", "gain", "mean PQ")
     return Table("Ablation", columns, tuple(rows), f"{PERCENT} Gain: points of mean IoU over the first row.")
 
 
@@ -174,6 +179,31 @@ def iteration_table(by_iterations: Mapping[int, Evaluation]) -> Table:
         rows.append((count, *scores, percent(evaluation.semantic.mean_iou)))
     columns = ("iterations", *(f"{name} IoU" for name in names), "mean IoU")
     return Table("Points by number of iterations", columns, tuple(rows), PERCENT)
+
+
+def reliability_table(evaluations: Mapping[str, Evaluation]) -> Table:
+    """Mean confidence, share of right labels and calibration error, by method that tells a confidence."""
+    rows: list[tuple[Cell, ...]] = []
+    for method, evaluation in evaluations.items():
+        told = evaluation.reliability
+        for kind, bins in {"in view": told.points, "of objects": told.objects}.items() if told else ():
+            n = int(bins.points.sum())
+            means = [float(each.sum() / n) if n else None for each in (bins.confidence, bins.right)]
+            rows.append((method, kind, n, *map(percent, (*means, bins.calibration_error))))
+    columns = ("method", "points", "number", "confidence", "right", "calibration error")
+    note = f"In percent. Calibration error: mean distance of right from confidence, in {BINS} bins."
+    return Table("Reliability", columns, tuple(rows), note)
+
+
+def coverage_table(evaluations: Mapping[str, Evaluation]) -> Table:
+    """Points of objects that are at least so sure, and the precision of these, by method that tells a confidence."""
+    rows: list[tuple[Cell, ...]] = []
+    for method, evaluation in evaluations.items():
+        curve = evaluation.reliability.by_threshold.from_thresholds() if evaluation.reliability else ()
+        rows += [(method, f"{row[0]:.2f}", *map(percent, row[1:])) for row in curve if row[0] in SHOWN_THRESHOLDS]
+    columns = ("method", "confidence from", "coverage", "precision")
+    note = "In percent. Coverage: share of the points labelled as objects that are kept."
+    return Table("Points of objects by confidence", columns, tuple(rows), note)
 
 
 def _class_scores(evaluation: Evaluation) -> Iterator[tuple[str, int, *tuple[float | None, ...]]]:
