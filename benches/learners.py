@@ -12,7 +12,7 @@ from sklearn.semi_supervised import LabelSpreading
 
 from benches.frames import Frame
 from benches.scipy_pipeline import project
-from ldls.evaluation.methods import DBSCAN_MIN_POINTS, DBSCAN_RADIUS_M
+from ldls.evaluation.clusters import DBSCAN_MIN_POINTS, DBSCAN_RADIUS_M
 
 
 def project_and_cluster(frame: Frame, masks: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import ldls
 from ldls.cli import app
 from ldls.io.labels import write_annotations, write_labeling
 from ldls.labeling import Labeling
@@ -65,6 +66,63 @@ def test_methods_stand_side_by_side(frames):
     assert [row["IoU"] for row in rows[:3]] == [row["IoU"] for row in rows[3:]]
     assert "a network: 2 frames, 7 of 8 points counted" in outcome.output
     assert "do not compare" not in outcome.output
+
+
+@pytest.fixture
+def results(tmp_path, small_scene):
+    """A whole result in `mine`, and the two boxes before the wall in `truth`."""
+    points, masks, camera = small_scene
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "truth").mkdir()
+    instances = np.where(points[:, 2] < 12, np.where(points[:, 0] < 0, 2, 1), 0)
+    truth = Labeling(instances, instances, np.zeros(len(points), bool), NAMES)
+    for name in "12":
+        ldls.save(ldls.segment(points, masks, camera), tmp_path / f"mine/{name}.npz")
+        write_annotations(tmp_path / f"truth/{name}.txt", truth)
+    return tmp_path
+
+
+def test_whole_results_tell_what_their_masks_allow_and_how_sure_they_are(results):
+    outcome = evaluate(results, "--out", results / "t")
+    assert outcome.exit_code == 0, outcome.output
+    rows = json.loads((results / "t/semantic.json").read_text())["rows"]
+    assert [row["method"] for row in rows] == ["mine"] * 3 + ["bound"] * 3
+    assert [row["IoU"] for row in rows[3:]] == [100.0] * 3
+    rows = json.loads((results / "t/reliability.json").read_text())["rows"]
+    assert [(row["method"], row["points"]) for row in rows] == [("mine", "in view"), ("mine", "of objects")]
+    mean = np.mean([ldls.read_result(results / f"mine/{name}.npz").confidence for name in "12"])
+    assert rows[0]["confidence"] == pytest.approx(100 * mean, rel=1e-6)  # all points are in view
+    assert {"coverage.md", "coverage.png", "reliability.png"} <= {path.name for path in (results / "t").iterdir()}
+    assert "reliability.png, coverage.png to" in outcome.output
+
+
+def test_where_one_result_is_not_whole_there_is_no_bound(results):
+    result = ldls.read_result(results / "mine/2.npz")
+    write_labeling(results / "mine/2.npz", Labeling.from_segmentation(result))
+    outcome = evaluate(results, "--out", results / "t")
+    assert outcome.exit_code == 0, outcome.output
+    assert "bound" not in outcome.output
+    assert "Reliability" not in outcome.output
+    assert not (results / "t/coverage.png").exists()
+
+
+def test_a_method_of_the_name_bound_stays(results):
+    outcome = evaluate(results, "--out", results / "t", "--name", "bound")
+    assert outcome.exit_code == 0, outcome.output
+    assert len(json.loads((results / "t/semantic.json").read_text())["rows"]) == 3
+
+
+def test_a_confidence_out_of_range_is_one_line(results):
+    with np.load(results / "mine/2.npz") as file:
+        arrays = dict(file)
+    np.savez(results / "mine/2.npz", **arrays | {"confidence": arrays["confidence"] + 1})
+    outcome = evaluate(results)
+    assert outcome.exit_code == 1
+    assert "frame 2: expected confidence from 0 to 1" in outcome.stderr
+    np.savez(results / "mine/2.npz", **arrays | {"confidence": arrays["labels"].astype(str)})
+    outcome = evaluate(results)
+    assert outcome.exit_code == 1
+    assert "2.npz: confidence is <U" in outcome.stderr
 
 
 def test_methods_that_label_different_points_are_told_apart(frames):

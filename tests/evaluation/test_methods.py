@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.evaluation import methods
+from ldls.evaluation import ClassSet, Labeling, methods
 
 
 def test_direct_projection_takes_the_label_of_the_nearest_pixel(small_scene):
@@ -18,29 +18,68 @@ def test_direct_projection_takes_the_label_of_the_nearest_pixel(small_scene):
     np.testing.assert_array_equal(labels, expected)
 
 
-def test_an_instance_keeps_its_largest_cluster():
-    pytest.importorskip("sklearn")
-    generator = np.random.default_rng(3)
-    points = np.vstack([generator.normal([x, 0, 0], 0.1, (n, 3)) for x, n in ((0, 30), (5, 20), (9, 25), (20, 2))])
-    labels = np.repeat(np.array([1, 1, 2, 0], np.int32), (30, 20, 25, 2))
-    kept = methods.largest_clusters(points, labels)
-    np.testing.assert_array_equal(kept, np.repeat([1, 0, 2, 0], (30, 20, 25, 2)))
-
-
-@pytest.mark.parametrize("count", [1, 4], ids=["a single point", "fewer than make a cluster"])
-def test_points_too_few_for_a_cluster_become_background(count):
-    pytest.importorskip("sklearn")
-    labels = methods.largest_clusters(np.zeros((count, 3)), np.ones(count, np.int32))
-    np.testing.assert_array_equal(labels, 0)
-
-
-def test_every_method_labels_every_point(small_scene):
+@pytest.fixture
+def compared(small_scene):
+    """Points, the results that are compared, the labels of every method, and the truth."""
     pytest.importorskip("sklearn")
     points, masks, camera = small_scene
-    result = ldls.segment(points, masks, camera)
-    found = methods.compare(result)
-    assert list(found) == ["direct projection", "project + DBSCAN", "diffusion, no outlier removal", "ldls"]
-    np.testing.assert_array_equal(found[methods.FULL], result.labels)
-    np.testing.assert_array_equal(found[methods.DIFFUSION], result.diffused_labels)
+    near = points[:, 2] < 12
+    instances = np.where(near, np.where(points[:, 0] < 0, 1, 2), 0)
+    truth = Labeling(instances, instances, np.zeros(len(points), bool), ("background", "Pedestrian", "Car"))
+    full, paper = (ldls.segment(points, masks, camera, params=each) for each in (None, ldls.Params.paper()))
+    return points, full, paper, methods.compare(full, paper, truth, ClassSet.kitti()), truth
+
+
+def test_every_method_labels_every_point(compared):
+    _, full, paper, found, _ = compared
+    assert list(found) == [
+        "direct projection",
+        "project + DBSCAN",
+        "clusters in the mask",
+        "cluster ensemble",
+        "diffusion, no outlier removal",
+        "the paper's method",
+        "ldls",
+        "bound",
+    ]
+    np.testing.assert_array_equal(found[methods.FULL], full.labels)
+    np.testing.assert_array_equal(found[methods.PAPER], paper.labels)
+    np.testing.assert_array_equal(found[methods.DIFFUSION], paper.diffused_labels)
     for labels in found.values():
-        np.testing.assert_array_equal(labels >= 0, result.labels >= 0)
+        assert labels.dtype == np.int32
+        np.testing.assert_array_equal(labels >= 0, full.labels >= 0)
+
+
+def test_the_bound_is_the_truth_where_each_object_has_its_mask(compared):
+    *_, found, truth = compared
+    seen = found[methods.BOUND] >= 0
+    np.testing.assert_array_equal(found[methods.BOUND][seen], truth.instances[seen])
+
+
+def test_clusters_have_no_point_of_the_ground(compared, monkeypatch):
+    points, full, paper, found, truth = compared
+    # what is below the middle lies on it, and one height is not known
+    heights = np.where(points[full.in_view, 1] > 0, 0.1, 0.2)
+    heights[5] = np.nan
+    monkeypatch.setattr(methods.stages, "ground", lambda *_, **__: heights)
+    standing = np.ones(len(points), bool)
+    standing[full.in_view] = ~(heights < 0.2)
+    cut = methods.compare(full, paper, truth, ClassSet.kitti())
+    for name in (methods.IN_MASKS, methods.ENSEMBLE):
+        assert set(cut[name][~standing]) == {0}
+        assert set(cut[name][standing]) == {0, 1, 2}
+    np.testing.assert_array_equal(cut[methods.CLUSTERING], found[methods.CLUSTERING])
+
+
+def test_clusters_in_the_mask_are_those_of_dbscan(compared, monkeypatch):
+    from sklearn.cluster import DBSCAN
+
+    points, full, paper, _, truth = compared
+    monkeypatch.setattr(methods.stages, "ground", lambda xyz, *_, **__: np.full(len(xyz), np.nan))
+    found = methods.compare(full, paper, truth, ClassSet.kitti())
+    expected = np.minimum(full.direct_labels, 0)
+    for label in (1, 2):
+        members = np.flatnonzero(full.direct_labels == label)
+        numbers = DBSCAN(eps=1.2, min_samples=2).fit_predict(points[members])
+        expected[members[numbers == np.bincount(numbers[numbers >= 0]).argmax()]] = label
+    np.testing.assert_array_equal(found[methods.IN_MASKS], expected)

@@ -12,7 +12,7 @@ from ldls.cli import app
 from ldls.datasets import KittiObjectSource
 from ldls.errors import LeftOutWarning
 from ldls.evaluation import ClassSet, paper
-from ldls.evaluation.methods import CLUSTERING, DIFFUSION, DIRECT_PROJECTION, FULL
+from ldls.evaluation.methods import BOUND, CLUSTERING, DIFFUSION, DIRECT_PROJECTION, FULL, PAPER
 from ldls.io.labels import write_annotations
 from ldls.labeling import Labeling
 
@@ -97,12 +97,12 @@ def test_a_folder_without_a_part_is_refused(folder):
 
 def test_a_frame_without_masks_or_truth_is_refused(folder):
     with pytest.raises(ldls.InputError, match="frame 000000: has no truth; both are needed"):
-        next(paper.label(frames_of(folder, False)))
+        next(paper.label(frames_of(folder, False), classes=ClassSet.kitti()))
 
 
 def test_scores_are_those_of_the_labels(folder):
     frames = frames_of(folder)
-    labelled = list(paper.label(frames, iterations=(1, 200)))
+    labelled = list(paper.label(frames, classes=ClassSet.kitti(), iterations=(1, 20)))
     found = paper.score(labelled, classes=ClassSet.kitti(), ranges_m=(5, 20))
     for method, evaluation in found.methods.items():
         labels = labelled[0].methods[method].prediction.classes
@@ -113,7 +113,10 @@ def test_scores_are_those_of_the_labels(folder):
         # two frames that are the same
         assert counts.tp == 2 * int((car & (truth == 2)).sum())
         assert counts.fp == 2 * int((car & (truth != 2)).sum())
-    assert found.by_iterations[200].semantic.mean_iou == found.methods[FULL].semantic.mean_iou
+    assert found.by_iterations[20].semantic.mean_iou == found.methods[FULL].semantic.mean_iou
+    # confidence is told by the methods that diffuse to the end
+    told = [method for method, evaluation in found.methods.items() if evaluation.reliability]
+    assert told == [PAPER, FULL]
     assert found.by_range[5].semantic["Car"].tp == 0
     assert [score.name for score in found.objects] == ["Car", "Pedestrian"] * 2
     with pytest.raises(ldls.InputError, match="got no frame"):
@@ -123,23 +126,31 @@ def test_scores_are_those_of_the_labels(folder):
 def test_on_real_frames_each_step_of_the_method_gains(data_folder):
     with pytest.warns(LeftOutWarning, match="1 of 5 sweeps are left out: 1 no label_2"):
         frames = frames_of(data_folder / "kitti/training", "boxes")
-    found = paper.score(list(paper.label(frames, iterations=())), classes=ClassSet.kitti())
+    found = paper.score(list(paper.label(frames, classes=ClassSet.kitti(), iterations=())), classes=ClassSet.kitti())
     for name in ("Car", "Pedestrian"):
         iou = {method: evaluation.semantic[name].iou for method, evaluation in found.methods.items()}
-        assert iou[DIRECT_PROJECTION] < iou[DIFFUSION] < iou[FULL]
-        assert iou[CLUSTERING] < iou[FULL]
+        assert iou[DIRECT_PROJECTION] < iou[DIFFUSION] < iou[PAPER] < iou[FULL] < iou[BOUND]
+        assert iou[CLUSTERING] < iou[PAPER]
 
 
 def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
     out = tmp_path / "out"
     ran = CliRunner().invoke(app, ["reproduce", str(folder), "--out", str(out)])
     assert ran.exit_code == 0, ran.output
-    for title in ("Points by class", "Instances", "Ablation", "maximum range", "number of iterations"):
+    for title in (
+        "Points by class",
+        "Instances",
+        "Panoptic",
+        "Ablation",
+        "Reliability",
+        "maximum range",
+        "number of iterations",
+    ):
         assert title in ran.output
     written = {path.name for path in out.iterdir()}
-    stems = ("comparison", "instances", "panoptic", "ablation", "range", "iterations")
+    stems = ("comparison", "instances", "panoptic", "ablation", "reliability", "coverage", "range", "iterations")
     assert {f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")} <= written
-    assert {"range.png", "objects.png", "iterations.png"} <= written
+    assert {f"{stem}.png" for stem in ("range", "objects", "iterations", "reliability", "coverage")} <= written
     assert "nan" not in ran.output.lower()
 
 

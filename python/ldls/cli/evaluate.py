@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +13,8 @@ import typer
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import words
 from ldls.cli.progress import progress
-from ldls.errors import ParameterError
+from ldls.cli.reliability_files import draw_reliability
+from ldls.errors import ParameterError, UnsupportedFormatError
 
 if TYPE_CHECKING:
     from ldls.evaluation import Evaluation
@@ -67,14 +70,16 @@ def evaluate(
 ) -> None:
     """Score the labels of a method against true labels.
 
-    Prints precision, recall and IoU over points, instances found at IoU 0.50 and 0.70, and panoptic quality. Files
-    belong together by name: 000123.npz and 000123.txt.
+    Prints precision, recall and IoU over points, instances found at IoU 0.50 and 0.70, and panoptic quality; of .npz
+    results of ldls also how far their confidence can be relied on, and what their masks allow at best. Files belong
+    together by name: 000123.npz and 000123.txt.
 
     Example: ldls evaluate results label_2 --truth-format kitti-boxes --points velodyne --calib calib --out tables
     """
-    from ldls.cli.label_pairs import FrameFolders, read_pairs
+    from ldls.cli.label_pairs import FrameFolders, read_bounds, read_pairs
     from ldls.evaluation import ClassSet
-    from ldls.evaluation import evaluate as score
+    from ldls.evaluation import evaluate as score_pairs
+    from ldls.evaluation.methods import BOUND
     from ldls.io.labels.label_formats import pair_files
 
     scored = ClassSet.kitti(
@@ -85,13 +90,19 @@ def evaluate(
     )
     formats = {"prediction_format": prediction_format, "truth_format": truth_format}
     folders = FrameFolders(points=points, calib=calib, images=images)
+    score = partial(score_pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
     by_method = {}
     for method, path in {name or predictions.stem: predictions, **_named(beside or [])}.items():
         files, lacking = pair_files(path, truth, missing=missing.value, **formats)
         pairs = progress(read_pairs(files, folders=folders, **formats), len(files), "scoring")
-        by_method[method] = score(pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
+        by_method[method] = score(pairs)
         if lacking:
             typer.echo(f"{method}: left out for want of their pair: {_frames(len(lacking))}")
+    # labels alone have no masks
+    with suppress(UnsupportedFormatError):
+        files, _ = pair_files(predictions, truth, missing=missing.value, **formats)
+        bounds = read_bounds(files, classes=scored, folders=folders, **formats)
+        by_method.setdefault(BOUND, score(progress(bounds, len(files), "bound")))
     _show(by_method, out)
 
 
@@ -107,19 +118,23 @@ def _named(beside: list[str]) -> dict[str, Path]:
 
 
 def _show(by_method: dict[str, Evaluation], out: Path | None) -> None:
-    from ldls.evaluation import frame_table, instance_table, panoptic_table, semantic_table
+    from ldls.evaluation import tables
 
-    tables = {
-        "semantic": semantic_table(by_method),
-        "instances": instance_table(by_method),
-        "panoptic": panoptic_table(by_method),
+    shown = {
+        "semantic": tables.semantic_table(by_method),
+        "instances": tables.instance_table(by_method),
+        "panoptic": tables.panoptic_table(by_method),
     }
+    if any(scores.reliability for scores in by_method.values()):
+        shown |= {"reliability": tables.reliability_table(by_method), "coverage": tables.coverage_table(by_method)}
+    figures: list[Path] = []
     if out:
-        for stem, table in tables.items():
+        for stem, table in shown.items():
             table.write(out, stem)
-        frame_table(next(iter(by_method.values()))).write(out, "frames")
+        tables.frame_table(next(iter(by_method.values()))).write(out, "frames")
+        figures = draw_reliability(by_method, out)
     screen = console()
-    for table in tables.values():
+    for table in shown.values():
         screen.print(table.rich())
     for method, scores in by_method.items():
         counted, all_points = (sum(getattr(f, field) for f in scores.frames) for field in ("n_counted", "n_points"))
@@ -128,9 +143,8 @@ def _show(by_method: dict[str, Evaluation], out: Path | None) -> None:
     if len({sum(f.n_counted for f in scores.frames) for scores in by_method.values()}) > 1:
         screen.print("the methods label different points: their scores do not compare", highlight=False)
     if out:
-        screen.print(
-            f"wrote {', '.join(tables)} and frames as .md, .csv and .json to {out}", highlight=False, soft_wrap=True
-        )
+        written = [f"{', '.join(shown)} and frames as .md, .csv and .json", *(path.name for path in figures)]
+        screen.print(f"wrote {', '.join(written)} to {out}", highlight=False, soft_wrap=True)
 
 
 def _frames(number: int) -> str:

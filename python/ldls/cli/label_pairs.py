@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.errors import InputError
+from ldls.errors import InputError, UnsupportedFormatError
+from ldls.evaluation.bound import bound_labels
+from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.pair import Pair, ranges_of
-from ldls.io import read_camera, read_points
+from ldls.io import read_camera, read_points, read_result
 from ldls.io.images import read_image_size
 from ldls.io.labels.label_formats import FORMATS, LabelFiles, guess_format, read_labeling
+from ldls.io.labels.labeling_npz import read_confidence_npz
 from ldls.io.labels.squeezeseg import read_squeezeseg_ranges
 from ldls.labeling import Labeling
 
@@ -70,7 +73,9 @@ def read_pairs(
     truth_format: str | None = None,
     folders: FrameFolders | None = None,
 ) -> Iterator[Pair]:
-    """Prediction and truth of each frame; with `ranges_m` where points are given or SqueezeSeg's truth has them.
+    """Prediction and truth of each frame, with what is known of its points.
+
+    There are `ranges_m` where points are given or SqueezeSeg's truth has them, and confidences in `.npz` files of ldls.
 
     Raises:
         FileFormatError: A file is broken.
@@ -82,7 +87,34 @@ def read_pairs(
         points = None if folders.points is None else folders.read_points(frame.name)
         prediction = _read(frame.name, frame.prediction, prediction_format, folders, points)
         truth = _read(frame.name, frame.truth, truth_format, folders, points)
-        yield Pair(frame.name, prediction, truth, _ranges(frame, truth_format, points))
+        of_ldls = (prediction_format or guess_format(frame.prediction)) == "ldls"
+        confidence = read_confidence_npz(frame.prediction) if of_ldls else None
+        yield Pair(frame.name, prediction, truth, _ranges(frame, truth_format, points), confidence)
+
+
+def read_bounds(
+    files: Sequence[LabelFiles],
+    *,
+    classes: ClassSet,
+    prediction_format: str | None = None,
+    truth_format: str | None = None,
+    folders: FrameFolders | None = None,
+) -> Iterator[Pair]:
+    """The best labels that the masks of each frame's result allow, beside its truth.
+
+    Raises:
+        UnsupportedFormatError: A prediction is no whole result of ldls, of which alone the masks are known.
+        LdlsError: As `read_pairs`.
+    """
+    formats = {"prediction_format": prediction_format, "truth_format": truth_format}
+    for frame, pair in zip(files, read_pairs(files, folders=folders, **formats), strict=True):
+        # a whole result has confidences
+        if pair.confidence is None:
+            raise UnsupportedFormatError(f"{frame.prediction}: holds no masks, expected a result of ldls")
+        result = read_result(frame.prediction)
+        names = [instance.name for instance in result.instances]
+        labels = Labeling.from_instance_labels(bound_labels(result, pair.truth, classes), names)
+        yield replace(pair, prediction=labels, confidence=None)
 
 
 def _read(name: str, path: Path, format: str | None, folders: FrameFolders, points: Points | None) -> Labeling:

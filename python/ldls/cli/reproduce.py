@@ -11,6 +11,7 @@ import typer
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import SuitePart, words
 from ldls.cli.progress import progress
+from ldls.cli.reliability_files import draw_reliability
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -43,11 +44,12 @@ def reproduce(
     classes: Annotated[str, typer.Option(help="Classes to score, separated by commas.")] = "Car,Pedestrian",
     threads: Annotated[int | None, typer.Option(help="Frames at a time.", show_default="all cores")] = None,
 ) -> None:
-    """Run the paper's experiments: direct projection, project + DBSCAN, diffusion without and with outlier removal.
+    """Run the paper's experiments: from direct projection over clusters and the paper's method to ldls.
 
-    Labels every frame with each of them and prints the comparison by class, the instances found, the ablation, and
-    the scores by maximum range and by number of iterations. Only points in view of the camera count. Writes the
-    tables as Markdown, CSV and JSON, and the figures as PNG.
+    Labels every frame with each of them, and as well as its masks allow, and prints the comparison by class, the
+    instances found, the ablation, how far confidence can be relied on, and the scores of ldls by maximum range and by
+    number of iterations. Only points in view of the camera count. Writes the tables as Markdown, CSV and JSON, and
+    the figures as PNG.
 
     Examples:
     ldls reproduce --suite validation --out tables
@@ -60,14 +62,15 @@ def reproduce(
     from ldls.params import Params
 
     frames = KittiObjectSource(_folder(folder, suite), masks="masks", truth=truth.value)
-    labelled = progress(label(frames, params=Params(threads=threads)), len(frames), "labelling")
-    experiment = score(list(labelled), classes=ClassSet.kitti(words(classes)))
+    scored = ClassSet.kitti(words(classes))
+    labelled = progress(label(frames, classes=scored, params=Params(threads=threads)), len(frames), "labelling")
+    experiment = score(list(labelled), classes=scored)
     screen = console()
     tables = _tables(experiment)
     for stem, table in tables.items():
         table.write(out, stem)
         screen.print(table.rich())
-    figures = _draw(experiment, out)
+    figures = _draw(experiment, out) + draw_reliability(experiment.methods, out)
     screen.print(f"{len(frames)} frames; wrote {', '.join(tables)} as .md, .csv and .json", highlight=False)
     screen.print(f"and {', '.join(path.name for path in figures)} to {out}", highlight=False, soft_wrap=True)
 
@@ -92,6 +95,8 @@ def _tables(experiment: Experiment) -> dict[str, Table]:
         "instances": tables.instance_table(experiment.methods),
         "panoptic": tables.panoptic_table(experiment.methods),
         "ablation": tables.ablation_table(experiment.methods),
+        "reliability": tables.reliability_table(experiment.methods),
+        "coverage": tables.coverage_table(experiment.methods),
         "range": tables.range_table(experiment.by_range),
         "iterations": tables.iteration_table(experiment.by_iterations),
     }

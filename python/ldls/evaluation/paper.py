@@ -15,7 +15,7 @@ from ldls.errors import InputError
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.evaluation import Evaluation, evaluate
 from ldls.evaluation.instance import ObjectScore, object_scores
-from ldls.evaluation.methods import FULL, compare
+from ldls.evaluation.methods import FULL, PAPER, compare
 from ldls.evaluation.pair import Pair, ranges_of
 from ldls.label_diffusion import segment
 from ldls.labeling import Labeling
@@ -56,22 +56,23 @@ class LabelledPairs:
 
 
 def label(
-    frames: Source, *, params: Params | None = None, iterations: Sequence[int] = ITERATIONS
+    frames: Source, *, classes: ClassSet, params: Params | None = None, iterations: Sequence[int] = ITERATIONS
 ) -> Iterator[LabelledPairs]:
     """The labels of every method for each frame, in order, one frame a thread.
 
     Args:
         frames: Frames whose first image has masks, and that have truth.
-        params: Parameters of the diffusion; their threads are frames at a time.
+        classes: The scored classes, by which the bound is found.
+        params: Parameters of the full method; their threads are frames at a time.
         iterations: Numbers of iterations after which the labels of the full method are taken too.
 
     Raises:
-        InputError: A frame has no masks or no truth.
+        InputError: A frame has no masks or no truth, or truth has a class that `classes` does not know.
     """
     params = params or Params()
     one_thread = replace(params, threads=1)
     with ThreadPoolExecutor(params.threads or default_threads()) as workers:
-        yield from workers.map(lambda at: _label(frames[at], one_thread, iterations), range(len(frames)))
+        yield from workers.map(lambda at: _label(frames[at], classes, one_thread, iterations), range(len(frames)))
 
 
 def score(labelled: Sequence[LabelledPairs], *, classes: ClassSet, ranges_m: Sequence[float] = RANGES_M) -> Experiment:
@@ -98,24 +99,26 @@ def score(labelled: Sequence[LabelledPairs], *, classes: ClassSet, ranges_m: Seq
     )
 
 
-def _label(frame: Frame, params: Params, iterations: Sequence[int]) -> LabelledPairs:
+def _label(frame: Frame, classes: ClassSet, params: Params, iterations: Sequence[int]) -> LabelledPairs:
     image = frame.images[0]
     masks, camera = image.masks, image.camera
     if masks is None or frame.truth is None:
         raise InputError(f"frame {frame.name}: has no {'masks' if masks is None else 'truth'}; both are needed")
-    full = segment(frame.points, masks, camera, params=params)
+    full, paper = (segment(frame.points, masks, camera, params=each) for each in (params, Params.paper(threads=1)))
+    found, confidence = compare(full, paper, frame.truth, classes), {PAPER: paper.confidence, FULL: full.confidence}
     truth = _rows(frame.truth, full.in_view)
     names = [mask.name for mask in masks]
     ranges_m = ranges_of(frame.points[full.in_view])
 
-    def pair(labels: NDArray[np.int32]) -> Pair:
-        return Pair(frame.name, Labeling.from_instance_labels(labels[full.in_view], names), truth, ranges_m)
+    def pair(labels: NDArray[np.int32], sure: NDArray[np.float32] | None = None) -> Pair:
+        labeling = Labeling.from_instance_labels(labels[full.in_view], names)
+        return Pair(frame.name, labeling, truth, ranges_m, None if sure is None else sure[full.in_view])
 
     def after(count: int) -> NDArray[np.int32]:
         return segment(frame.points, masks, camera, params=replace(params, iterations=count)).labels
 
     return LabelledPairs(
-        methods={name: pair(labels) for name, labels in compare(full).items()},
+        methods={name: pair(labels, confidence.get(name)) for name, labels in found.items()},
         iterations={count: pair(after(count)) for count in iterations},
     )
 

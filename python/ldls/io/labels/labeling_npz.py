@@ -36,6 +36,19 @@ def read_labeling_npz(path: str | PathLike[str]) -> Labeling:
     )
 
 
+def read_confidence_npz(path: str | PathLike[str]) -> NDArray[np.floating] | None:
+    """(N,) `confidence` of an `.npz` file, 0 to 1; None where it holds none.
+
+    Raises:
+        CorruptFileError: It is not a whole `.npz` file, or these are no numbers.
+        FileNotFoundError: There is no such file.
+    """
+    confidence = read_npz(path).get("confidence")
+    if confidence is not None and confidence.dtype.kind != "f":
+        raise CorruptFileError(f"{path}: confidence is {confidence.dtype}, expected floating point")
+    return confidence
+
+
 def write_labeling(path: str | PathLike[str], labeling: Labeling) -> None:
     """Write the arrays of `labeling` to an `.npz` file under their names."""
     arrays = {"classes": labeling.classes, "instances": labeling.instances, "ignored": labeling.ignored}
