@@ -136,6 +136,7 @@ def depth_groups(distances, pixels, masks, standing, params):
     admitted = np.ones((len(distances), len(masks) + 1), bool)
     column, row = np.floor(pixels + 0.5).astype(int).reshape(-1, 2).T
     for m, mask in enumerate(masks):
+        admitted[:, m + 1] = False
         if not mask.any():
             continue
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
@@ -168,22 +169,22 @@ def object_interval(distances, weights, beside, params):
         else:
             groups.append([point])
 
-    def goes_on(group):
+    def on_mask(group):
         low, high = distances[group[0]] - 0.3, distances[group[-1]] + 0.3
         others = ((beside >= low) & (beside <= high)).sum()
-        return others > 0.25 * (others + len(group))
+        return len(group) / (len(group) + others)
 
     chains = [[groups[0]]]
     for before, group in pairwise(groups):
         last = distances[before[-1]]
         near = distances[group[0]] - last <= max(params.bridged_gap, 0.1 * last)
         lighter = group if weights[group].sum() <= weights[before].sum() else before
-        if params.bridged_gap > 0 and near and not goes_on(lighter):
+        if params.bridged_gap > 0 and near and on_mask(lighter) >= 0.75:
             chains[-1].append(group)
         else:
             chains.append([group])
-    best = max(chains, key=lambda chain: sum(weights[group].sum() for group in chain))
-    return distances[best[0][0]] - 0.3, distances[best[-1][-1]] + 0.3
+    best = max((sum(chain, []) for chain in chains), key=lambda chain: weights[chain].sum() * on_mask(chain))
+    return distances[best[0]] - 0.3, distances[best[-1]] + 0.3
 
 
 def point_edges(xyz, k, sigma, ground=None, ground_edges=1.0):

@@ -59,7 +59,7 @@ class DepthGroups:
 
     Attributes:
         intervals: (M, 2) float64 nearest and farthest distance of the object in metres; NaN where no point off the
-            ground falls on the mask, and all then may be of it.
+            ground falls on the mask: there is no object.
         distances: (n,) float64 distance of each point to the camera in metres.
         unsure: (n,) bool: whether a point stands beside the edge of a mask, as far away as its object, so that
             background pixels say nothing of it.

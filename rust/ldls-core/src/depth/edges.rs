@@ -3,8 +3,10 @@
 use crate::Rle;
 use std::ops::Range;
 
-/// Pixels from the edge on which all count alike.
+/// Most pixels by which a mask may be off, and pixels inside it on which all count alike.
 const REACH: usize = 10;
+/// Steps that stand for all beyond.
+const FARTHER: u8 = REACH as u8 + 1;
 /// Fewest pixels by which a mask may be off.
 const LEAST_MARGIN: usize = 3;
 
@@ -35,7 +37,7 @@ impl Edges {
         let to_inside = steps_to(&inside, true, rows.len());
         let signed = |(&out, &back): (&u8, &u8)| match (out, back) {
             (0, back) if usize::from(back) <= margin => -(back as i8),
-            (out, _) => out as i8,
+            (out, _) => out.min(REACH as u8) as i8,
         };
         let steps = to_outside.iter().zip(&to_inside).map(signed).collect();
         Some(Self {
@@ -66,15 +68,15 @@ fn extent(mask: &Rle) -> Option<[Range<usize>; 2]> {
     all
 }
 
-/// Steps from each pixel to the nearest one of `wanted`, at most [`REACH`], in columns of `height` pixels.
+/// Steps from each pixel to the nearest one of `wanted`, at most one more than [`REACH`], in columns of `height` pixels.
 fn steps_to(pixels: &[bool], wanted: bool, height: usize) -> Vec<u8> {
-    let start = |&pixel: &bool| if pixel == wanted { 0 } else { REACH as u8 };
+    let start = |&pixel: &bool| if pixel == wanted { 0 } else { FARTHER };
     let mut steps: Vec<u8> = pixels.iter().map(start).collect();
     // two passes: what comes from the columns before and the pixels above, and then the other way around
     for _ in 0..2 {
-        let mut before = vec![REACH as u8; height];
+        let mut before = vec![FARTHER; height];
         for column in steps.chunks_exact_mut(height) {
-            let mut above = REACH as u8;
+            let mut above = FARTHER;
             for row in 0..height {
                 let beside = &before[row.saturating_sub(1)..(row + 2).min(height)];
                 let nearest = beside
@@ -95,30 +97,39 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const ROWS: usize = 34;
+    const PIXELS: usize = ROWS * 40;
+
     proptest! {
         #[test]
         fn steps_equal_a_search_of_every_pixel(
-            pixels in proptest::collection::vec(proptest::bool::weighted(0.4), 9 * 14),
+            [left, top] in proptest::array::uniform2(0_usize..30), [width, height] in proptest::array::uniform2(1_usize..28),
+            others in proptest::collection::vec(0..PIXELS, 0..4), share in 0.0..1.0_f64,
         ) {
-            // column-major, 9 rows
-            let row_major: Vec<bool> = (0..9 * 14).map(|at| pixels[at % 14 * 9 + at / 14]).collect();
-            let mask = Rle::from_pixels(9, 14, &row_major).unwrap();
-            let Some(edges) = Edges::of(&mask, 1.0) else {
+            // column-major, a rectangle and some pixels more
+            let within = |at: usize| (left..left + width).contains(&(at / ROWS)) && (top..top + height).contains(&(at % ROWS));
+            let pixels: Vec<bool> = (0..PIXELS).map(|at| within(at) || others.contains(&at)).collect();
+            let row_major: Vec<bool> = (0..PIXELS).map(|at| pixels[at % 40 * ROWS + at / 40]).collect();
+            let mask = Rle::from_pixels(ROWS, 40, &row_major).unwrap();
+            let Some(edges) = Edges::of(&mask, share) else {
                 prop_assert!(!pixels.contains(&true));
                 return Ok(());
             };
             let [columns, rows] = extent(&mask).unwrap();
-            let margin = columns.len().min(rows.len()).clamp(LEAST_MARGIN, REACH);
-            for at in 0_usize..9 * 14 {
-                let steps = |other: usize| (at / 9).abs_diff(other / 9).max((at % 9).abs_diff(other % 9));
-                let others = (0..9 * 14).filter(|&other| pixels[other] != pixels[at]);
-                let nearest = others.map(steps).min().unwrap_or(REACH).min(REACH);
+            let shorter = columns.len().min(rows.len()) as f64;
+            let margin = ((share * shorter) as usize).clamp(LEAST_MARGIN, REACH);
+            for at in 0..PIXELS {
+                let steps = |other: usize| {
+                    (at / ROWS).abs_diff(other / ROWS).max((at % ROWS).abs_diff(other % ROWS))
+                };
+                let others = (0..PIXELS).filter(|&other| pixels[other] != pixels[at]);
+                let nearest = others.map(steps).min().unwrap_or(PIXELS);
                 let expected = match (pixels[at], nearest <= margin) {
-                    (true, _) => nearest as i8,
+                    (true, _) => nearest.min(REACH) as i8,
                     (false, true) => -(nearest as i8),
                     (false, false) => 0,
                 };
-                prop_assert_eq!(edges.depth_at([at / 9, at % 9]), expected);
+                prop_assert_eq!(edges.depth_at([at / ROWS, at % ROWS]), expected);
             }
         }
     }

@@ -6,8 +6,9 @@ use crate::Params;
 const GAP_SHARE: f64 = 0.03;
 /// The same for gaps that are bridged.
 const BRIDGED_SHARE: f64 = 0.1;
-/// A group that goes on beside the mask, with more than this share of its points there, is background: not bridged to.
-const MOST_BESIDE: f64 = 0.25;
+/// A group with a smaller share of its points on the mask, the others beside it, goes on as background does: it is not
+/// bridged to.
+const LEAST_ON_MASK: f64 = 0.75;
 /// Distance, in metres, by which an object reaches beyond its group.
 const SLACK_M: f64 = 0.3;
 
@@ -32,8 +33,9 @@ struct Group {
 /// Nearest and farthest distance of the object that `members` show, in metres: those of the heaviest group, the nearest
 /// of equals, and some slack. `beside` are the distances, ascending, of the points beside the mask.
 ///
-/// The long side of a vehicle seen from behind has gaps of metres. Groups apart by no more than `bridged_gap` are one
-/// unless the lighter one goes on beside the mask, as a wall behind a person does.
+/// What lies behind an object goes on beside its mask, so a group weighs as much as its points on the mask times their
+/// share of all at its distances. The long side of a vehicle seen from behind has gaps of metres: groups apart by no
+/// more than `bridged_gap` are one unless the lighter one goes on beside the mask.
 pub(super) fn object_of(
     mut members: Vec<Member>,
     beside: &[f64],
@@ -56,11 +58,13 @@ pub(super) fn object_of(
             }),
         }
     }
-    let goes_on = |group: &Group| {
-        let first = beside.partition_point(|&distance| distance < group.near - SLACK_M);
-        let last = beside.partition_point(|&distance| distance <= group.far + SLACK_M);
-        let beside = (last - first) as f64;
-        beside > MOST_BESIDE * (beside + group.points as f64)
+    // share of the points at the distances of a group that lie on the mask, the others beside it
+    let on_mask = |groups: &[Group]| {
+        let [near, far] = interval(groups);
+        let first = beside.partition_point(|&distance| distance < near);
+        let last = beside.partition_point(|&distance| distance <= far);
+        let points = groups.iter().map(|group| group.points).sum::<usize>() as f64;
+        points / (points + (last - first) as f64)
     };
     let one_object = |before: &Group, group: &Group| {
         let bridged = params.bridged_gap.max(BRIDGED_SHARE * before.far);
@@ -69,15 +73,25 @@ pub(super) fn object_of(
         } else {
             before
         };
-        params.bridged_gap > 0.0 && group.near - before.far <= bridged && !goes_on(lighter)
+        params.bridged_gap > 0.0
+            && group.near - before.far <= bridged
+            && on_mask(std::slice::from_ref(lighter)) >= LEAST_ON_MASK
     };
-    let chains = groups.chunk_by(one_object);
-    let weight = |chain: &[Group]| chain.iter().map(|group| group.weight).sum::<u64>();
-    let object = chains.rev().max_by_key(|chain| weight(chain))?;
-    Some([
-        object[0].near - SLACK_M,
-        object[object.len() - 1].far + SLACK_M,
-    ])
+    let weight = |chain: &[Group]| {
+        let weight = chain.iter().map(|group| group.weight).sum::<u64>();
+        weight as f64 * on_mask(chain)
+    };
+    let chains = groups.chunk_by(one_object).rev();
+    let heaviest = chains.max_by(|one, other| weight(one).total_cmp(&weight(other)));
+    heaviest.map(interval)
+}
+
+/// Nearest and farthest distance of neighbouring groups, with slack, in metres.
+fn interval(groups: &[Group]) -> [f64; 2] {
+    [
+        groups[0].near - SLACK_M,
+        groups[groups.len() - 1].far + SLACK_M,
+    ]
 }
 
 #[cfg(test)]
@@ -121,6 +135,20 @@ mod tests {
         assert_eq!(
             object(&rear_and_side, &[11.2, 12.5, 12.7]),
             [10.0 - SLACK_M, 10.1 + SLACK_M]
+        );
+    }
+
+    #[test]
+    fn what_goes_on_beside_the_mask_weighs_less() {
+        let person_before_wall = [5.0, 5.1, 5.2, 9.0, 9.1, 9.2, 9.3];
+        assert_eq!(
+            object(&person_before_wall, &[]),
+            [9.0 - SLACK_M, 9.3 + SLACK_M]
+        );
+        let wall = [8.9, 9.0, 9.2];
+        assert_eq!(
+            object(&person_before_wall, &wall),
+            [5.0 - SLACK_M, 5.2 + SLACK_M]
         );
     }
 

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DepthGroups {
     /// Nearest and farthest distance of the object of each mask to the camera, in metres; none where no point that
-    /// stands on the ground falls on the mask.
+    /// stands on the ground falls on the mask, so that there is no object.
     pub intervals: Vec<Option<[f64; 2]>>,
     /// Distance of each point to the camera, in metres.
     pub distances: Vec<f64>,
@@ -34,7 +34,7 @@ impl DepthGroups {
         match label.checked_sub(1) {
             None => !self.unsure[point],
             Some(m) => self.intervals[m as usize]
-                .is_none_or(|[near, far]| near <= distance && distance <= far),
+                .is_some_and(|[near, far]| near <= distance && distance <= far),
         }
     }
 }
