@@ -81,11 +81,11 @@ class DepthGroups:
     def behind_m(self, mask: int) -> NDArray[np.float64]:
         """How far behind the object of a mask, numbered from 0, each point (n,) is, in metres; negative before it.
 
-        0 as far away as the object, and for all where it has no interval: the mask may label these points.
+        0 as far away as the object: the mask labels these points. NaN for all where there is no object.
         """
         near, far = self.intervals[mask]
-        behind = np.maximum(self.distances - far, 0.0) + np.minimum(self.distances - near, 0.0)
-        return np.where(np.isnan(behind), 0.0, behind)
+        behind: NDArray[np.float64] = np.maximum(self.distances - far, 0.0) + np.minimum(self.distances - near, 0.0)
+        return behind
 
 
 def project(

@@ -49,6 +49,7 @@ def street(tmp_path_factory):
     points = [
         *np.flatnonzero(result.labels < result.diffused_labels)[::15],
         *np.flatnonzero(result.direct_labels > result.labels)[::40],
+        *np.flatnonzero((result.direct_labels == 0) & (result.labels > 0))[::20],
     ]
     return path, [ldls.explain(result, int(point)) for point in points]
 

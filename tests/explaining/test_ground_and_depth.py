@@ -1,6 +1,7 @@
 """Explanations of what the ground and the depth groups decide, against what the core did and plain loops."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,14 +12,19 @@ from ldls.explaining import rebuild, refused_labels
 from ldls.simulation import sample_frame
 from ring_samples import street_ring
 
+SHARES = ldls.Params(calibrated=False)
+"""Confidence is the share of the winner, which an explanation says too."""
+
 
 def one_camera():
     frame = sample_frame()
     (image,) = frame.images
-    return ldls.segment(frame.points, image.masks, image.camera)
+    return ldls.segment(frame.points, image.masks, image.camera, params=SHARES)
 
 
-@pytest.fixture(scope="module", params=[one_camera, lambda: ldls.segment(*street_ring())], ids=["camera", "ring"])
+@pytest.fixture(
+    scope="module", params=[one_camera, lambda: ldls.segment(*street_ring(), params=SHARES)], ids=["camera", "ring"]
+)
 def street(request):
     result = request.param()
     return result, rebuild(result), {point: ldls.explain(result, point) for point in some_points(result)}
@@ -46,6 +52,17 @@ def test_every_lost_label_has_a_reason_and_no_other_point_has_one(street):
             assert "the ground, nearer than 4 cm." in found.verdict
         reasons.add("removed" if removed else "cleared" if found.cleared else "")
     assert reasons == {"removed", "cleared", ""}
+
+
+def test_a_doubtful_label_is_left_out_for_its_doubt():
+    sure = one_camera()
+    doubtful = ldls.segment(sure.points, sure.masks, sure.views[0].view.camera, params=replace(SHARES, abstain=0.9))
+    changed = np.flatnonzero(doubtful.labels != sure.labels)
+    assert len(changed) and (doubtful.labels[changed] == 0).all()
+    assert doubtful.abstained[changed].all()
+    found = ldls.explain(doubtful, int(changed[0]))
+    assert found.verdict.endswith("only, less than 90.0 %.")
+    assert not found.cleared
 
 
 def test_components_keep_what_the_result_keeps(street):
@@ -97,6 +114,10 @@ def test_windows_say_how_far_behind_an_object_a_point_is(street):
                     assert each.counts != depths.unsure[at]
                     continue
                 (near, far), distance = depths.intervals[each.mask], depths.distances[at]
+                if np.isnan(near):
+                    assert np.isnan(each.behind_m)
+                    assert not each.counts
+                    continue
                 expected = distance - far if distance > far else distance - near if distance < near else 0.0
                 assert each.behind_m == pytest.approx(expected)
                 assert each.counts == (expected == 0)

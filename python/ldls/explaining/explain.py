@@ -47,6 +47,8 @@ def explain(result: Segmentation, point: int) -> Explanation:
         point=point,
         xyz=(x, y, z),
         label=int(result.labels[point]),
+        confidence=float(result.confidence[point]),
+        abstain=result.params.abstain,
         diffused_label=int(result.diffused_labels[point]),
         names={-1: "out of view", 0: "background", **{each.label: each.name for each in result.instances}},
         **seen,

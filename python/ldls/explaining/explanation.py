@@ -8,7 +8,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ldls.explaining.sight import Sight
+from ldls.stages import GROUND_M
 
+LOWEST_M, _ = GROUND_M
 LEAST_AT_DEPTH = 0.8
 """Share of its points that a part needs as far away as the object, to be kept."""
 
@@ -149,6 +151,8 @@ class Explanation:
         island: The part of the graph it lies in.
         height_m: Its height above the ground in metres; None where the parameters need no ground or none was found.
         clearance_m: Height in metres below which points became background; 0 for none.
+        confidence: How sure its label is, 0 to 1.
+        abstain: Confidence below which points became background; 0 for none.
     """
 
     point: int
@@ -165,6 +169,8 @@ class Explanation:
     island: Island | None = None
     height_m: float | None = None
     clearance_m: float = 0.0
+    confidence: float = 0.0
+    abstain: float = 0.0
 
     @property
     def winner(self) -> Likelihood | None:
@@ -179,8 +185,9 @@ class Explanation:
     @property
     def cleared(self) -> bool:
         """True if the point kept its label in outlier removal and lost it for it is near to the ground."""
-        components = self.components
-        return components is not None and not components.removed and self.label == 0
+        components, height_m = self.components, self.height_m
+        kept = components is not None and not components.removed and self.label == 0
+        return kept and height_m is not None and LOWEST_M < height_m < self.clearance_m
 
     @property
     def verdict(self) -> str:
@@ -195,6 +202,9 @@ class Explanation:
         if components is not None and self.cleared:
             near = f"{_height(self.height_m)}, nearer than {100 * self.clearance_m:g} cm"
             return f"{point} is background: diffusion gave it to {named(self, components.label)}, but it is {near}."
+        if components is not None and self.label == 0:
+            doubt = f"that is right with {percent(self.confidence)} only, less than {percent(self.abstain)}"
+            return f"{point} is background: diffusion gave it to {named(self, components.label)}, but {doubt}."
         return f"{point} is {named(self, self.label)}: {_lead(self)}{_refused(self)}."
 
     def to_dict(self) -> dict[str, Any]:
@@ -246,6 +256,8 @@ def _lead(explanation: Explanation) -> str:
 
 def away(behind_m: float) -> str:
     """How far a point is behind the object of a mask, or before it."""
+    if math.isnan(behind_m):
+        return "which has no object: nothing off the ground falls on its mask"
     metres = f"{abs(behind_m):.1f}" if abs(behind_m) >= 0.1 else "less than 0.1"
     return f"{metres} m {'behind' if behind_m > 0 else 'before'} it"
 

@@ -28,8 +28,8 @@ class WindowCount:
         pixels: How many; a pixel under two masks counts for both.
         counts: Whether they label the point: those of a mask if it is as far away as its object, those of the
             background unless it stands beside a mask.
-        behind_m: How far behind the object of the mask the point is, in metres, negative before it, 0 as far away; None
-            for the background, and where the parameters ask for no depth groups.
+        behind_m: How far behind the object of the mask the point is, in metres, negative before it, 0 as far away, NaN
+            without an object; None for the background, and where the parameters ask for no depth groups.
     """
 
     label: int
