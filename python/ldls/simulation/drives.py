@@ -155,7 +155,7 @@ def _on_the_ground(scene: Scene, ground: Ground, seconds: float, way_m: float) -
 def _moved_m(thing: SceneObject, ground: Ground, seconds: float) -> tuple[float, float, float]:
     x, y, _ = thing.centre_m
     dx, dy = (speed * seconds for speed in thing.velocity_m_s)
-    return dx, dy, ground.height_m(x + dx, y + dy) - ground.height_m(x, y)
+    return dx, dy, float(ground.height_m(x + dx, y + dy) - ground.height_m(x, y))
 
 
 def _in_the_way(drive: Drive, plan: Plan) -> set[int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ldls.simulation.shapes.shape import Colour, Material, Shape, join, painted
 
@@ -39,10 +39,12 @@ class Ground:
     roll_m: float
     phase: float
 
-    def height_m(self, x_m: float, y_m: float) -> float:
-        """Height of the surface at a place, in metres."""
-        strip = next((s for s in self.strips if y_m < s.left_m), self.strips[-1])
-        return float(self._base(np.array([x_m]), y_m)[0]) + strip.up_m
+    def height_m(self, x_m: ArrayLike, y_m: ArrayLike) -> NDArray[np.float64]:
+        """Height of the surface at places, in metres; of the shape of x and y together."""
+        x, y = np.asarray(x_m, np.float64), np.asarray(y_m, np.float64)
+        strip = np.searchsorted([s.left_m for s in self.strips[:-1]], y, side="right")
+        height: NDArray[np.float64] = self._base(x, y) + np.array([s.up_m for s in self.strips])[strip]
+        return height
 
     def shape(self) -> Shape:
         """The surface, with the upright faces of its kerbs."""

@@ -65,7 +65,7 @@ class Plan:
         c, s = np.cos(yaw), np.sin(yaw)
         middle = (low + high) / 2
         x, y = x_m + c * middle[0] - s * middle[1], y_m + s * middle[0] + c * middle[1]
-        centre = (float(x), float(y), self.ground.height_m(x_m, y_m) + float(middle[2]))
+        centre = (float(x), float(y), float(self.ground.height_m(x_m, y_m)) + float(middle[2]))
         velocity = (float(speed_m_s * c), float(speed_m_s * s))
         size = (float(length), float(width), float(height))
         self.objects.append(SceneObject(category, centre, *size, float(yaw), velocity))
@@ -80,7 +80,7 @@ class Plan:
         self.objects = [self.objects[m - 1] for m in kept]
 
     def _stand(self, shape: Shape, x_m: float, y_m: float, yaw: float) -> Shape:
-        return shape.turned(yaw).moved((x_m, y_m, self.ground.height_m(x_m, y_m)))
+        return shape.turned(yaw).moved((x_m, y_m, float(self.ground.height_m(x_m, y_m))))
 
     def _free(self, discs: NDArray[np.float64]) -> bool:
         apart = np.linalg.norm(discs[:, None, :2] - self._discs[None, :, :2], axis=-1)
