@@ -119,10 +119,10 @@ def ground(
 ) -> NDArray[np.float64]:
     """Height (n,) of each point above the ground in metres; NaN for all where no ground is found.
 
-    The ground is a cubic surface through the lowest points of polar cells around the camera, fitted so that what stands
-    on it does not count, and with `local_ground` what lies level around each point. Up is z of the lidar frame, or -y
-    where the camera looks along its z, as in clouds that are in the frame of the camera. Points from -0.3 m to 0.15 m
-    are the ground's.
+    The ground is a surface of degree 5 through the lowest points of polar cells around the camera, fitted so that what
+    stands on it does not count, and with `local_ground` what lies level around each point. Up is z of the lidar frame,
+    or -y where the camera looks along its z, as in clouds that are in the frame of the camera. Points from -0.3 m to
+    0.15 m are the ground's.
 
     Args:
         points: (n, >= 3) finite, in metres.

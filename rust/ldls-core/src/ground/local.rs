@@ -5,14 +5,14 @@ use std::collections::HashMap;
 /// Side of a cell, in metres; a cell looks at itself and the eight around it.
 const CELL_M: f64 = 1.0;
 /// Heights, in metres, among which the ground is looked for, below and above the surface.
-const NEAR_M: f64 = 0.2;
+const NEAR_M: f64 = 0.22;
 /// Steps in which heights are counted, and how many of them are as thick as the ground.
 const STEP_M: f64 = 0.02;
 const STEPS: usize = (2.0 * NEAR_M / STEP_M + 0.5) as usize;
 const THICKNESS: usize = 3;
 /// Points that the ground must have, and their share of those near the surface: the foot of an object is no ground.
-const LEAST_POINTS: u32 = 20;
-const LEAST_SHARE: f64 = 0.5;
+const LEAST_POINTS: u32 = 30;
+const LEAST_SHARE: f64 = 0.4;
 
 type Cell = [i64; 2];
 type Histogram = [u32; STEPS];

@@ -1,12 +1,13 @@
 //! The ground below a cloud: how high each point lies above it.
 //!
-//! A cubic surface through the lowest points follows slopes and bends where lines are sparse and where objects hide the
+//! A surface of degree 5 through the lowest points follows slopes and bends where lines are sparse and where objects hide the
 //! ground; a local offset follows kerbs and lawns where enough of the ground is seen.
 
 mod local;
 mod surface;
 
 use crate::Camera;
+use rayon::prelude::*;
 use surface::Surface;
 
 /// Points up to this height above the ground, in metres, belong to it: the noise of a lidar and a tuft of grass.
@@ -22,7 +23,11 @@ pub fn ground_heights(points: &[[f64; 3]], camera: &Camera, local: bool) -> Vec<
     let Some(surface) = Surface::fit(&places) else {
         return vec![f64::NAN; points.len()];
     };
-    let mut heights: Vec<f64> = places.iter().map(|place| surface.height(place)).collect();
+    let mut heights: Vec<f64> = places
+        .par_iter()
+        .with_min_len(4096)
+        .map(|place| surface.height(place))
+        .collect();
     if local {
         local::level(&places, &mut heights);
     }

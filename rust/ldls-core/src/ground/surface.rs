@@ -1,44 +1,48 @@
-//! A smooth ground: a cubic surface through the lowest points of polar cells, fitted so that what stands on the ground
-//! does not count.
+//! A smooth ground: a surface of degree 5 through the lowest points of polar cells, fitted so that what stands on the
+//! ground does not count.
 
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-/// Terms of a cubic in x and y.
-const TERMS: usize = 10;
+/// Degree of the surface in x and y, and how many terms that is.
+const DEGREE: usize = 5;
+const TERMS: usize = terms(DEGREE);
 /// Coordinates are counted in this many metres, so that all terms are of one size.
 const UNIT_M: f64 = 30.0;
-/// Width of a cell, in degrees.
-const SECTOR_DEG: f64 = 3.0;
-/// The outer radius of a cell over its inner one.
-const RING_RATIO: f64 = 1.08;
-/// Nearer points are of the vehicle itself; farther ones fall into the last ring.
-const NEAREST_M: f64 = 0.5;
+/// Sectors of a quadrant, by |y| / (|x| + |y|), which needs no arc tangent: 2.0 to 3.8 degrees wide.
+const SECTORS_A_QUADRANT: usize = 30;
+const SECTORS: usize = 4 * SECTORS_A_QUADRANT;
+/// Rings, equally wide, in which the distance doubles.
+const RINGS_A_DOUBLING: usize = 9;
 const RINGS: usize = 80;
-const SECTORS: usize = (360.0 / SECTOR_DEG) as usize;
+/// Nearer points are of the vehicle itself; farther ones than the rings reach fall into the last one.
+const NEAREST_M: f64 = 0.5;
 /// Fewer cells, or fewer of them on the surface, make no ground.
 const LEAST_CELLS: usize = 12;
 const ON_SURFACE_M: f64 = 0.15;
 /// Weight of a cell above the first plane: most cells have no ground in them.
 const ABOVE: f64 = 0.05;
 const FIRST_ROUNDS: usize = 12;
-/// Terms of the surface and the residual, in metres, that halves the trust in a cell below it, round by round.
-const ROUNDS: [(usize, f64); 8] = [
-    (3, 1.0),
+/// Degree of the surface, and the residual in metres that leaves a cell below it a quarter of its weight, round by round:
+/// a stiff surface may be far from the ground that it bends towards later, so trust narrows as it bends.
+const ROUNDS: [(usize, f64); 7] = [
+    (1, 1.0),
+    (2, 0.5),
     (3, 0.5),
-    (3, 0.3),
-    (6, 0.2),
-    (6, 0.15),
-    (10, 0.1),
-    (10, 0.1),
-    (10, 0.1),
+    (4, 0.4),
+    (5, 0.3),
+    (5, 0.2),
+    (5, 0.1),
 ];
-/// Share of the number of cells added to the diagonal for terms of degree 1, 2 and 3: where there is no ground, the
-/// surface goes on flat.
-const RIDGE: [f64; 4] = [0.0, 1e-5, 1e-3, 1e-2];
-const DEGREES: [usize; TERMS] = [0, 1, 1, 2, 2, 2, 3, 3, 3, 3];
+/// What stands on the ground lies above it, and nothing but noise below: a residual above counts as so many below.
+const ABOVE_COUNTS: f64 = 2.5;
+/// Share of the number of cells added to the diagonal for terms of each degree: where there is no ground, the surface goes
+/// on flat.
+const RIDGE: [f64; DEGREE + 1] = [0.0, 1e-5, 1e-4, 5e-4, 1e-3, 2e-3];
 
 type Terms = SVector<f64, TERMS>;
+/// The lowest place of a cell and its terms.
+type Cell = ([f64; 3], Terms);
 
 /// z = f(x, y) of the ground, in metres.
 pub(super) struct Surface {
@@ -53,9 +57,13 @@ impl Surface {
         if cells.len() < LEAST_CELLS {
             return None;
         }
-        let mut surface = Self::weighted(&cells, 3, |_| 1.0)?;
+        let cells: Vec<Cell> = cells
+            .into_iter()
+            .map(|place| (place, terms_at(&place)))
+            .collect();
+        let mut surface = Self::weighted(&cells, 1, |_| 1.0)?;
         for _ in 0..FIRST_ROUNDS {
-            surface = Self::weighted(&cells, 3, |place| {
+            surface = Self::weighted(&cells, 1, |place| {
                 if surface.height(place) > 0.0 {
                     ABOVE
                 } else {
@@ -63,50 +71,58 @@ impl Surface {
                 }
             })?;
         }
-        for (terms, scale) in ROUNDS {
-            surface = Self::weighted(&cells, terms, |place| {
+        for (degree, scale) in ROUNDS {
+            surface = Self::weighted(&cells, degree, |place| {
                 let height = surface.height(place);
-                // what stands on the ground lies above it, and nothing but noise below
-                let relative = if height > 0.0 {
-                    2.0 * height / scale
-                } else {
-                    height / scale
-                };
+                let counts = if height > 0.0 { ABOVE_COUNTS } else { 1.0 };
+                let relative = counts * height / scale;
                 (1.0 + relative * relative).powi(-2)
             })?;
         }
         let on_it = cells
             .iter()
-            .filter(|place| surface.height(place).abs() < ON_SURFACE_M);
+            .filter(|(place, _)| surface.height(place).abs() < ON_SURFACE_M);
         let below = surface.height(&[0.0; 3]) > 0.0;
         (below && on_it.count() >= LEAST_CELLS).then_some(surface)
     }
 
     /// Height of a place above the surface, in metres.
     pub(super) fn height(&self, place: &[f64; 3]) -> f64 {
-        place[2] - self.coefficients.dot(&terms_at(place))
+        let (x, y) = (place[0] / UNIT_M, place[1] / UNIT_M);
+        let mut z = 0.0;
+        // Horner's scheme, in x over those in y, which do not wait for one another
+        for of_x in (0..=DEGREE).rev() {
+            let mut factor = 0.0;
+            for of_y in (0..=DEGREE - of_x).rev() {
+                factor = factor * y + self.coefficients[terms(of_x + of_y) - of_x - 1];
+            }
+            z = z * x + factor;
+        }
+        place[2] - z
     }
 
-    /// The surface of the first `terms` terms with the least sum of weighted squares.
-    fn weighted(
-        cells: &[[f64; 3]],
-        terms: usize,
-        weight: impl Fn(&[f64; 3]) -> f64,
-    ) -> Option<Self> {
+    /// The surface of a degree with the least sum of weighted squares.
+    fn weighted(cells: &[Cell], degree: usize, weight: impl Fn(&[f64; 3]) -> f64) -> Option<Self> {
+        let terms = terms(degree);
         let mut normal = SMatrix::<f64, TERMS, TERMS>::identity();
         let mut right = Terms::zeros();
-        for term in 0..terms {
-            normal[(term, term)] = RIDGE[DEGREES[term]] * cells.len() as f64;
+        let ridges = RIDGE
+            .iter()
+            .enumerate()
+            .flat_map(|(of, &ridge)| vec![ridge; of + 1]);
+        for (term, ridge) in ridges.take(terms).enumerate() {
+            normal[(term, term)] = ridge * cells.len() as f64;
         }
-        for place in cells {
-            let (row, weight) = (terms_at(place), weight(place));
-            // the decomposition reads the lower half only
+        for (place, values) in cells {
+            let weight = weight(place);
             for across in 0..terms {
-                let weighted = weight * row[across];
+                let weighted = weight * values[across];
                 right[across] += weighted * place[2];
-                for down in across..terms {
-                    normal[(down, across)] += weighted * row[down];
-                }
+                // the decomposition reads the lower half only
+                let below = across * (TERMS + 1)..across * TERMS + terms;
+                let sums = normal.as_mut_slice()[below].iter_mut();
+                sums.zip(&values.as_slice()[across..terms])
+                    .for_each(|(sum, value)| *sum += weighted * value);
             }
         }
         let coefficients = normal.cholesky()?.solve(&right);
@@ -117,20 +133,25 @@ impl Surface {
     }
 }
 
+/// How many terms a polynomial of a degree in x and y has.
+const fn terms(degree: usize) -> usize {
+    (degree + 1) * (degree + 2) / 2
+}
+
+/// The products of powers of x and y, degree by degree; of one degree those with more of x first.
 fn terms_at(place: &[f64; 3]) -> Terms {
     let (x, y) = (place[0] / UNIT_M, place[1] / UNIT_M);
-    Terms::from([
-        1.0,
-        x,
-        y,
-        x * x,
-        x * y,
-        y * y,
-        x * x * x,
-        x * x * y,
-        x * y * y,
-        y * y * y,
-    ])
+    let mut terms = Terms::repeat(1.0);
+    let mut first = 0;
+    for degree in 1..=DEGREE {
+        let next = first + degree;
+        for before in first..next {
+            terms[before + degree] = x * terms[before];
+        }
+        terms[next + degree] = y * terms[next - 1];
+        first = next;
+    }
+    terms
 }
 
 /// The lowest place of each cell that has one, in the order of the cells; of equally low ones the first.
@@ -151,7 +172,13 @@ fn cell([x, y, _]: &[f64; 3]) -> Option<usize> {
     if !(ratio > 1.0) {
         return None;
     }
-    let ring = (ratio.ln() / RING_RATIO.ln()) as usize;
-    let sector = ((y.atan2(*x).to_degrees() + 180.0) / SECTOR_DEG) as usize;
+    // how often the distance doubles, with a straight line from one doubling to the next
+    let exponent = (ratio.to_bits() >> 52) - 1023;
+    let doublings = exponent as f64 + ratio / f64::from_bits((exponent + 1023) << 52) - 1.0;
+    let ring = (doublings * RINGS_A_DOUBLING as f64) as usize;
+    // a quarter of a turn is 1: from -1 to the right over 0 ahead and 1 to the left to 3
+    let across = y / (x.abs() + y.abs());
+    let turn = if *x >= 0.0 { across } else { 2.0 - across };
+    let sector = ((turn + 1.0) * SECTORS_A_QUADRANT as f64) as usize;
     Some(ring.min(RINGS - 1) * SECTORS + sector.min(SECTORS - 1))
 }
