@@ -1,6 +1,7 @@
 //! The local offset of the ground from its smooth surface: kerbs, lawns, ramps.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Side of a cell, in metres; a cell looks at itself and the eight around it.
 const CELL_M: f64 = 1.0;
@@ -14,7 +15,8 @@ const THICKNESS: usize = 3;
 const LEAST_POINTS: u32 = 30;
 const LEAST_SHARE: f64 = 0.4;
 
-type Cell = [i64; 2];
+type Cell = (i64, i64);
+type Cells = HashMap<Cell, usize, BuildHasherDefault<CellHasher>>;
 type Histogram = [u32; STEPS];
 
 /// Turns `heights` of `places` above the smooth surface, in metres, into those above the ground around each.
@@ -37,9 +39,9 @@ pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64]) {
 }
 
 /// The number of the cell of each place, and of each cell that has one.
-fn number_cells(places: &[[f64; 3]]) -> (Vec<usize>, HashMap<Cell, usize>) {
-    let mut cells = HashMap::new();
-    let mut last = ([i64::MIN; 2], 0);
+fn number_cells(places: &[[f64; 3]]) -> (Vec<usize>, Cells) {
+    let mut cells = Cells::default();
+    let mut last = ((i64::MIN, i64::MIN), 0);
     let number = |place: &[f64; 3]| {
         let cell = cell(place);
         // neighbours on a scan line share a cell
@@ -53,13 +55,14 @@ fn number_cells(places: &[[f64; 3]]) -> (Vec<usize>, HashMap<Cell, usize>) {
 }
 
 fn cell([x, y, _]: &[f64; 3]) -> Cell {
-    [x, y].map(|along| (along / CELL_M).floor() as i64)
+    let along = |axis: &f64| (axis / CELL_M).floor() as i64;
+    (along(x), along(y))
 }
 
 /// The heights counted in a cell and the eight around it.
-fn around(counts: &[Histogram], cells: &HashMap<Cell, usize>, [column, row]: Cell) -> Histogram {
+fn around(counts: &[Histogram], cells: &Cells, (column, row): Cell) -> Histogram {
     let mut sum = [0; STEPS];
-    for at in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [column + dx, row + dy])) {
+    for at in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (column + dx, row + dy))) {
         let Some(&number) = cells.get(&at) else {
             continue;
         };
@@ -88,4 +91,25 @@ fn offset(histogram: &Histogram) -> f64 {
         .map(|(step, &count)| f64::from(count) * height(step))
         .sum();
     sum / f64::from(full)
+}
+
+/// Hashes the two numbers of a cell in a few instructions: nobody picks points to make cells collide.
+#[derive(Default)]
+struct CellHasher(u64);
+
+impl Hasher for CellHasher {
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes
+            .iter()
+            .for_each(|&byte| self.write_i64(i64::from(byte)));
+    }
+
+    fn write_i64(&mut self, number: i64) {
+        self.0 =
+            (self.0.rotate_left(5) ^ number.cast_unsigned()).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
 }
