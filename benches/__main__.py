@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import statistics
 from collections.abc import Callable
@@ -31,7 +32,7 @@ def main() -> None:
     threads = options.threads or ldls._ldls.default_threads()
     # read when the peers are first imported; threads that spin when their work is done would slow the next one's
     os.environ |= {"OMP_NUM_THREADS": str(threads), "OMP_WAIT_POLICY": "PASSIVE"}
-    console, measured = Console(width=100), frame()
+    console, measured = Console(width=120), frame()
     with quiet_blas():
         for section in options.sections or SECTIONS:
             try:
@@ -278,6 +279,46 @@ def cameras(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
     return table
 
 
+def ground(_measured: Frame, _threads: int, runs: int, _most: int) -> Table:
+    """The ground of simulated scenes against Patchwork++: heights, labels and time."""
+    from benches import ground_peer, ground_scenes
+
+    seeds = range(4)
+    names = ("Patchwork++", "ldls, sweep", "Patchwork++ in view", "ldls in view")
+    table = _table(
+        f"ground of {2 * len(seeds)} simulated scenes a row",
+        ["slopes, lidar", "side", "p50, m", "p90", "p99", "precision", "recall", "IoU", "objects", "ms"],
+        "errors of height; objects: points of objects called ground; Patchwork++ is given whole sweeps; one thread",
+    )
+    for slopes, lidar in itertools.product(ground_scenes.SLOPES, ground_scenes.LIDARS):
+        found: dict[str, list[ground_peer.Mistakes]] = {name: [] for name in names}
+        seconds: dict[str, list[float]] = {name: [] for name in names}
+        for seed, kind in itertools.product(seeds, ("street", "campus")):
+            scene = ground_scenes.ground_scene(seed, kind, slopes, lidar)
+            whole, rows = np.arange(len(scene.points)), scene.in_view
+            in_view, peer = scene.points[rows], ground_peer.Patchwork(scene)
+            sides: dict[str, Callable[[], object]] = {
+                names[0]: peer.run,
+                names[1]: lambda scene=scene: ground_peer.our_ground(scene.points, scene.camera),  # type: ignore[misc]
+                names[3]: lambda scene=scene, seen=in_view: ground_peer.our_ground(seen, scene.camera),  # type: ignore[misc]
+            }
+            for name, median in medians(sides, runs=min(runs, 7)).items():
+                seconds[name].append(median)
+            said = peer.estimate()
+            for name, points, estimate in (
+                (names[0], whole, said),
+                (names[1], whole, ground_peer.our_ground(scene.points, scene.camera)),
+                (names[2], rows, said.of(rows)),
+                (names[3], rows, ground_peer.our_ground(in_view, scene.camera)),
+            ):
+                found[name].append(ground_peer.mistakes(scene, points, estimate))
+        for name in names:
+            ms = f"{statistics.median(seconds[name]) * 1e3:.1f}" if seconds[name] else ""
+            table.add_row(f"{slopes}, {lidar}", name, *ground_peer.Mistakes.joined(found[name]).row(), ms)
+        table.add_section()
+    return table
+
+
 SECTIONS = {
     "scipy": against_scipy,
     "learners": against_learners,
@@ -289,6 +330,7 @@ SECTIONS = {
     "runs": whole_runs,
     "masks": masks,
     "cameras": cameras,
+    "ground": ground,
 }
 
 
