@@ -111,6 +111,13 @@ def random_cloud(seed, points=3000):
     return np.random.default_rng(seed).uniform([-40, -40, -2], [40, 40, 3], (points, 3))
 
 
+def tufts(seed):
+    """Points spread over 22 cm of height, among which a layer at 10 cm grows from a tenth of all to most with x."""
+    generator = np.random.default_rng(seed)
+    x, y, spread, share = generator.uniform([2, -6, 0, 0], [30, 6, 0.22, 1], (9000, 4)).T
+    return np.column_stack([x, y, np.where(share < x / 32, 0.1, spread) - 1.7])
+
+
 CAMERA = pinhole()
 TURNED = np.array([[0, -1, 0, 0.3], [0, 0, -1, -0.2], [1, 0, 0, -0.5], [0, 0, 0, 1.0]])
 
@@ -121,6 +128,8 @@ TURNED = np.array([[0, -1, 0, 0.3], [0, 0, -1, -0.2], [1, 0, 0, -0.5], [0, 0, 0,
     [
         pytest.param(sloping_road(1)[0], id="boxes on a slope"),
         pytest.param(sloping_road(2, (-0.1, 0.08))[0], id="boxes on a steep slope"),
+        pytest.param(tufts(3), id="a layer among tufts"),
+        pytest.param(tufts(4)[::5], id="a layer of few points"),
         pytest.param(random_cloud(3), id="no ground in it"),
         pytest.param(random_cloud(4, 60), id="few points"),
         pytest.param(random_cloud(5) * [1, 1, 0.02], id="a thick plain"),
