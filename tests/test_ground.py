@@ -19,7 +19,8 @@ def expected_heights(points, center, local):
     places = np.asarray(points, np.float64)[:, :3] - center
     cells = lowest_places(places)
     surface = fitted(cells) if len(cells) >= 12 else None
-    if surface is None or (np.abs(above(surface, cells)) < 0.15).sum() < 12:
+    camera_below = surface is not None and above(surface, np.zeros((1, 3)))[0] <= 0
+    if surface is None or camera_below or (np.abs(above(surface, cells)) < 0.15).sum() < 12:
         return np.full(len(places), np.nan)
     heights = above(surface, places)
     return heights - local_offsets(places, heights) if local else heights
@@ -118,8 +119,9 @@ def tufts(seed):
     return np.column_stack([x, y, np.where(share < x / 32, 0.1, spread) - 1.7])
 
 
-CAMERA = pinhole()
-TURNED = np.array([[0, -1, 0, 0.3], [0, 0, -1, -0.2], [1, 0, 0, -0.5], [0, 0, 0, 1.0]])
+AHEAD = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
+TURNED = AHEAD + np.array([[0, 0, 0, 0.3], [0, 0, 0, -0.2], [0, 0, 0, -0.5], [0, 0, 0, 0]])
+CAMERA = pinhole(T_camera_lidar=AHEAD)
 
 
 @pytest.mark.parametrize("local", [False, True], ids=["smooth", "local"])
@@ -141,6 +143,12 @@ def test_heights_are_those_of_the_description(points, local):
     center = np.linalg.inv(TURNED)[:3, 3]
     heights = ldls.stages.ground(points, camera, local_ground=local)
     np.testing.assert_allclose(heights, expected_heights(points, center, local), rtol=0, atol=1e-6)
+
+
+def test_a_cloud_in_the_frame_of_its_camera_has_its_ground_below_minus_y():
+    points, _ = sloping_road(7)
+    turned = points @ AHEAD[:3, :3].T
+    np.testing.assert_allclose(ldls.stages.ground(turned, pinhole()), ldls.stages.ground(points, CAMERA), atol=1e-9)
 
 
 @pytest.mark.parametrize("local", [False, True], ids=["smooth", "local"])
