@@ -18,8 +18,7 @@ from rich.progress import track
 
 import ldls
 from ldls.datasets import Frame, KittiObjectSource
-from ldls.evaluation import ClassSet, Evaluation, Table, evaluate
-from ldls.evaluation.figures import curves_against
+from ldls.evaluation import ClassSet, Evaluation, Table, evaluate, iou_against
 from ldls.evaluation.methods import BOUND, DIRECT_PROJECTION, ENSEMBLE, FULL, IN_MASKS, PAPER, compare
 from ldls.evaluation.pair import Pair
 from ldls.labeling import Labeling
@@ -32,8 +31,6 @@ FIRST_SEEDS = {
 }
 FRAMES = {"tuning": 20, "validation": 40}
 CURVE_SEEDS = range(3400, 3420)
-COUNTED_POINTS = 20
-"""Points from which on an instance counts in recall."""
 TEN = tuple(name for category, name in CLASS_NAMES.items() if category != CYCLIST)
 
 OFF = {name: value for name, value in vars(ldls.Params.paper()).items() if name not in ("threads", "calibrated")}
@@ -119,7 +116,7 @@ def scores_of(frames: Sequence[Frame], labeller: Labeller, classes: ClassSet) ->
     """Scores of the labels of points in view."""
     with ThreadPoolExecutor() as pool:
         pairs = pool.map(lambda frame: pair_of(frame, labeller(frame)), frames)
-        return evaluate(pairs, classes=classes, minimum_points=COUNTED_POINTS)
+        return evaluate(pairs, classes=classes)
 
 
 def pair_of(frame: Frame, labels: NDArray[np.int32]) -> Pair:
@@ -156,10 +153,7 @@ def by_method(frames: Sequence[Frame], classes: ClassSet) -> Mapping[str, Evalua
 
     with ThreadPoolExecutor() as pool:
         labelled = list(pool.map(label, frames))
-    return {
-        name: evaluate([pairs[name] for pairs in labelled], classes=classes, minimum_points=COUNTED_POINTS)
-        for name in labelled[0]
-    }
+    return {name: evaluate([pairs[name] for pairs in labelled], classes=classes) for name in labelled[0]}
 
 
 def methods(folder: Path, part: str) -> Iterator[tuple[str, Table]]:
@@ -234,9 +228,11 @@ def curve(folder: Path, stem: str, name: str, scored: Mapping[float, Mapping[str
     """The table of a curve, and its figure beside it."""
     drawn = (DIRECT_PROJECTION, IN_MASKS, ENSEMBLE, PAPER, FULL, BOUND)
     lines = {method: {x: scored[x][method].semantic.mean_iou for x in scored} for method in drawn}
-    curves_against(lines, folder / f"curve-{stem}.png", label=name)
+    iou_against(lines, folder / f"curve-{stem}.png", label=name)
     rows = [(method, *(percent(lines[method][x]) for x in scored)) for method in drawn]
-    return Table(f"mean IoU of Car and Pedestrian against {name}, %", ("method", *(f"{x:g}" for x in scored)), tuple(rows))
+    return Table(
+        f"mean IoU of Car and Pedestrian against {name}, %", ("method", *(f"{x:g}" for x in scored)), tuple(rows)
+    )
 
 
 def of_settings(folder: Path, part: str, settings: Mapping[str, ldls.Params]) -> Table:
@@ -255,8 +251,8 @@ def table(title: str, sets: Mapping[str, object], rows: Sequence[tuple[object, .
 
 
 def shown(scores: Evaluation) -> str:
-    """Mean IoU, and recall of instances at IoU 0.70."""
-    counts = [scores.instance[name, 0.7] for name in scores.names]
+    """Mean IoU, and recall at IoU 0.70 of instances with 20 points or more."""
+    counts = [scores.well_seen[name, 0.7] for name in scores.names]
     found, true = sum(each.tp for each in counts), sum(each.tp + each.fn for each in counts)
     return f"{100 * (scores.semantic.mean_iou or 0):.1f} ({100 * found / max(true, 1):.0f})"
 

@@ -183,7 +183,8 @@ def object_interval(distances, weights, beside, params):
             chains[-1].append(group)
         else:
             chains.append([group])
-    best = max((sum(chain, []) for chain in chains), key=lambda chain: weights[chain].sum() * on_mask(chain))
+    joined = [np.concatenate(chain) for chain in chains]
+    best = max(joined, key=lambda chain: weights[chain].sum() * on_mask(chain))
     return distances[best[0]] - 0.3, distances[best[-1]] + 0.3
 
 

@@ -1,4 +1,5 @@
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from ldls.errors import ParameterError
 from ldls.evaluation import Counts
 from ldls.evaluation.figures import (
     COLORS,
-    iou_against_iterations,
+    iou_against,
     iou_against_range,
     precision_against_coverage,
     right_against_confidence,
@@ -34,7 +35,7 @@ TOLD = {"Car": reliability(1), "Pedestrian": reliability(2)}
 FIGURES = [
     pytest.param(scores_against_range, RANGES, id="scores against range"),
     pytest.param(iou_against_range, OBJECTS, id="IoU against range"),
-    pytest.param(iou_against_iterations, STEPS, id="IoU against iterations"),
+    pytest.param(partial(iou_against, label="steps", logarithmic=True), STEPS, id="IoU against iterations"),
     pytest.param(precision_against_coverage, TOLD, id="precision against coverage"),
 ]
 

@@ -113,7 +113,7 @@ def _draw(experiment: Experiment, out: Path) -> list[Path]:
     after = {name: {n: one.semantic[name].iou for n, one in experiment.by_iterations.items()} for name in names}
     paths = [out / "range.png", out / "iterations.png"]
     figures.scores_against_range(by_range, paths[0])
-    figures.iou_against_iterations(after, paths[1])
+    figures.iou_against(after, paths[1], label="diffusion steps", logarithmic=True)
     if any(objects.values()):
         paths.append(out / "objects.png")
         figures.iou_against_range(objects, paths[-1])

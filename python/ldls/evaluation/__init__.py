@@ -12,7 +12,7 @@ from ldls.evaluation.bound import bound_labels
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.evaluation import Evaluation, FrameCounts, evaluate
-from ldls.evaluation.figures import iou_against_iterations, iou_against_range, scores_against_range
+from ldls.evaluation.figures import iou_against, iou_against_range, scores_against_range
 from ldls.evaluation.instance import InstanceScores, ObjectScore, object_scores
 from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticQuality, PanopticScores
@@ -42,7 +42,7 @@ __all__ = [
     "evaluate",
     "frame_table",
     "instance_table",
-    "iou_against_iterations",
+    "iou_against",
     "iou_against_range",
     "object_scores",
     "panoptic_table",

@@ -67,12 +67,20 @@ def iou_against_range(scatter: Mapping[str, Sequence[tuple[float, float]]], path
     _save(figure, path)
 
 
-def iou_against_iterations(curves: Mapping[str, Mapping[int, float | None]], path: str | PathLike[str]) -> None:
-    """Draw IoU against the number of diffusion steps.
+def iou_against(
+    curves: Mapping[str, Mapping[float, float | None]],
+    path: str | PathLike[str],
+    *,
+    label: str,
+    logarithmic: bool = False,
+) -> None:
+    """Draw IoU against whatever was varied.
 
     Args:
-        curves: For each name in the legend, IoU from 0 to 1 by number of steps; None is left out.
+        curves: For each name in the legend, IoU from 0 to 1 by value; None is left out.
         path: PNG file to write.
+        label: What the values are, with their unit.
+        logarithmic: Whether values double rather than add up.
 
     Raises:
         ParameterError: There is nothing to draw.
@@ -80,13 +88,15 @@ def iou_against_iterations(curves: Mapping[str, Mapping[int, float | None]], pat
     figure = _figure(curves, width=7.0)
     axes = figure.subplots()
     for k, (name, scores) in enumerate(curves.items()):
-        _line(axes, k, name, {steps: scores[steps] for steps in sorted(scores)})
-    _dress(axes, "diffusion steps", IOU_LABEL)
-    axes.set_xscale("symlog")
-    steps = sorted({count for scores in curves.values() for count in scores})
-    axes.set_xticks(steps, [str(count) for count in steps], minor=False)
-    axes.set_xticks([], minor=True)
-    axes.set_xlim(0.85 * steps[0], 1.15 * steps[-1])
+        _line(axes, k, name, {value: scores[value] for value in sorted(scores)})
+    _dress(axes, label, IOU_LABEL)
+    values = sorted({value for scores in curves.values() for value in scores})
+    axes.set_xticks(values, [f"{value:g}" for value in values], minor=False)
+    if logarithmic:
+        axes.set_xscale("symlog")
+        axes.set_xticks(values, [f"{value:g}" for value in values], minor=False)
+        axes.set_xticks([], minor=True)
+        axes.set_xlim(0.85 * values[0], 1.15 * values[-1])
     _save(figure, path)
 
 
