@@ -50,7 +50,7 @@ SETTINGS: dict[str, tuple[object, ...]] = {
     "sigma": (0.03, 0.3, 1.0),
     "pixel_weight": (0.0001, 0.01, 0.1),
     "window": (1, 3, 9),
-    "iterations": (5, 10, 50, 200),
+    "iterations": (5, 20, 50, 200),
     "ground_edges": (0.0, 0.1, 1.0),
     "ground_clearance": (0.0, 0.02, 0.06, 0.08),
     "depth_gap": (0.4, 0.8, 1.2),

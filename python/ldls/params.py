@@ -53,7 +53,7 @@ class Params:
     sigma: float = 0.1
     pixel_weight: float = 0.001
     window: int = 5
-    iterations: int | None = 20
+    iterations: int | None = 10
     remove_outliers: bool = True
     ground_edges: float = 0.02
     ground_clearance: float = 0.04

@@ -7,11 +7,11 @@ use crate::Params;
 use crate::diffusion::Diffused;
 
 /// Constant, and the slope of the share and of the score, for points of objects.
-const OBJECT: [f64; 3] = [-2.32, 0.25, 2.46];
+const OBJECT: [f64; 3] = [-2.30, 0.23, 2.47];
 /// Constant and the slope of the share for points that diffusion gave to the background.
-const BACKGROUND: [f64; 2] = [2.21, 0.24];
+const BACKGROUND: [f64; 2] = [2.20, 0.24];
 /// The same for points that outlier removal or the ground made background: the surer diffusion was, the less sure.
-const REMOVED: [f64; 2] = [1.99, -0.25];
+const REMOVED: [f64; 2] = [1.93, -0.20];
 /// Shares and scores beyond these say no more.
 const SHARES: [f64; 2] = [0.01, 0.999];
 const SCORES: [f64; 2] = [0.05, 0.95];

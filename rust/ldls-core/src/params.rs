@@ -41,7 +41,7 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             sigma: 0.1,
-            iterations: Some(20),
+            iterations: Some(10),
             ground_edges: 0.02,
             ground_clearance: 0.04,
             local_ground: true,
