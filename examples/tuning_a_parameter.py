@@ -2,8 +2,8 @@
 
     python examples/tuning_a_parameter.py [OUT]        needs the extras sim and eval
 
-Tune on frames like yours and judge on others; the paper's parameters are a good start, and differences of a point or
-two of IoU on a handful of frames mean nothing.
+Tune on frames like yours and judge on others; the defaults are a good start, and differences of a point or two of IoU
+on a handful of frames mean nothing.
 """
 
 import sys
@@ -49,6 +49,6 @@ table = "\n".join(rows)
 (out / "tuning.md").write_text(table + "\n")
 print("mean IoU of car and person on the tuning frames, percent\n" + table)
 
-best, paper = max(found, key=found.__getitem__), ldls.Params()
+best, defaults = max(found, key=found.__getitem__), ldls.Params()
 print(f"best there: sigma = {best.sigma:g}, K = {best.neighbors}")
-print(f"on other frames: {mean_iou(held_out, best):.1f} with these, {mean_iou(held_out, paper):.1f} with the paper's")
+print(f"on other frames: {mean_iou(held_out, best):.1f} with these, {mean_iou(held_out, defaults):.1f} with the defaults")

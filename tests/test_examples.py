@@ -62,7 +62,7 @@ def test_a_second_run_over_a_drive_has_nothing_to_do(told):
 
 def test_tuning_ends_with_scores_on_other_frames(told):
     text, _ = told("tuning_a_parameter")
-    (scores,) = re.findall(r"on other frames: ([\d.]+) with these, ([\d.]+) with the paper's", text)
+    (scores,) = re.findall(r"on other frames: ([\d.]+) with these, ([\d.]+) with the defaults", text)
     assert all(30 < float(score) < 100 for score in scores)
 
 
