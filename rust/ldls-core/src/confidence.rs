@@ -49,14 +49,14 @@ fn log_odds(probability: f32, [low, high]: [f64; 2]) -> f64 {
 /// which it is below the parameters' become background.
 pub(crate) fn judge(
     labels: &mut [u32],
-    diffused: Diffused,
+    diffused: &Diffused,
     scores: &[f32],
     params: &Params,
 ) -> Vec<f32> {
     let confidence = if params.calibrated {
         calibrated_confidence(&diffused.confidence, &diffused.labels, labels, scores)
     } else {
-        diffused.confidence
+        diffused.confidence.clone()
     };
     let doubtful = |(_, confidence): &(_, &f32)| f64::from(**confidence) < params.abstain;
     let doubtful = labels.iter_mut().zip(&confidence).filter(doubtful);
@@ -101,7 +101,7 @@ mod tests {
             ..Params::paper()
         };
         let mut labels = [1, 1];
-        assert_eq!(judge(&mut labels, diffused, &[1.0], &params), [0.99, 0.4]);
+        assert_eq!(judge(&mut labels, &diffused, &[1.0], &params), [0.99, 0.4]);
         assert_eq!(labels, [1, 0]);
     }
 }

@@ -58,42 +58,28 @@ pub fn segment(
     let (in_view, mut images) = timed(&mut t.project, || {
         Images::project(cloud, views, same_object, keep_origin)
     })?;
-    let heights = timed(&mut t.depth, || {
-        find_ground(&in_view.points, &mut images, params)
-    });
-    let k = params.neighbors;
-    let nearest = timed(&mut t.neighbors, || Adjacency::search(in_view.points, k));
+    timed(&mut t.depth, || images.see_depth(&in_view.points, params));
+    let (scene, k) = (&images, params.neighbors);
+    let nearest = &timed(&mut t.neighbors, || Adjacency::search(in_view.points, k));
     let order = &nearest.order;
-    let pixels = timed(&mut t.pixel_labels, || images.pixel_labels(order, params))?;
-    let (a, b) = timed(&mut t.graph, || {
-        normalize(&nearest, pixels, &heights, params)
-    })?;
-    let exact = || {
-        normalize(
-            &nearest,
-            images.pixel_labels(order, params)?,
-            &heights,
-            params,
-        )
-    };
+    let pixels = timed(&mut t.pixel_labels, || scene.pixel_labels(order, params))?;
+    let (a, b) = timed(&mut t.graph, || normalize(nearest, pixels, scene, params))?;
+    let exact = || normalize(nearest, scene.pixel_labels(order, params)?, scene, params);
     let diffused = timed(&mut t.diffusion, || {
-        diffuse(&a, &b, images.n_labels(), params.iterations, exact)
+        diffuse(&a, &b, scene.n_labels(), params.iterations, exact)
     })?;
     let mut kept = timed(&mut t.components, || {
-        remove_outliers(&a, &diffused.labels, &heights, order, &images, params)
+        remove_outliers(&a, &diffused.labels, order, scene, params)
     })?;
-
-    let diffused_labels = diffused.labels.clone();
-    let report = Report::new(in_view.counts, &nearest, diffused.convergence);
-    let confidence = judge(&mut kept, diffused, &images.scores(), params);
+    let confidence = judge(&mut kept, &diffused, &scene.scores(), params);
 
     // back to the rows of the cloud
     let rows = arrange(order, &in_view.indices);
     Ok(Segmentation {
         labels: labels_of_cloud(cloud.len(), &rows, &kept),
-        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused_labels),
+        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels),
         confidence: scatter(cloud.len(), &rows, 0.0, confidence),
-        report,
+        report: Report::new(in_view.counts, nearest, diffused.convergence),
         in_view: in_view.indices,
         sightings: images.sightings,
         objects: images.objects,
@@ -120,29 +106,16 @@ fn check_edges(points: usize, neighbors: usize) -> Result<()> {
     })
 }
 
-/// Heights of the points in view above the ground, and depth groups in the images; NaN where nobody needs them.
-fn find_ground(points: &[[f64; 3]], images: &mut Images, params: &Params) -> Vec<f64> {
-    if !params.need_ground() {
-        return vec![f64::NAN; points.len()];
-    }
-    let heights = images.ground_heights(points, params.local_ground);
-    if params.need_depth() {
-        let standing: Vec<bool> = heights.iter().map(|&height| !is_ground(height)).collect();
-        images.group_by_depth(points, &standing, params);
-    }
-    heights
-}
-
 /// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
 fn normalize<T: Real>(
     nearest: &Adjacency,
     mut b: PixelLabels<T>,
-    heights: &[f64],
+    images: &Images,
     params: &Params,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
     let mut a = PointGraph::from_adjacency(nearest, params.sigma);
     if params.ground_edges < 1.0 {
-        let ground = |&point: &u32| is_ground(heights[point as usize]);
+        let ground = |&point: &u32| is_ground(images.heights[point as usize]);
         let ground: Vec<bool> = nearest.order.iter().map(ground).collect();
         a.weaken_ground_edges(&ground, params.ground_edges)?;
     }
@@ -154,7 +127,6 @@ fn normalize<T: Real>(
 fn remove_outliers(
     a: &PointGraph,
     labels: &[u32],
-    heights: &[f64],
     order: &[u32],
     images: &Images,
     params: &Params,
@@ -164,7 +136,7 @@ fn remove_outliers(
         let at_depth = |row: usize, label| images.at_depth(order[row], label);
         kept = remove_outliers_by_index(a, labels, order, params.part_size, at_depth)?;
     }
-    let heights = order.iter().map(|&point| heights[point as usize]);
+    let heights = order.iter().map(|&point| images.heights[point as usize]);
     clear_ground(&mut kept, heights, params.ground_clearance);
     Ok(kept)
 }

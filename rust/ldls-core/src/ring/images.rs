@@ -3,7 +3,7 @@
 use super::same_objects::{Objects, same_objects};
 use super::view::View;
 use crate::depth::DepthGroups;
-use crate::ground::ground_heights;
+use crate::ground::{ground_heights, is_ground};
 use crate::masks::PixelLabels;
 use crate::neighbors::arrange;
 use crate::projection::{Cloud, InView, Sighting, project};
@@ -21,6 +21,8 @@ pub(crate) struct Images<'a> {
     /// Label of each instance of each image, at the number of the instance; entry 0 is the background.
     labels: Vec<Vec<u32>>,
     pub(crate) objects: Objects,
+    /// Height of each point in view above the ground, in metres; NaN where it is not known.
+    pub(crate) heights: Vec<f64>,
     /// What depth says of the points that each image sees; empty where nobody asked.
     depths: Vec<DepthGroups>,
 }
@@ -58,29 +60,31 @@ impl<'a> Images<'a> {
             slots,
             sightings,
             objects,
+            heights: vec![f64::NAN; points],
             depths: Vec::new(),
         };
         Ok((in_view, images))
     }
 
-    /// Heights of `points` in view above the ground, by the first camera; NaN where there is none.
-    pub(crate) fn ground_heights(&self, points: &[[f64; 3]], local: bool) -> Vec<f64> {
-        let heights = |view: &View| ground_heights(points, view.camera, local);
-        let unknown = || vec![f64::NAN; points.len()];
-        self.views.first().map_or_else(unknown, heights)
-    }
-
-    /// Finds the object of each mask among `points` in view, `standing` those off the ground, by depth.
-    pub(crate) fn group_by_depth(
-        &mut self,
-        points: &[[f64; 3]],
-        standing: &[bool],
-        params: &Params,
-    ) {
+    /// Finds the ground below `points` in view, by the first camera, and the object of each mask by depth, where the
+    /// parameters ask for them.
+    pub(crate) fn see_depth(&mut self, points: &[[f64; 3]], params: &Params) {
+        let Some(first) = self.views.first().filter(|_| params.need_ground()) else {
+            return;
+        };
+        self.heights = ground_heights(points, first.camera, params.local_ground);
+        if !params.need_depth() {
+            return;
+        }
+        let standing: Vec<bool> = self
+            .heights
+            .iter()
+            .map(|&height| !is_ground(height))
+            .collect();
         let of_view = |(view, sighting): (&View, &Sighting)| {
-            let place = |&point: &u32| view.camera.distance(&points[point as usize]);
-            let distances = sighting.seen.iter().map(place).collect();
-            let standing = arrange(&sighting.seen, standing);
+            let distance = |&point: &u32| view.camera.distance(&points[point as usize]);
+            let distances = sighting.seen.iter().map(distance).collect();
+            let standing = arrange(&sighting.seen, &standing);
             view.masks
                 .depth_groups(&sighting.uv, distances, &standing, params)
         };
