@@ -42,7 +42,7 @@ def test_a_result_is_recorded_with_its_diffusion(saved):
     found = Recorded("frame.rrd")
     np.testing.assert_array_equal(vectors(found.last("world/points", "Points3D:positions")), saved.points)
     assert r"world/camera/camera\ 0/image" in found.entities
-    assert len(found.each("diffusion/points", "Points3D:colors")) == 51
+    assert len(found.each("diffusion/points", "Points3D:colors")) == 11
     assert run("frame.npz", "--rerun", "plain.rrd", "--diffusion", 0).exit_code == 0
     plain = Recorded("plain.rrd")
     assert plain.timelines == {"frame"} and not plain.each(r"world/camera/camera\ 0/image/masks", "EncodedImage:blob")
@@ -172,13 +172,13 @@ def test_segment_and_demo_record_too(small_scene, saved, tmp_path):
     rows = {"P2": camera.projection, "R0_rect": np.eye(3), "Tr_velo_to_cam": np.eye(4)[:3]}
     layouts.write_text(tmp_path / "c.txt", "".join(f"{key}: {layouts.row(m)}\n" for key, m in rows.items()))
     words = (
-        "segment --points p.bin --calib c.txt --masks m.npz --image image.png --out out --rerun s.rrd --diffusion 50"
+        "segment --points p.bin --calib c.txt --masks m.npz --image image.png --out out --rerun s.rrd --diffusion 4"
     )
     done = CliRunner().invoke(app, words.split())
     assert done.exit_code == 0 and "rerun s.rrd" in done.output, done.output
     found = Recorded("s.rrd")
     assert r"world/camera/camera\ 0/image" in found.entities
-    assert len(found.each("diffusion/points", "Points3D:colors")) == 5
+    assert len(found.each("diffusion/points", "Points3D:colors")) == 4
     done = CliRunner().invoke(app, ["demo", "--rerun", "d.rrd"])
     assert done.exit_code == 0 and "world/boxes" in Recorded("d.rrd").entities, done.output
     bad = CliRunner().invoke(app, words.replace("s.rrd", "s.png").split())

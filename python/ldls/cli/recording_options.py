@@ -26,7 +26,7 @@ DiffusionOption = Annotated[
         min=0,
         metavar="K",
         help="Record how labels spread, a picture every K products; 0 for none.",
-        show_default="4 of one frame, none of several",
+        show_default="1 of one frame, none of several",
     ),
 ]
 ONLY_CAMERA = "camera 0"

@@ -18,8 +18,8 @@ from ldls.viewing.recording.entities import log_points
 from ldls.viewing.recording.stream import Entity, rerun
 
 TIMELINE = "iteration"
-EVERY = 4
-"""Products from one picture to the next: 50 pictures of 200 products."""
+EVERY = 1
+"""Products from one picture to the next."""
 OF_CONVERGED = 200
 """Products that are shown of a result that was diffused until it converged."""
 
