@@ -89,17 +89,6 @@ def test_errors(run, tmp_path, capsys):
     assert names["report"].n_points == 5
 
 
-def test_parameters(run, capsys):
-    pytest.importorskip("embreex")
-    from ldls.simulation import suite_orders
-    from ldls.simulation.production import make_frames
-
-    frames = suite_orders("tuning")[:1]
-    assert len(list(make_frames("tuning", frames, processes=1))) == len(frames)
-    names = run("docs/parameters.md", holding="def scores")
-    assert len(capsys.readouterr().out.splitlines()) == len(names["SETTINGS"])
-
-
 def test_from_a_bag_to_a_labelled_bag(run):
     pytest.importorskip("rosbags")
     pytest.importorskip("embreex")
