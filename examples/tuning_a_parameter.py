@@ -51,4 +51,5 @@ print("mean IoU of car and person on the tuning frames, percent\n" + table)
 
 best, defaults = max(found, key=found.__getitem__), ldls.Params()
 print(f"best there: sigma = {best.sigma:g}, K = {best.neighbors}")
-print(f"on other frames: {mean_iou(held_out, best):.1f} with these, {mean_iou(held_out, defaults):.1f} with the defaults")
+scores = [mean_iou(held_out, params) for params in (best, defaults)]
+print("on other frames: {:.1f} with these, {:.1f} with the defaults".format(*scores))

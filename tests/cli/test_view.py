@@ -171,9 +171,7 @@ def test_segment_and_demo_record_too(small_scene, saved, tmp_path):
     ldls.save(masks, "m.npz")
     rows = {"P2": camera.projection, "R0_rect": np.eye(3), "Tr_velo_to_cam": np.eye(4)[:3]}
     layouts.write_text(tmp_path / "c.txt", "".join(f"{key}: {layouts.row(m)}\n" for key, m in rows.items()))
-    words = (
-        "segment --points p.bin --calib c.txt --masks m.npz --image image.png --out out --rerun s.rrd --diffusion 4"
-    )
+    words = "segment --points p.bin --calib c.txt --masks m.npz --image image.png --out out --rerun s.rrd --diffusion 4"
     done = CliRunner().invoke(app, words.split())
     assert done.exit_code == 0 and "rerun s.rrd" in done.output, done.output
     found = Recorded("s.rrd")

@@ -110,7 +110,8 @@ def _draw(experiment: Experiment, out: Path) -> list[Path]:
     names = experiment.methods[FULL].names
     by_range = {name: {limit: one.semantic[name] for limit, one in experiment.by_range.items()} for name in names}
     objects = {name: [(one.range_m, one.iou) for one in experiment.objects if one.name == name] for name in names}
-    after = {name: {n: one.semantic[name].iou for n, one in experiment.by_iterations.items()} for name in names}
+    by_count = experiment.by_iterations.items()
+    after = {name: {float(count): one.semantic[name].iou for count, one in by_count} for name in names}
     paths = [out / "range.png", out / "iterations.png"]
     figures.scores_against_range(by_range, paths[0])
     figures.iou_against(after, paths[1], label="diffusion steps", logarithmic=True)
