@@ -1,4 +1,4 @@
-"""`python -m benches.accuracy OUT`: what each part of the method is worth, on simulated frames of four lidars.
+"""`python -m benches.accuracy`: what each part of the method is worth, on simulated frames of four lidars.
 
 Choosing is done on the part `tuning`; `--part validation` is for the end, and has frames that nothing was chosen on.
 """
@@ -65,7 +65,7 @@ Labeller = Callable[[Frame], NDArray[np.int32]]
 def main() -> None:
     """Make the frames, label them and write the tables."""
     parser = argparse.ArgumentParser(prog="python -m benches.accuracy", description=__doc__)
-    parser.add_argument("out", type=Path, help="folder for frames, tables and figures")
+    parser.add_argument("--out", type=Path, default=Path("accuracy"), help="folder for frames, tables and figures")
     parser.add_argument("--part", choices=FRAMES, default="tuning")
     parser.add_argument("sections", nargs="*", choices=[[], *SECTIONS], help="what to measure (default: all)")
     options = parser.parse_args()

@@ -53,9 +53,14 @@ def recipes(page: Path) -> list[Recipe]:
 
 def commands(block: str) -> list[list[str]]:
     """The words of each `ldls ...` in a block of shell."""
+    return [words for words in shell_commands(block) if words[0] == "ldls"]
+
+
+def shell_commands(block: str) -> list[list[str]]:
+    """The words of each command in a block of shell."""
     lines = block.replace("\\\n", " ").splitlines()
-    parts = [part.strip() for line in lines for part in SHELL_WORDS.split(line)]
-    return [shlex.split(part, comments=True) for part in parts if part.startswith("ldls ")]
+    parts = [shlex.split(part, comments=True) for line in lines for part in SHELL_WORDS.split(line)]
+    return [words for words in parts if words]
 
 
 def inline_commands(text: str) -> list[list[str]]:

@@ -52,7 +52,7 @@ def test_every_picture_is_made_by_a_command_beside_it(page):
     ("page", "recipe"), [pytest.param(*case, id=f"{name_of(case[0])}: {', '.join(case[1].files)}") for case in RECIPES]
 )
 def test_the_command_writes_that_file(page, recipe):
-    words = [word for command in pages.commands(recipe.commands) for word in itertools.pairwise(command)]
+    words = [word for command in pages.shell_commands(recipe.commands) for word in itertools.pairwise(command)]
     folders = {Path(value) for option, value in words if option == "--out"}
     written = {value for option, value in words if option == "--picture"}
     for file in recipe.files.values():
