@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -13,7 +14,9 @@ from pages import ROOT, Recipe, pages, recipes
 
 def make(recipe: Recipe, folder: Path) -> dict[str, Path]:
     """Run the commands of a recipe in a folder; what they made, by the paths of the pictures in the repository."""
-    subprocess.run(["bash", "-euo", "pipefail", "-c", recipe.commands], cwd=folder, check=True)
+    # benches are no part of the package, and found in the source tree
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))}
+    subprocess.run(["bash", "-euo", "pipefail", "-c", recipe.commands], cwd=folder, env=environment, check=True)
     return {picture: folder / file for picture, file in recipe.files.items()}
 
 
