@@ -12,6 +12,7 @@ _Depths: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.
 _Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 __all__ = [
+    "GROUND_M",
     "Camera",
     "Masks",
     "Products",
@@ -37,6 +38,7 @@ __all__ = [
 ]
 
 __version__: str
+GROUND_M: list[float]
 
 @final
 class Rle:

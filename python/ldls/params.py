@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from dataclasses import dataclass, fields
+from numbers import Real
 
 import ldls._ldls as _ldls
 from ldls.errors import ParameterError
@@ -112,7 +113,9 @@ def check_whole_number(name: str, value: object) -> None:
 
 
 def _number(name: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ParameterError(f"{name}: got {value!r}, expected a number")
     try:
-        float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name}: got {value!r}, expected a number") from None
+        float(value)
+    except OverflowError:
+        raise ParameterError(f"{name}: got a number of {len(str(value))} digits, expected a finite one") from None

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 _BEST = Params()
-GROUND_M = (-0.3, 0.15)
-"""Heights between which points are the ground's."""
+GROUND_M = _ldls.GROUND_M
+"""Heights in metres between which points are the ground's."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,7 @@ mod _ldls {
         use pyo3::types::PyModuleMethods;
         crate::call::remember_panics();
         crate::allocator::keep_for_a_while();
+        module.add("GROUND_M", ldls_core::GROUND_M)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -10,10 +10,9 @@ use crate::Camera;
 use rayon::prelude::*;
 use surface::Surface;
 
-/// Points up to this height above the ground, in metres, belong to it: the noise of a lidar and a tuft of grass.
-const TOP_M: f64 = 0.15;
-/// Points lower than this, in metres, lie in a pit or under a surface that is not the ground.
-const BOTTOM_M: f64 = -0.3;
+/// Heights between which points belong to the ground, in metres: lower ones lie in a pit or under a surface that is not
+/// the ground, and up to the upper one there are the noise of a lidar and tufts of grass.
+pub const GROUND_M: [f64; 2] = [-0.3, 0.15];
 
 /// Height of each of `points` (metres) above the ground that `camera` stands on, NaN where none is found.
 ///
@@ -36,7 +35,7 @@ pub fn ground_heights(points: &[[f64; 3]], camera: &Camera, local: bool) -> Vec<
 
 /// True for a point of the ground, by its height above it in metres.
 pub fn is_ground(height: f64) -> bool {
-    BOTTOM_M < height && height < TOP_M
+    GROUND_M[0] < height && height < GROUND_M[1]
 }
 
 /// Turns labels of points nearer to the ground than `clearance`, in metres, into background; at 0 none.
@@ -44,7 +43,7 @@ pub fn clear_ground(labels: &mut [u32], heights: impl IntoIterator<Item = f64>, 
     if clearance <= 0.0 {
         return;
     }
-    let low = |height: f64| BOTTOM_M < height && height < clearance;
+    let low = |height: f64| GROUND_M[0] < height && height < clearance;
     let labelled = labels.iter_mut().zip(heights);
     labelled
         .filter(|(_, height)| low(*height))
