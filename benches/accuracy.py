@@ -23,6 +23,7 @@ from ldls.evaluation.methods import BOUND, DIRECT_PROJECTION, ENSEMBLE, FULL, IN
 from ldls.evaluation.pair import Pair
 from ldls.labeling import Labeling
 from ldls.simulation import FrameOrder, SegmenterErrors, SensorErrors, make_frames, suite_orders
+from ldls.simulation.production import seeded_orders
 from ldls.simulation.scene_object import CLASS_NAMES, CYCLIST
 
 FIRST_SEEDS = {
@@ -90,18 +91,10 @@ def orders_of(
     segmenter: SegmenterErrors | None = None,
     sensors: SensorErrors | None = None,
 ) -> list[FrameOrder]:
-    """Streets of even seeds and campuses of odd ones."""
-    return [
-        FrameOrder(
-            name=f"{number:06d}",
-            seed=seed,
-            kind="campus" if seed % 2 else "street",
-            lidar=lidar,
-            segmenter=segmenter or SegmenterErrors(),
-            sensors=sensors or SensorErrors(),
-        )
-        for number, seed in enumerate(seeds)
-    ]
+    """The frames of some seeds, with the usual errors where none are given."""
+    return seeded_orders(
+        seeds, lidar=lidar, segmenter=segmenter or SegmenterErrors(), sensors=sensors or SensorErrors()
+    )
 
 
 def frames_of(folder: Path, orders: Sequence[FrameOrder]) -> list[Frame]:

@@ -123,6 +123,8 @@ def test_the_stages_together_equal_the_whole(frame_571):
     labels = stages.remove_outliers(A, z.argmax(axis=1), depths=depths, heights=heights)
     result = ldls.segment(frame.points, frame.masks, frame.camera)
     np.testing.assert_array_equal(labels, result.labels[in_view])
+    confidence = stages.confidence(z, labels, frame.masks)
+    np.testing.assert_allclose(confidence, result.confidence[in_view], atol=1e-5)
 
 
 def test_the_stages_of_the_paper_equal_the_reference(frame_571):

@@ -207,11 +207,11 @@ def point_graph(
     columns = np.ascontiguousarray(indices, np.uint32)
     if columns.ndim != 2:
         raise ShapeError(f"indices: expected (n, k), got shape {columns.shape}")
-    xyz, low = _finite_xyz(points), None
+    xyz, on_ground = _finite_xyz(points), None
     if heights is not None:
         above = _per_point("heights", heights, len(xyz), np.float64)
-        low = (above > GROUND_M[0]) & (above < GROUND_M[1])
-    return _csr(_ldls.point_graph(xyz, columns, sigma, low, ground_edges, threads), len(columns))
+        on_ground = (above > GROUND_M[0]) & (above < GROUND_M[1])
+    return _csr(_ldls.point_graph(xyz, columns, sigma, on_ground, ground_edges, threads), len(columns))
 
 
 def pixel_labels(
@@ -230,8 +230,8 @@ def pixel_labels(
     """
     Params(window=window, pixel_weight=pixel_weight)
     uv = np.ascontiguousarray(pixels, np.float64)
-    said = None if depths is None else _checked(depths, len(uv), len(masks))
-    weights, mass = _ldls.pixel_labels(uv, masks.core, window, pixel_weight, said, threads)
+    groups = None if depths is None else _checked(depths, len(uv), len(masks))
+    weights, mass = _ldls.pixel_labels(uv, masks.core, window, pixel_weight, groups, threads)
     return PixelLabels(_csr(weights, len(masks) + 1), mass)
 
 
@@ -333,12 +333,12 @@ def remove_outliers(
         raise DtypeError(f"labels: expected (n,) whole numbers, got {array.dtype} {array.shape}")
     if array.size and array.min() < 0:
         raise InputError("labels: expected 0 or more; pass the points in view only")
-    said, least = None, 1.0
+    groups, least = None, 1.0
     if depths is not None:
-        said, least = _checked(depths, len(array), int(array.max(initial=0))), _BEST.part_size
+        groups, least = _checked(depths, len(array), int(array.max(initial=0))), _BEST.part_size
     size = least if part_size is None else part_size
     Params(part_size=size, ground_clearance=ground_clearance)
-    kept = _ldls.remove_outliers(_arrays(graph), np.ascontiguousarray(array, np.uint32), size, said)
+    kept = _ldls.remove_outliers(_arrays(graph), np.ascontiguousarray(array, np.uint32), size, groups)
     if heights is None:
         return kept
     above = _per_point("heights", heights, len(kept), np.float64)

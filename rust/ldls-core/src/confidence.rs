@@ -82,9 +82,9 @@ mod tests {
 
     #[test]
     fn confidence_is_a_probability_whatever_comes() {
-        for value in [f32::NAN, f32::INFINITY, -1.0, 0.0, 1.0] {
+        for value in [f32::INFINITY, -1.0, 0.0, 1.0] {
             let found = confidence(value, 1, 1, value);
-            assert!((0.0..=1.0).contains(&found) || value.is_nan());
+            assert!((0.0..=1.0).contains(&found));
         }
     }
 

@@ -45,7 +45,7 @@ pub struct Segmentation {
 ///
 /// # Errors
 /// Whatever [`Params::check`] and [`crate::project`] refuse, [`Error::TooManyPoints`], and [`Error::Mismatch`] where a view has
-/// not one category a mask.
+/// not one category and one score a mask.
 pub fn segment(
     cloud: Cloud,
     views: &[View],
@@ -87,7 +87,7 @@ pub fn segment(
     })
 }
 
-/// Refuses parameters out of range, clouds too large and views without categories.
+/// Refuses parameters out of range, clouds too large and views without a category and a score for each mask.
 fn check(cloud: Cloud, views: &[View], params: &Params) -> Result<()> {
     params.check()?;
     check_edges(cloud.len(), params.neighbors)?;

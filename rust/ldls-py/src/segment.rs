@@ -27,7 +27,7 @@ pub struct ParamsAttributes {
     part_size: f64,
     calibrated: bool,
     abstain: f64,
-    threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
 }
 
 impl ParamsAttributes {

@@ -81,7 +81,7 @@ pub fn depth_groups(
     let points = rows::<3>(py, "points", &points)?;
     let pixels = rows::<2>(py, "pixels", &pixels)?;
     let heights = slice(py, "heights", &heights)?;
-    let groups = run(py, None, || {
+    let groups = run(py, params.threads, || {
         let distances = points
             .iter()
             .map(|point| camera.0.distance(point))
@@ -239,7 +239,7 @@ pub fn diffuse(
     ))
 }
 
-/// Labels without what is not in the largest component of each, nor part of its object, and without the ground.
+/// Labels without what is not in the largest component of each, nor part of its object.
 #[pyfunction]
 pub fn remove_outliers(
     py: Python<'_>,

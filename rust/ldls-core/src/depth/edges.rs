@@ -49,7 +49,7 @@ impl Edges {
 
     /// Steps from the pixel `[column, row]` to the edge: positive inside the mask, negative beside it within the margin,
     /// 0 elsewhere.
-    pub(super) fn depth_at(&self, [column, row]: [usize; 2]) -> i8 {
+    pub(super) fn steps_at(&self, [column, row]: [usize; 2]) -> i8 {
         if !self.columns.contains(&column) || !self.rows.contains(&row) {
             return 0;
         }
@@ -129,7 +129,7 @@ mod tests {
                     (false, true) => -(nearest as i8),
                     (false, false) => 0,
                 };
-                prop_assert_eq!(edges.depth_at([at / ROWS, at % ROWS]), expected);
+                prop_assert_eq!(edges.steps_at([at / ROWS, at % ROWS]), expected);
             }
         }
     }

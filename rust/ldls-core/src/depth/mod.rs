@@ -59,11 +59,11 @@ impl InstanceMasks {
             let (mut members, mut beside) = (Vec::new(), Vec::new());
             for &(point, pixel) in &standing {
                 let distance = distances[point];
-                match edges.depth_at(pixel) {
+                match edges.steps_at(pixel) {
                     0 => {}
-                    weight @ 1.. => members.push(Member {
+                    steps @ 1.. => members.push(Member {
                         distance,
-                        weight: u64::from(weight.unsigned_abs()),
+                        weight: u64::from(steps.unsigned_abs()),
                     }),
                     _ => beside.push((distance, point)),
                 }

@@ -76,6 +76,30 @@ impl<T: Real> PointGraph<T> {
         ))
     }
 
+    /// The same graph from rows that begin with the point itself.
+    pub(crate) fn from_adjacency(adjacency: &Adjacency, sigma: f64) -> Self {
+        let points = &adjacency.points;
+        let (count, degree) = (points.len(), adjacency.degree);
+        let mut weights = vec![T::default(); count * degree];
+        let rows = weights
+            .par_chunks_mut(degree)
+            .zip(adjacency.columns.par_chunks(degree))
+            .zip(points);
+        rows.with_min_len(ROWS_A_TASK)
+            .for_each(|((weights, columns), point)| {
+                weights[0] = T::from_f64(1.0);
+                for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
+                    let squared = squared_distance(point, &points[j as usize]);
+                    *weight = T::from_f64(-squared / sigma).exp();
+                }
+            });
+        Self {
+            layout: Layout::Uniform { count, degree },
+            columns: Arc::clone(&adjacency.columns),
+            weights,
+        }
+    }
+
     /// Multiplies the weights of edges between a point of the ground and one that is not by `factor`.
     ///
     /// # Errors
@@ -102,30 +126,6 @@ impl<T: Real> PointGraph<T> {
             }
         }
         Ok(())
-    }
-
-    /// The same graph from rows that begin with the point itself.
-    pub(crate) fn from_adjacency(adjacency: &Adjacency, sigma: f64) -> Self {
-        let points = &adjacency.points;
-        let (count, degree) = (points.len(), adjacency.degree);
-        let mut weights = vec![T::default(); count * degree];
-        let rows = weights
-            .par_chunks_mut(degree)
-            .zip(adjacency.columns.par_chunks(degree))
-            .zip(points);
-        rows.with_min_len(ROWS_A_TASK)
-            .for_each(|((weights, columns), point)| {
-                weights[0] = T::from_f64(1.0);
-                for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
-                    let squared = squared_distance(point, &points[j as usize]);
-                    *weight = T::from_f64(-squared / sigma).exp();
-                }
-            });
-        Self {
-            layout: Layout::Uniform { count, degree },
-            columns: Arc::clone(&adjacency.columns),
-            weights,
-        }
     }
 
     /// A graph from the three arrays of a sparse matrix.

@@ -22,6 +22,7 @@ const LEAST_CELLS: usize = 12;
 const ON_SURFACE_M: f64 = 0.15;
 /// Weight of a cell above the first plane: most cells have no ground in them.
 const ABOVE: f64 = 0.05;
+/// Rounds of that plane.
 const FIRST_ROUNDS: usize = 12;
 /// Degree of the surface, and the residual in metres that leaves a cell below it a quarter of its weight, round by round:
 /// a stiff surface may be far from the ground that it bends towards later, so trust narrows as it bends.
