@@ -3,8 +3,8 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use ldls_core::{
-    Camera, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, View, diffuse, project,
-    remove_outliers, segment,
+    Camera, Cancel, Cloud, InstanceMasks, Neighbors, Params, PointGraph, Rle, View, diffuse,
+    project, remove_outliers, segment,
 };
 use rayon::prelude::*;
 use std::hint::black_box;
@@ -73,6 +73,7 @@ fn neighbors_of_kiddo(points: &[[f64; 3]], k: usize) -> Vec<u32> {
 
 fn stages(criterion: &mut Criterion) {
     let (camera, masks, params) = (camera(), masks(), Params::paper());
+    let never = Cancel::never();
     let view = View {
         masks: &masks,
         categories: &[0; INSTANCES],
@@ -86,56 +87,53 @@ fn stages(criterion: &mut Criterion) {
             columns: 3,
         };
         let images = [(&camera, [HEIGHT, WIDTH])];
-        let in_view = project(cloud, &images, false).expect("points in view");
+        let in_view = project(cloud, &images, false, never).expect("points in view");
         let (points, uv) = (&in_view.points, &in_view.sightings[0].uv);
         let mut labels = masks
-            .pixel_labels(uv, params.window, params.pixel_weight, |_, _| true)
+            .pixel_labels(uv, params.window, params.pixel_weight, |_, _| true, never)
             .expect("labels");
-        let neighbors = Neighbors::search(points, params.neighbors);
-        let mut graph =
-            PointGraph::<f32>::from_neighbors(points, &neighbors, params.sigma).expect("a graph");
-        graph.normalize_rows(&mut labels).expect("rows");
+        let neighbors = Neighbors::search(points, params.neighbors, never).expect("neighbours");
+        let mut graph = PointGraph::<f32>::from_neighbors(points, &neighbors, params.sigma, never)
+            .expect("a graph");
+        graph.normalize_rows(&mut labels, never).expect("rows");
         let exact = || {
-            let mut a = PointGraph::<f64>::from_neighbors(points, &neighbors, params.sigma)?;
-            let mut b = masks.pixel_labels(uv, params.window, params.pixel_weight, |_, _| true)?;
-            a.normalize_rows(&mut b)?;
+            let mut a = PointGraph::<f64>::from_neighbors(points, &neighbors, params.sigma, never)?;
+            let mut b =
+                masks.pixel_labels(uv, params.window, params.pixel_weight, |_, _| true, never)?;
+            a.normalize_rows(&mut b, never)?;
             Ok((a, b))
         };
-        let diffused =
-            diffuse(&graph, &labels, masks.len() + 1, params.iterations, exact).expect("labels");
+        let diffused = diffuse(
+            &graph,
+            &labels,
+            masks.len() + 1,
+            params.iterations,
+            exact,
+            never,
+        )
+        .expect("labels");
 
         let mut group = criterion.benchmark_group("stage");
         group
             .throughput(Throughput::Elements(points.len() as u64))
             .sample_size(10);
         group.bench_function(BenchmarkId::new("project", n), |b| {
-            b.iter(|| black_box(project(cloud, &images, false)));
+            b.iter(|| black_box(project(cloud, &images, false, never)));
         });
         group.bench_function(BenchmarkId::new("pixel labels", n), |b| {
-            b.iter(|| {
-                black_box(masks.pixel_labels::<f32>(
-                    uv,
-                    params.window,
-                    params.pixel_weight,
-                    |_, _| true,
-                ))
-            });
+            let (window, weight) = (params.window, params.pixel_weight);
+            let everywhere = |_, _| true;
+            b.iter(|| masks.pixel_labels::<f32>(uv, window, weight, everywhere, never));
         });
         group.bench_function(BenchmarkId::new("neighbors", n), |b| {
-            b.iter(|| black_box(Neighbors::search(points, params.neighbors)));
+            b.iter(|| black_box(Neighbors::search(points, params.neighbors, never)));
         });
         // the peer: kiddo's tree, whose queries run on all threads as ours do
         group.bench_function(BenchmarkId::new("neighbors of kiddo", n), |b| {
             b.iter(|| black_box(neighbors_of_kiddo(points, params.neighbors)));
         });
         group.bench_function(BenchmarkId::new("graph", n), |b| {
-            b.iter(|| {
-                black_box(PointGraph::<f32>::from_neighbors(
-                    points,
-                    &neighbors,
-                    params.sigma,
-                ))
-            });
+            b.iter(|| PointGraph::<f32>::from_neighbors(points, &neighbors, params.sigma, never));
         });
         group.bench_function(BenchmarkId::new("diffusion", n), |b| {
             b.iter(|| {
@@ -145,14 +143,23 @@ fn stages(criterion: &mut Criterion) {
                     masks.len() + 1,
                     params.iterations,
                     exact,
+                    never,
                 ))
             });
         });
         group.bench_function(BenchmarkId::new("components", n), |b| {
-            b.iter(|| black_box(remove_outliers(&graph, &diffused.labels, 1.0, |_, _| true)));
+            b.iter(|| {
+                black_box(remove_outliers(
+                    &graph,
+                    &diffused.labels,
+                    1.0,
+                    |_, _| true,
+                    never,
+                ))
+            });
         });
         group.bench_function(BenchmarkId::new("whole frame", n), |b| {
-            b.iter(|| black_box(segment(cloud, &[view], 0.5, &params, false)));
+            b.iter(|| black_box(segment(cloud, &[view], 0.5, &params, false, never)));
         });
         group.finish();
     }

@@ -3,9 +3,13 @@
 //! Logistic functions of the winner's share of the likelihoods and of the score of its mask, fitted to the labels of
 //! simulated frames of four lidars whose truth is known.
 
-use crate::Params;
 use crate::diffusion::Diffused;
+use crate::memory::{collect, collect_parallel};
+use crate::{Params, Result};
+use rayon::prelude::*;
 
+/// Fewest points for a task of the thread pool.
+const POINTS_A_TASK: usize = 4096;
 /// Constant, and the slope of the share and of the score, for points of objects.
 const OBJECT: [f64; 3] = [-2.30, 0.23, 2.47];
 /// Constant and the slope of the share for points that diffusion gave to the background.
@@ -18,12 +22,15 @@ const SCORES: [f64; 2] = [0.05, 0.95];
 
 /// The confidence of each label, by the share of its winner in the likelihoods, the label that diffusion gave and the
 /// score of the object of each label from 1.
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`].
 pub fn calibrated_confidence(
     shares: &[f32],
     diffused: &[u32],
     labels: &[u32],
     scores: &[f32],
-) -> Vec<f32> {
+) -> Result<Vec<f32>> {
     let probability = |((&share, &diffused), &label): ((&f32, &u32), &u32)| {
         let share = log_odds(share, SHARES);
         let odds = match (diffused, label) {
@@ -36,8 +43,8 @@ pub fn calibrated_confidence(
         };
         (1.0 / (1.0 + (-odds).exp())) as f32
     };
-    let points = shares.iter().zip(diffused).zip(labels);
-    points.map(probability).collect()
+    let points = shares.par_iter().zip(diffused).zip(labels);
+    collect_parallel(points.with_min_len(POINTS_A_TASK).map(probability))
 }
 
 fn log_odds(probability: f32, [low, high]: [f64; 2]) -> f64 {
@@ -52,16 +59,17 @@ pub(crate) fn judge(
     diffused: &Diffused,
     scores: &[f32],
     params: &Params,
-) -> Vec<f32> {
+) -> Result<Vec<f32>> {
+    let shares = &diffused.confidence;
     let confidence = if params.calibrated {
-        calibrated_confidence(&diffused.confidence, &diffused.labels, labels, scores)
+        calibrated_confidence(shares, &diffused.labels, labels, scores)?
     } else {
-        diffused.confidence.clone()
+        collect(shares.iter().copied())?
     };
     let doubtful = |(_, confidence): &(_, &f32)| f64::from(**confidence) < params.abstain;
     let doubtful = labels.iter_mut().zip(&confidence).filter(doubtful);
     doubtful.for_each(|(label, _)| *label = 0);
-    confidence
+    Ok(confidence)
 }
 
 #[cfg(test)]
@@ -69,7 +77,7 @@ mod tests {
     use super::*;
 
     fn confidence(share: f32, diffused: u32, label: u32, score: f32) -> f32 {
-        calibrated_confidence(&[share], &[diffused], &[label], &[score])[0]
+        calibrated_confidence(&[share], &[diffused], &[label], &[score]).unwrap()[0]
     }
 
     #[test]
@@ -101,7 +109,8 @@ mod tests {
             ..Params::paper()
         };
         let mut labels = [1, 1];
-        assert_eq!(judge(&mut labels, &diffused, &[1.0], &params), [0.99, 0.4]);
+        let confidence = judge(&mut labels, &diffused, &[1.0], &params).unwrap();
+        assert_eq!(confidence, [0.99, 0.4]);
         assert_eq!(labels, [1, 0]);
     }
 }

@@ -187,6 +187,17 @@ pub enum Error {
         expected: &'static str,
     },
 
+    /// There is not enough memory.
+    #[error("not enough memory for an array of {bytes} bytes; split the cloud, or free memory")]
+    OutOfMemory {
+        /// Size of the array that there is no memory for.
+        bytes: usize,
+    },
+
+    /// The caller asked the work to stop.
+    #[error("cancelled")]
+    Cancelled,
+
     /// Arrays that belong together do not fit.
     #[error("{name}: {problem}")]
     Mismatch {

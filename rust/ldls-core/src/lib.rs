@@ -7,6 +7,7 @@
 //! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is
 //! taken by one thread in one order.
 
+mod cancel;
 mod confidence;
 mod depth;
 mod diffusion;
@@ -14,6 +15,7 @@ mod error;
 mod graph;
 mod ground;
 mod masks;
+pub mod memory;
 mod neighbors;
 mod params;
 mod projection;
@@ -24,6 +26,7 @@ mod segment;
 #[cfg(test)]
 mod test_support;
 
+pub use cancel::Cancel;
 pub use confidence::calibrated_confidence;
 pub use depth::DepthGroups;
 pub use diffusion::{Convergence, Diffused, Products, diffuse, likelihoods};

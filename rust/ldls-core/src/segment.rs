@@ -5,11 +5,12 @@ use crate::diffusion::diffuse;
 use crate::graph::{PointGraph, remove_outliers_by_index};
 use crate::ground::{clear_ground, is_ground};
 use crate::masks::PixelLabels;
+use crate::memory::{collect, filled};
 use crate::neighbors::{Adjacency, arrange};
 use crate::projection::{Cloud, Sighting};
 use crate::report::{Report, Timings, timed};
 use crate::ring::{Images, Objects, View};
-use crate::{Error, Params, Real, Result};
+use crate::{Cancel, Error, Params, Real, Result};
 
 /// Label of points that no image sees.
 const OUT_OF_VIEW: i32 = -1;
@@ -44,41 +45,51 @@ pub struct Segmentation {
 /// `keep_origin` is set.
 ///
 /// # Errors
-/// Whatever [`Params::check`] and [`crate::project`] refuse, [`Error::TooManyPoints`], and [`Error::Mismatch`] where a view has
-/// not one category and one score a mask.
+/// Whatever [`Params::check`] and [`crate::project`] refuse, [`Error::TooManyPoints`], [`Error::Mismatch`] where a view has
+/// not one category and one score a mask, [`Error::OutOfMemory`] and [`Error::Cancelled`].
 pub fn segment(
     cloud: Cloud,
     views: &[View],
     same_object: f64,
     params: &Params,
     keep_origin: bool,
+    cancel: &Cancel,
 ) -> Result<Segmentation> {
     check(cloud, views, params)?;
     let mut t = Timings::default();
     let (in_view, mut images) = timed(&mut t.project, || {
-        Images::project(cloud, views, same_object, keep_origin)
+        Images::project(cloud, views, same_object, keep_origin, cancel)
     })?;
-    timed(&mut t.depth, || images.see_depth(&in_view.points, params));
+    timed(&mut t.depth, || {
+        images.see_depth(&in_view.points, params, cancel)
+    })?;
     let (scene, k) = (&images, params.neighbors);
-    let nearest = &timed(&mut t.neighbors, || Adjacency::search(in_view.points, k));
+    let nearest = &timed(&mut t.neighbors, || {
+        Adjacency::search(in_view.points, k, cancel)
+    })?;
     let order = &nearest.order;
-    let pixels = timed(&mut t.pixel_labels, || scene.pixel_labels(order, params))?;
-    let (a, b) = timed(&mut t.graph, || normalize(nearest, pixels, scene, params))?;
-    let exact = || normalize(nearest, scene.pixel_labels(order, params)?, scene, params);
+    let pixels = || scene.pixel_labels(order, params, cancel);
+    let pixel_labels = timed(&mut t.pixel_labels, pixels)?;
+    let (a, b) = timed(&mut t.graph, || {
+        normalize(nearest, pixel_labels, scene, params, cancel)
+    })?;
+    let pixels = || scene.pixel_labels(order, params, cancel);
+    let exact = || normalize(nearest, pixels()?, scene, params, cancel);
     let diffused = timed(&mut t.diffusion, || {
-        diffuse(&a, &b, scene.n_labels(), params.iterations, exact)
+        diffuse(&a, &b, scene.n_labels(), params.iterations, exact, cancel)
     })?;
     let mut kept = timed(&mut t.components, || {
-        remove_outliers(&a, &diffused.labels, order, scene, params)
+        remove_outliers(&a, &diffused.labels, order, scene, params, cancel)
     })?;
-    let confidence = judge(&mut kept, &diffused, &scene.scores(), params);
+    let confidence = judge(&mut kept, &diffused, &scene.scores(), params)?;
+    cancel.check()?;
 
     // back to the rows of the cloud
-    let rows = arrange(order, &in_view.indices);
+    let rows = arrange(order, &in_view.indices)?;
     Ok(Segmentation {
-        labels: labels_of_cloud(cloud.len(), &rows, &kept),
-        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels),
-        confidence: scatter(cloud.len(), &rows, 0.0, confidence),
+        labels: labels_of_cloud(cloud.len(), &rows, &kept)?,
+        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels)?,
+        confidence: scatter(cloud.len(), &rows, 0.0, confidence)?,
         report: Report::new(in_view.counts, nearest, diffused.convergence),
         in_view: in_view.indices,
         sightings: images.sightings,
@@ -112,14 +123,15 @@ fn normalize<T: Real>(
     mut b: PixelLabels<T>,
     images: &Images,
     params: &Params,
+    cancel: &Cancel,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
-    let mut a = PointGraph::from_adjacency(nearest, params.sigma);
+    let mut a = PointGraph::from_adjacency(nearest, params.sigma, cancel)?;
     if params.ground_edges < 1.0 {
         let ground = |&point: &u32| is_ground(images.heights[point as usize]);
-        let ground: Vec<bool> = nearest.order.iter().map(ground).collect();
-        a.weaken_ground_edges(&ground, params.ground_edges)?;
+        let ground = collect(nearest.order.iter().map(ground))?;
+        a.weaken_ground_edges(&ground, params.ground_edges, cancel)?;
     }
-    a.normalize_rows(&mut b)?;
+    a.normalize_rows(&mut b, cancel)?;
     Ok((a, b))
 }
 
@@ -130,18 +142,19 @@ fn remove_outliers(
     order: &[u32],
     images: &Images,
     params: &Params,
+    cancel: &Cancel,
 ) -> Result<Vec<u32>> {
-    let mut kept = labels.to_vec();
+    let mut kept = collect(labels.iter().copied())?;
     if params.remove_outliers {
         let at_depth = |row: usize, label| images.at_depth(order[row], label);
-        kept = remove_outliers_by_index(a, labels, order, params.part_size, at_depth)?;
+        kept = remove_outliers_by_index(a, labels, order, params.part_size, at_depth, cancel)?;
     }
     let heights = order.iter().map(|&point| images.heights[point as usize]);
     clear_ground(&mut kept, heights, params.ground_clearance);
     Ok(kept)
 }
 
-fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32]) -> Vec<i32> {
+fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32]) -> Result<Vec<i32>> {
     let signed = labels.iter().map(|&label| label as i32);
     scatter(n, rows, OUT_OF_VIEW, signed)
 }
@@ -152,12 +165,12 @@ fn scatter<T: Copy>(
     rows: &[u32],
     elsewhere: T,
     values: impl IntoIterator<Item = T>,
-) -> Vec<T> {
-    let mut all = vec![elsewhere; n];
+) -> Result<Vec<T>> {
+    let mut all = filled(elsewhere, n)?;
     for (&row, value) in rows.iter().zip(values) {
         all[row as usize] = value;
     }
-    all
+    Ok(all)
 }
 
 #[cfg(test)]

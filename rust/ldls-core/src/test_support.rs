@@ -2,7 +2,7 @@
 //! two points.
 
 use crate::{
-    Camera, Cloud, InstanceMasks, Params, PixelLabels, PointGraph, Rle, Segmentation, View,
+    Camera, Cancel, Cloud, InstanceMasks, Params, PixelLabels, PointGraph, Rle, Segmentation, View,
 };
 
 const IDENTITY: [f64; 16] = [
@@ -52,7 +52,7 @@ pub(crate) fn segment(views: &[View]) -> Segmentation {
         values: &values,
         columns: 3,
     };
-    crate::segment(cloud, views, 0.5, &Params::paper(), false).unwrap()
+    crate::segment(cloud, views, 0.5, &Params::paper(), false, Cancel::never()).unwrap()
 }
 
 /// Two points, each joined to the other with weight 1/4 and to its own pixel with weight 1/2.

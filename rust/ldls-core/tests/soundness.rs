@@ -1,7 +1,7 @@
 //! Graphs on which a series leaves the likelihoods of plain products, unseen by the probe: what is then noticed of the
 //! values themselves.
 
-use ldls_core::{PixelLabels, PointGraph, likelihoods};
+use ldls_core::{Cancel, PixelLabels, PointGraph, likelihoods};
 
 const POINTS: usize = 400;
 const PRODUCTS: usize = 200;
@@ -38,7 +38,7 @@ fn ring(
 
 /// The largest difference of likelihoods from plain products in double precision, and the sweeps that they took.
 fn error_and_sweeps((a, b): &(PointGraph, PixelLabels)) -> (f64, usize) {
-    let (found, convergence) = likelihoods(a, b, 2, Some(PRODUCTS)).unwrap();
+    let (found, convergence) = likelihoods(a, b, 2, Some(PRODUCTS), Cancel::never()).unwrap();
     let mut z = vec![[0.0; 2]; POINTS];
     for _ in 0..PRODUCTS {
         let row = |i: usize| {

@@ -1,7 +1,7 @@
 //! NumPy arrays in and out. Input arrays are C-contiguous: the Python side sees to that.
 
-use crate::errors::raise;
-use ldls_core::{Cloud, PixelLabels, PointGraph};
+use crate::errors::{or_raise, raise};
+use ldls_core::{Cloud, PixelLabels, PointGraph, memory};
 use numpy::ndarray::{ArrayView, Dimension};
 use numpy::{
     Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray1,
@@ -73,7 +73,13 @@ pub fn rows<const COLUMNS: usize>(
             &format!("{name}: expected (n, {COLUMNS}), got {found} columns"),
         ));
     }
-    Ok(slice(py, name, array)?.as_chunks().0.to_vec())
+    let rows = slice(py, name, array)?.as_chunks().0;
+    copied(py, rows)
+}
+
+/// A copy of `values`.
+pub fn copied<T: Copy>(py: Python<'_>, values: &[T]) -> PyResult<Vec<T>> {
+    or_raise(py, memory::collect(values.iter().copied()))
 }
 
 /// A matrix of `columns` columns from its values row by row.
@@ -101,21 +107,22 @@ pub fn csr_arrays(
     offsets: &[usize],
     columns: &[u32],
     weights: Vec<f32>,
-) -> CsrArrays {
-    let offsets: Vec<i64> = offsets.iter().map(|&offset| offset as i64).collect();
-    let columns: Vec<i32> = columns.iter().map(|&column| column as i32).collect();
-    (
+) -> PyResult<CsrArrays> {
+    let offsets = offsets.iter().map(|&offset| offset as i64);
+    let offsets = or_raise(py, memory::collect(offsets))?;
+    let columns = columns.iter().map(|&column| column as i32);
+    let columns = or_raise(py, memory::collect(columns))?;
+    Ok((
         offsets.into_pyarray(py).unbind(),
         columns.into_pyarray(py).unbind(),
         weights.into_pyarray(py).unbind(),
-    )
+    ))
 }
 
 /// The point graph in sparse arrays from Python.
 pub fn graph(py: Python<'_>, arrays: &CsrArguments<'_>) -> PyResult<PointGraph> {
     let (offsets, columns, weights) = csr_vectors(py, arrays)?;
-    PointGraph::from_csr(offsets, columns, weights)
-        .map_err(|error| crate::errors::to_python(py, &error))
+    or_raise(py, PointGraph::from_csr(offsets, columns, weights))
 }
 
 /// The pixel labels in sparse arrays from Python, with the weight of all pixel edges of each point.
@@ -125,8 +132,7 @@ pub fn pixel_labels(
     mass: Vec<f32>,
 ) -> PyResult<PixelLabels> {
     let (offsets, labels, weights) = csr_vectors(py, arrays)?;
-    PixelLabels::from_csr(offsets, labels, weights, mass)
-        .map_err(|error| crate::errors::to_python(py, &error))
+    or_raise(py, PixelLabels::from_csr(offsets, labels, weights, mass))
 }
 
 fn csr_vectors(
@@ -134,13 +140,10 @@ fn csr_vectors(
     arrays: &CsrArguments<'_>,
 ) -> PyResult<(Vec<usize>, Vec<u32>, Vec<f32>)> {
     // negative indices turn into huge ones, which the core refuses
-    let offsets = slice(py, "indptr", &arrays.0)?
-        .iter()
-        .map(|&offset| offset as usize)
-        .collect();
-    let columns = slice(py, "indices", &arrays.1)?
-        .iter()
-        .map(|&column| column as u32)
-        .collect();
-    Ok((offsets, columns, slice(py, "values", &arrays.2)?.to_vec()))
+    let offsets = slice(py, "indptr", &arrays.0)?.iter();
+    let offsets = memory::collect(offsets.map(|&offset| offset as usize));
+    let columns = slice(py, "indices", &arrays.1)?.iter();
+    let columns = memory::collect(columns.map(|&column| column as u32));
+    let weights = copied(py, slice(py, "values", &arrays.2)?)?;
+    Ok((or_raise(py, offsets)?, or_raise(py, columns)?, weights))
 }

@@ -1,13 +1,19 @@
-//! Calls of the core from Python: without the GIL, on a thread pool, and with panics turned into `InternalError`.
+//! Calls of the core from Python: without the GIL, on a thread pool, stopped by Ctrl-C, and with panics turned into
+//! `InternalError`.
 
-use crate::errors::{raise, to_python};
+use crate::allocator::{has_ballast, take_ballast};
+use crate::errors::{out_of_memory, raise, to_python};
+use ldls_core::Cancel;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::any::Any;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
+/// How often the caller's thread looks for signals and for a lack of memory.
+const LOOK: Duration = Duration::from_millis(20);
 /// Most threads of a pool.
 const MAX_THREADS: usize = 1024;
 
@@ -28,9 +34,10 @@ static LAST_PANIC: Mutex<Option<String>> = Mutex::new(None);
 pub fn run<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
-    work: impl FnOnce() -> ldls_core::Result<T> + Send,
+    work: impl FnOnce(&Cancel) -> ldls_core::Result<T> + Send,
 ) -> PyResult<T> {
     let threads = checked_threads(py, threads)?;
+    check_memory()?;
     let outcome = if threads == 1 {
         let pool = idle_thread(py)?;
         let outcome = on_pool(py, &pool, work);
@@ -40,7 +47,7 @@ pub fn run<T: Send>(
         let pool = shared_pool(py, threads)?;
         on_pool(py, &pool, work)
     };
-    unwrapped(py, outcome)
+    unwrapped(py, outcome?)
 }
 
 /// Runs `work`, which is short and knows nothing of threads, here and now, with the GIL released.
@@ -48,6 +55,7 @@ pub fn run_here<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> ldls_core::Result<T> + Send,
 ) -> PyResult<T> {
+    check_memory()?;
     let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
     unwrapped(py, outcome)
 }
@@ -65,25 +73,64 @@ fn unwrapped<T>(py: Python<'_>, outcome: std::thread::Result<ldls_core::Result<T
     }
 }
 
+fn check_memory() -> PyResult<()> {
+    if take_ballast() {
+        return Ok(());
+    }
+    Err(out_of_memory("not enough memory to begin; free some"))
+}
+
 /// Runs `work` on the first thread of `pool`: always the same one, so that what a frame took from the allocator's store
-/// of that thread lies there for the next frame. The other threads share in what it divides.
+/// of that thread lies there for the next frame. The other threads share in what it divides. The caller's thread looks
+/// after signals meanwhile, and stops the work at one that raises an exception, as Ctrl-C does.
 fn on_pool<T: Send>(
     py: Python<'_>,
     pool: &ThreadPool,
-    work: impl FnOnce() -> T + Send,
-) -> std::thread::Result<T> {
-    let work = Mutex::new(Some(work));
-    py.detach(|| {
-        let outcomes = pool.broadcast(|thread| {
-            let work = (thread.index() == 0).then(|| lock(&work).take())??;
-            Some(catch_unwind(AssertUnwindSafe(work)))
-        });
-        outcomes
-            .into_iter()
-            .flatten()
-            .next()
-            .expect("a pool has a first thread")
-    })
+    work: impl FnOnce(&Cancel) -> T + Send,
+) -> PyResult<std::thread::Result<T>> {
+    let (work, cancel) = (Mutex::new(Some(work)), Cancel::default());
+    let (outcome, done) = (Mutex::new(None), Condvar::new());
+    let stopped = py.detach(|| {
+        pool.in_place_scope(|scope| {
+            scope.spawn_broadcast(|_, thread| {
+                let work = (thread.index() == 0).then(|| lock(&work).take());
+                if let Some(work) = work.flatten() {
+                    let found = catch_unwind(AssertUnwindSafe(|| work(&cancel)));
+                    *lock(&outcome) = Some(found);
+                    done.notify_one();
+                }
+            });
+            let mut found = lock(&outcome);
+            while found.is_none() {
+                let waited = done.wait_timeout(found, LOOK);
+                found = waited.unwrap_or_else(PoisonError::into_inner).0;
+                if found.is_none() {
+                    drop(found);
+                    if let Err(error) = look_around() {
+                        cancel.cancel();
+                        return Err(error);
+                    }
+                    found = lock(&outcome);
+                }
+            }
+            Ok(())
+        })
+    });
+    stopped?;
+    let outcome = outcome.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(outcome.expect("a pool has a first thread"))
+}
+
+/// The exception that a signal raises, or that there is next to no memory left.
+fn look_around() -> PyResult<()> {
+    let signals = |py: Python<'_>| py.check_signals();
+    Python::attach(signals)?;
+    if has_ballast() {
+        return Ok(());
+    }
+    Err(out_of_memory(
+        "not enough memory; split the cloud, or free memory",
+    ))
 }
 
 /// Number of threads where none is asked for: `LDLS_NUM_THREADS`, or the cores that the process may use by affinity
@@ -104,7 +151,7 @@ pub fn default_threads(py: Python<'_>) -> PyResult<usize> {
 /// Panics in a worker thread: for the test of what users then see.
 #[pyfunction]
 pub fn panic_in_worker(py: Python<'_>) -> PyResult<()> {
-    run(py, None, || panic!("panic asked for"))
+    run(py, None, |_| panic!("panic asked for"))
 }
 
 /// Keeps the place of a panic for the message, instead of printing it.

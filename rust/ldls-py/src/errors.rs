@@ -1,11 +1,26 @@
 //! Core errors as the exception classes of `ldls.errors`.
 
 use ldls_core::Error;
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 
-/// The exception of `ldls.errors` that stands for `error`.
+/// The exception of `ldls.errors` that stands for `error`, or `MemoryError`.
 pub fn to_python(py: Python<'_>, error: &Error) -> PyErr {
-    raise(py, class_name(error), &error.to_string())
+    let message = error.to_string();
+    match class_name(error) {
+        Some(name) => raise(py, name, &message),
+        None => out_of_memory(&message),
+    }
+}
+
+/// What the core found, or its error as an exception.
+pub fn or_raise<T>(py: Python<'_>, found: ldls_core::Result<T>) -> PyResult<T> {
+    found.map_err(|error| to_python(py, &error))
+}
+
+/// A `MemoryError`.
+pub fn out_of_memory(message: &str) -> PyErr {
+    PyMemoryError::new_err(message.to_owned())
 }
 
 /// An instance of the class `name` of `ldls.errors`.
@@ -20,8 +35,9 @@ pub fn raise(py: Python<'_>, name: &str, message: &str) -> PyErr {
     }
 }
 
-fn class_name(error: &Error) -> &'static str {
-    match error {
+/// None for a lack of memory.
+fn class_name(error: &Error) -> Option<&'static str> {
+    Some(match error {
         Error::CoordinateOutOfRange { .. } => "InputError",
         Error::CameraNotFinite { .. }
         | Error::CameraSingular { .. }
@@ -38,5 +54,8 @@ fn class_name(error: &Error) -> &'static str {
         }
         Error::Parameter { .. } => "ParameterError",
         Error::Mismatch { .. } => "ShapeError",
-    }
+        // nobody is there to see it: the caller raises what made it cancel
+        Error::Cancelled => "InternalError",
+        Error::OutOfMemory { .. } => return None,
+    })
 }

@@ -162,7 +162,7 @@ impl Masks {
         let pixels = pixels
             .as_slice_mut()
             .map_err(|error| raise(py, "InputError", &format!("pixels: {error}")))?;
-        run(py, threads, || self.0.paint(pixels))
+        run(py, threads, |_| self.0.paint(pixels))
     }
 
     fn rle(&self, index: usize) -> PyResult<Rle> {

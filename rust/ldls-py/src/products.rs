@@ -2,6 +2,8 @@
 
 use crate::arrays::{CsrArguments, graph, matrix, pixel_labels};
 use crate::call::{run, run_here};
+use crate::errors::or_raise;
+use ldls_core::memory;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -24,7 +26,8 @@ impl Products {
     ) -> PyResult<Self> {
         let a = graph(py, &point_graph)?;
         // nobody asks for it, but there is one for each row
-        let mass = vec![0.0; labels.0.as_array().len().saturating_sub(1)];
+        let rows = labels.0.as_array().len().saturating_sub(1);
+        let mass = or_raise(py, memory::filled(0.0, rows))?;
         let b = pixel_labels(py, &labels, mass)?;
         let state = run_here(py, || ldls_core::Products::new(a, b, n_labels, iterations))?;
         Ok(Self { state, n_labels })
@@ -37,9 +40,9 @@ impl Products {
         products: usize,
         threads: Option<usize>,
     ) -> PyResult<Py<PyArray2<f32>>> {
-        let z = run(py, threads, || {
-            self.state.advance(products);
-            Ok(self.state.likelihoods())
+        let z = run(py, threads, |cancel| {
+            self.state.advance(products, cancel)?;
+            self.state.likelihoods()
         })?;
         matrix(py, z, self.n_labels)
     }

@@ -3,8 +3,9 @@
 use crate::arrays::{Points, matrix};
 use crate::call::{checked_threads, run, run_at_once};
 use crate::camera::Camera;
+use crate::errors::or_raise;
 use crate::masks::Masks;
-use ldls_core::{Params, Timings, View};
+use ldls_core::{Params, Timings, View, memory};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -98,13 +99,15 @@ pub fn segment(
             camera: &camera.0,
         })
         .collect();
-    let segmentation = run(py, threads, || {
-        ldls_core::segment(cloud, &views, same_object, &params, keep_origin)
+    let segmentation = run(py, threads, |cancel| {
+        ldls_core::segment(cloud, &views, same_object, &params, keep_origin, cancel)
     })?;
-    let in_view: Vec<i64> = segmentation.in_view.iter().map(|&i| i.into()).collect();
+    let rows = segmentation.in_view.iter().map(|&row| i64::from(row));
+    let in_view = or_raise(py, memory::collect(rows))?;
     let sightings = segmentation.sightings.into_iter().map(|sighting| {
         let rows = sighting.seen.iter().map(|&at| in_view[at as usize]);
-        let rows = PyArray1::from_vec(py, rows.collect()).unbind();
+        let rows = or_raise(py, memory::collect(rows))?;
+        let rows = rows.into_pyarray(py).unbind();
         Ok((rows, matrix(py, sighting.uv.into_flattened(), 2)?))
     });
     Ok(SegmentationArrays {

@@ -1,14 +1,15 @@
 //! The steps of the method one by one, for `ldls.stages`.
 
 use crate::arrays::{
-    CsrArguments, CsrArrays, Points, csr_arrays, graph, matrix, pixel_labels as labels_of, rows,
-    slice,
+    CsrArguments, CsrArrays, Points, copied, csr_arrays, graph, matrix, pixel_labels as labels_of,
+    rows, slice,
 };
 use crate::call::run;
 use crate::camera::Camera;
+use crate::errors::or_raise;
 use crate::masks::Masks;
 use crate::segment::ParamsAttributes;
-use ldls_core::{DepthGroups, PointGraph};
+use ldls_core::{DepthGroups, PointGraph, memory};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
@@ -40,10 +41,11 @@ pub fn project(
     threads: Option<usize>,
 ) -> PyResult<ViewArrays> {
     let cloud = points.cloud(py)?;
-    let mut in_view = run(py, threads, || {
-        ldls_core::project(cloud, &[(&camera.0, [height, width])], keep_origin)
+    let mut in_view = run(py, threads, |cancel| {
+        ldls_core::project(cloud, &[(&camera.0, [height, width])], keep_origin, cancel)
     })?;
-    let indices: Vec<i64> = in_view.indices.iter().map(|&i| i.into()).collect();
+    let indices = in_view.indices.iter().map(|&row| i64::from(row));
+    let indices = or_raise(py, memory::collect(indices))?;
     let uv = in_view.sightings.swap_remove(0).uv;
     Ok((
         indices.into_pyarray(py).unbind(),
@@ -61,8 +63,8 @@ pub fn ground(
     threads: Option<usize>,
 ) -> PyResult<Py<PyArray1<f64>>> {
     let points = rows::<3>(py, "points", &points)?;
-    let heights = run(py, threads, || {
-        Ok(ldls_core::ground_heights(&points, &camera.0, local))
+    let heights = run(py, threads, |cancel| {
+        ldls_core::ground_heights(&points, &camera.0, local, cancel)
     })?;
     Ok(heights.into_pyarray(py).unbind())
 }
@@ -81,15 +83,13 @@ pub fn depth_groups(
     let points = rows::<3>(py, "points", &points)?;
     let pixels = rows::<2>(py, "pixels", &pixels)?;
     let heights = slice(py, "heights", &heights)?;
-    let groups = run(py, params.threads, || {
-        let distances = points
-            .iter()
-            .map(|point| camera.0.distance(point))
-            .collect();
-        let standing: Vec<bool> = heights.iter().map(|&h| !ldls_core::is_ground(h)).collect();
-        Ok(masks
+    let groups = run(py, params.threads, |cancel| {
+        let distances = memory::collect(points.iter().map(|point| camera.0.distance(point)))?;
+        let standing = memory::collect(heights.iter().map(|&h| !ldls_core::is_ground(h)))?;
+        let params = params.params();
+        masks
             .0
-            .depth_groups(&pixels, distances, &standing, &params.params()))
+            .depth_groups(&pixels, distances, &standing, &params, cancel)
     })?;
     let intervals = groups
         .intervals
@@ -111,8 +111,11 @@ pub fn neighbors(
     threads: Option<usize>,
 ) -> PyResult<NeighborArrays> {
     let points = rows::<3>(py, "points", &points)?;
-    let found = run(py, threads, || Ok(ldls_core::Neighbors::search(&points, k)))?;
-    let squared_distances = found.squared_distances(&points);
+    let (found, squared_distances) = run(py, threads, |cancel| {
+        let found = ldls_core::Neighbors::search(&points, k, cancel)?;
+        let squared_distances = found.squared_distances(&points)?;
+        Ok((found, squared_distances))
+    })?;
     if found.k == 0 {
         let shape = [points.len(), 0];
         return Ok((
@@ -141,21 +144,20 @@ pub fn point_graph(
     let k = indices.shape()[1];
     let neighbors = ldls_core::Neighbors {
         k,
-        indices: slice(py, "indices", &indices)?.to_vec(),
+        indices: copied(py, slice(py, "indices", &indices)?)?,
     };
     let ground = ground
         .as_ref()
         .map(|ground| slice(py, "ground", ground))
         .transpose()?;
-    let graph = run(py, threads, || {
-        let mut graph = PointGraph::<f32>::from_neighbors(&points, &neighbors, sigma)?;
+    let (offsets, columns, weights) = run(py, threads, |cancel| {
+        let mut graph = PointGraph::<f32>::from_neighbors(&points, &neighbors, sigma, cancel)?;
         if let Some(ground) = ground {
-            graph.weaken_ground_edges(ground, ground_edges)?;
+            graph.weaken_ground_edges(ground, ground_edges, cancel)?;
         }
-        Ok(graph)
+        graph.into_csr()
     })?;
-    let (offsets, columns, weights) = graph.into_csr();
-    Ok(csr_arrays(py, &offsets, &columns, weights))
+    csr_arrays(py, &offsets, &columns, weights)
 }
 
 /// Weights of the pixel edges by label, and of all of them, not normalised.
@@ -178,12 +180,12 @@ pub fn pixel_labels(
             .as_ref()
             .is_none_or(|depths| depths.admits(at, label))
     };
-    let labels = run(py, threads, || {
+    let labels = run(py, threads, |cancel| {
         masks
             .0
-            .pixel_labels(&pixels, window, pixel_weight, admitted)
+            .pixel_labels(&pixels, window, pixel_weight, admitted, cancel)
     })?;
-    Ok(label_arrays(py, labels))
+    label_arrays(py, labels)
 }
 
 /// Labels of the nearest pixels.
@@ -194,8 +196,8 @@ pub fn direct_labels(
     masks: &Masks,
 ) -> PyResult<Py<PyArray1<i32>>> {
     let pixels = rows::<2>(py, "pixels", &pixels)?;
-    let labels = run(py, None, || masks.0.direct_labels(&pixels))?;
-    Ok(signed(&labels).into_pyarray(py).unbind())
+    let labels = run(py, None, |cancel| masks.0.direct_labels(&pixels, cancel))?;
+    signed(py, &labels)
 }
 
 /// Both matrices with rows that sum to 1 together.
@@ -207,12 +209,14 @@ pub fn normalize_rows(
     mass: PyReadonlyArray1<'_, f32>,
 ) -> PyResult<(CsrArrays, PixelLabelArrays)> {
     let mut graph = graph(py, &point_graph)?;
-    let mut labels = labels_of(py, &labels, slice(py, "mass", &mass)?.to_vec())?;
-    run(py, None, || graph.normalize_rows(&mut labels))?;
-    let (offsets, columns, weights) = graph.into_csr();
+    let mut labels = labels_of(py, &labels, copied(py, slice(py, "mass", &mass)?)?)?;
+    let (offsets, columns, weights) = run(py, None, |cancel| {
+        graph.normalize_rows(&mut labels, cancel)?;
+        graph.into_csr()
+    })?;
     Ok((
-        csr_arrays(py, &offsets, &columns, weights),
-        label_arrays(py, labels),
+        csr_arrays(py, &offsets, &columns, weights)?,
+        label_arrays(py, labels)?,
     ))
 }
 
@@ -228,9 +232,9 @@ pub fn diffuse(
     threads: Option<usize>,
 ) -> PyResult<(Py<PyArray2<f32>>, usize, Option<f64>)> {
     let a = graph(py, &point_graph)?;
-    let b = labels_of(py, &labels, slice(py, "mass", &mass)?.to_vec())?;
-    let (z, convergence) = run(py, threads, || {
-        ldls_core::likelihoods(&a, &b, n_labels, iterations)
+    let b = labels_of(py, &labels, copied(py, slice(py, "mass", &mass)?)?)?;
+    let (z, convergence) = run(py, threads, |cancel| {
+        ldls_core::likelihoods(&a, &b, n_labels, iterations, cancel)
     })?;
     Ok((
         matrix(py, z, n_labels)?,
@@ -258,10 +262,10 @@ pub fn remove_outliers(
             .as_ref()
             .is_none_or(|depths| depths.admits(at, label))
     };
-    let kept = run(py, None, || {
-        ldls_core::remove_outliers(&graph, labels, part_size, at_depth)
+    let kept = run(py, None, |cancel| {
+        ldls_core::remove_outliers(&graph, labels, part_size, at_depth, cancel)
     })?;
-    Ok(signed(&kept).into_pyarray(py).unbind())
+    signed(py, &kept)
 }
 
 /// Labels with points nearer to the ground than `clearance` turned into background.
@@ -272,10 +276,10 @@ pub fn clear_ground(
     heights: PyReadonlyArray1<'_, f64>,
     clearance: f64,
 ) -> PyResult<Py<PyArray1<i32>>> {
-    let mut cleared = slice(py, "labels", &labels)?.to_vec();
+    let mut cleared = copied(py, slice(py, "labels", &labels)?)?;
     let heights = slice(py, "heights", &heights)?;
     ldls_core::clear_ground(&mut cleared, heights.iter().copied(), clearance);
-    Ok(signed(&cleared).into_pyarray(py).unbind())
+    signed(py, &cleared)
 }
 
 /// Confidence of labels from the likelihoods' shares.
@@ -291,7 +295,9 @@ pub fn confidence(
     let diffused = slice(py, "diffused", &diffused)?;
     let labels = slice(py, "labels", &labels)?;
     let scores = slice(py, "scores", &scores)?;
-    let found = ldls_core::calibrated_confidence(shares, diffused, labels, scores);
+    let found = run(py, None, |_| {
+        ldls_core::calibrated_confidence(shares, diffused, labels, scores)
+    })?;
     Ok(found.into_pyarray(py).unbind())
 }
 
@@ -305,19 +311,19 @@ fn depth_groups_of(
             .iter()
             .map(interval)
             .collect(),
-        distances: slice(py, "distances", distances)?.to_vec(),
-        unsure: slice(py, "unsure", unsure)?.to_vec(),
+        distances: copied(py, slice(py, "distances", distances)?)?,
+        unsure: copied(py, slice(py, "unsure", unsure)?)?,
     })
 }
 
-fn label_arrays(py: Python<'_>, labels: ldls_core::PixelLabels) -> PixelLabelArrays {
+fn label_arrays(py: Python<'_>, labels: ldls_core::PixelLabels) -> PyResult<PixelLabelArrays> {
     let mass = labels.mass.into_pyarray(py).unbind();
-    (
-        csr_arrays(py, &labels.offsets, &labels.labels, labels.weights),
-        mass,
-    )
+    let arrays = csr_arrays(py, &labels.offsets, &labels.labels, labels.weights)?;
+    Ok((arrays, mass))
 }
 
-fn signed(labels: &[u32]) -> Vec<i32> {
-    labels.iter().map(|&label| label as i32).collect()
+fn signed(py: Python<'_>, labels: &[u32]) -> PyResult<Py<PyArray1<i32>>> {
+    let labels = labels.iter().map(|&label| label as i32);
+    let labels = or_raise(py, memory::collect(labels))?;
+    Ok(labels.into_pyarray(py).unbind())
 }

@@ -31,19 +31,14 @@ struct Group {
 }
 
 /// Nearest and farthest distance of the object that `members` show, in metres: those of the heaviest group, the nearest
-/// of equals, and some slack. `beside` are the distances, ascending, of the points beside the mask.
+/// of equals, and some slack. `beside` are the distances of the points beside the mask; both ascend.
 ///
 /// What lies behind an object goes on beside its mask, so a group weighs as much as its points on the mask times their
 /// share of all at its distances. The long side of a vehicle seen from behind has gaps of metres: groups apart by no
 /// more than `bridged_gap` are one unless the lighter one goes on beside the mask.
-pub(super) fn object_of(
-    mut members: Vec<Member>,
-    beside: &[f64],
-    params: &Params,
-) -> Option<[f64; 2]> {
-    members.sort_unstable_by(|one, other| one.distance.total_cmp(&other.distance));
+pub(super) fn object_of(members: &[Member], beside: &[f64], params: &Params) -> Option<[f64; 2]> {
     let mut groups: Vec<Group> = Vec::new();
-    for Member { distance, weight } in members {
+    for &Member { distance, weight } in members {
         match groups.last_mut() {
             Some(group) if distance - group.far <= params.depth_gap.max(GAP_SHARE * group.far) => {
                 group.far = distance;
@@ -99,11 +94,12 @@ mod tests {
     use super::*;
 
     fn object(distances: &[f64], beside: &[f64]) -> [f64; 2] {
-        let members = distances.iter().map(|&distance| Member {
+        let member = |&distance| Member {
             distance,
             weight: 1,
-        });
-        object_of(members.collect(), beside, &Params::default()).unwrap()
+        };
+        let members: Vec<Member> = distances.iter().map(member).collect();
+        object_of(&members, beside, &Params::default()).unwrap()
     }
 
     #[test]
@@ -122,7 +118,7 @@ mod tests {
 
     #[test]
     fn the_nearer_of_equal_groups_is_the_object() {
-        assert_eq!(object(&[20.0, 9.0], &[]), [9.0 - SLACK_M, 9.0 + SLACK_M]);
+        assert_eq!(object(&[9.0, 20.0], &[]), [9.0 - SLACK_M, 9.0 + SLACK_M]);
     }
 
     #[test]
@@ -154,6 +150,6 @@ mod tests {
 
     #[test]
     fn no_point_makes_no_object() {
-        assert!(object_of(Vec::new(), &[1.0], &Params::default()).is_none());
+        assert!(object_of(&[], &[1.0], &Params::default()).is_none());
     }
 }

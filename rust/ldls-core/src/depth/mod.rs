@@ -7,11 +7,17 @@ mod edges;
 mod groups;
 
 use crate::masks::InstanceMasks;
+use crate::memory::{collect, filled, push, with_room};
 use crate::projection::nearest_pixel;
-use crate::{Params, Rle};
+use crate::{Cancel, Params, Result, Rle};
 use edges::Edges;
 use groups::{Member, object_of};
 use rayon::prelude::*;
+
+/// Points between two looks at the flag.
+const POINTS_A_BLOCK: usize = 1 << 16;
+/// Values above which the two halves are sorted by two threads.
+const PARALLEL: usize = 1 << 16;
 
 /// What depth says of the points that one image sees and of its masks.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -42,55 +48,89 @@ impl DepthGroups {
 impl InstanceMasks {
     /// The depth groups of points at the pixels `uv` and at `distances` (metres) from the camera; `standing` are those
     /// off the ground. Of `params`, `depth_gap`, `bridged_gap` and `edge_margin` count.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
     pub fn depth_groups(
         &self,
         uv: &[[f64; 2]],
         distances: Vec<f64>,
         standing: &[bool],
         params: &Params,
-    ) -> DepthGroups {
+        cancel: &Cancel,
+    ) -> Result<DepthGroups> {
         let pixel = |(point, &uv): (usize, &[f64; 2])| {
             let pixel = nearest_pixel(uv, self.height(), self.width())?;
             standing[point].then_some((point, pixel))
         };
-        let standing: Vec<(usize, [usize; 2])> = uv.iter().enumerate().filter_map(pixel).collect();
+        let mut pixels = with_room(standing.iter().filter(|&&stands| stands).count())?;
+        pixels.extend(uv.iter().enumerate().filter_map(pixel));
         let of_mask = |mask: &Rle| {
-            let edges = Edges::of(mask, params.edge_margin)?;
+            cancel.check()?;
+            let Some(edges) = Edges::of(mask, params.edge_margin)? else {
+                return Ok(None);
+            };
             let (mut members, mut beside) = (Vec::new(), Vec::new());
-            for &(point, pixel) in &standing {
-                let distance = distances[point];
-                match edges.steps_at(pixel) {
-                    0 => {}
-                    steps @ 1.. => members.push(Member {
-                        distance,
-                        weight: u64::from(steps.unsigned_abs()),
-                    }),
-                    _ => beside.push((distance, point)),
+            for block in pixels.chunks(POINTS_A_BLOCK) {
+                cancel.check()?;
+                for &(point, pixel) in block {
+                    let distance = distances[point];
+                    match edges.steps_at(pixel) {
+                        0 => {}
+                        steps @ 1.. => {
+                            let weight = u64::from(steps.unsigned_abs());
+                            push(&mut members, Member { distance, weight })?;
+                        }
+                        _ => push(&mut beside, (distance, point))?,
+                    }
                 }
             }
-            beside.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
-            let distances: Vec<f64> = beside.iter().map(|&(distance, _)| distance).collect();
-            let [near, far] = object_of(members, &distances, params)?;
-            let shared = beside
-                .iter()
-                .filter(|(distance, _)| (near..=far).contains(distance));
-            let points: Vec<usize> = shared.map(|&(_, point)| point).collect();
-            Some(([near, far], points))
+            sort(&mut members, |member| member.distance, cancel)?;
+            sort(&mut beside, |&(distance, _)| distance, cancel)?;
+            let distances = collect(beside.iter().map(|&(distance, _)| distance))?;
+            let Some([near, far]) = object_of(&members, &distances, params) else {
+                return Ok(None);
+            };
+            beside.retain(|(distance, _)| (near..=far).contains(distance));
+            Ok(Some(([near, far], beside)))
         };
-        let found: Vec<_> = self.masks().par_iter().map(of_mask).collect();
-        let mut unsure = vec![false; uv.len()];
+        let found = self.masks().par_iter().map(of_mask);
+        let found = found.collect::<Result<Vec<_>>>()?;
+        let mut unsure = filled(false, uv.len())?;
         if params.edge_margin > 0.0 {
-            let points = found.iter().flatten().flat_map(|(_, points)| points);
-            points.for_each(|&point| unsure[point] = true);
+            let points = found.iter().flatten().flat_map(|(_, beside)| beside);
+            points.for_each(|&(_, point)| unsure[point] = true);
         }
         let intervals = found
             .into_iter()
             .map(|found| found.map(|(interval, _)| interval))
             .collect();
-        DepthGroups {
+        Ok(DepthGroups {
             intervals,
             distances,
             unsure,
-        }
+        })
     }
+}
+
+/// Sorts `values` by their distance, ascending.
+fn sort<T: Send>(
+    values: &mut [T],
+    distance: impl Fn(&T) -> f64 + Copy + Sync,
+    cancel: &Cancel,
+) -> Result<()> {
+    let compare = |one: &T, other: &T| distance(one).total_cmp(&distance(other));
+    if values.len() <= PARALLEL {
+        values.sort_unstable_by(compare);
+        return Ok(());
+    }
+    cancel.check()?;
+    let middle = values.len() / 2;
+    values.select_nth_unstable_by(middle, compare);
+    let (near, far) = values.split_at_mut(middle);
+    let (near, far) = rayon::join(
+        || sort(near, distance, cancel),
+        || sort(far, distance, cancel),
+    );
+    near.and(far)
 }

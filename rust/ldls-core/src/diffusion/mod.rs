@@ -24,10 +24,10 @@ use self::seeds::{Seeds, plan};
 use self::series::Series;
 use self::sweep::{WIDTH_F32, WIDTH_F64};
 use self::winners::Best;
-use crate::Real;
-use crate::Result;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
+use crate::memory::{collect_parallel, filled};
+use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 
 /// Share of the largest likelihood that a series in single precision may leave out.
@@ -51,26 +51,28 @@ pub struct Diffused {
 /// double precision, for points at which single precision cannot decide.
 ///
 /// # Errors
-/// [`crate::Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and whatever `exact` returns.
+/// [`crate::Error::Mismatch`] where `b` does not fit `a` or `n_labels`, [`crate::Error::OutOfMemory`],
+/// [`crate::Error::Cancelled`], and whatever `exact` returns.
 pub fn diffuse(
     a: &PointGraph,
     b: &PixelLabels,
     n_labels: usize,
     iterations: Option<usize>,
     exact: impl FnOnce() -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    cancel: &Cancel,
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
-    let mut best = vec![Best::default(); a.len()];
+    let mut best = filled(Best::default(), a.len())?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let choose = |pass: &Pass<f32, WIDTH_F32>| winners::update(&mut best, pass);
-    let mut convergence = for_each_pass(a, b, &labels, iterations, choose);
-    let contested = winners::contested(&best, convergence.error);
+    let mut convergence = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
+    let contested = winners::contested(&best, convergence.error)?;
     if !contested.is_empty() {
         let (a, b) = exact()?;
         let labels = winners::candidates(&best, &contested, n_labels, convergence.error);
-        let mut refined = vec![(0, f64::NEG_INFINITY); contested.len()];
+        let mut refined = filled((0, f64::NEG_INFINITY), contested.len())?;
         let choose = |pass: &Pass<f64, WIDTH_F64>| winners::refine(&contested, &mut refined, pass);
-        for_each_pass(&a, &b, &labels, iterations, choose);
+        for_each_pass(&a, &b, &labels, iterations, cancel, choose)?;
         for (&point, &(label, _)) in contested.iter().zip(&refined) {
             best[point as usize].labels[0] = label;
         }
@@ -78,8 +80,8 @@ pub fn diffuse(
     }
     let best = best.par_iter().with_min_len(ROWS_A_TASK);
     Ok(Diffused {
-        labels: best.clone().map(|best| best.labels[0]).collect(),
-        confidence: best.map(Best::confidence).collect(),
+        labels: collect_parallel(best.clone().map(|best| best.labels[0]))?,
+        confidence: collect_parallel(best.map(Best::confidence))?,
         convergence,
     })
 }
@@ -93,9 +95,10 @@ pub fn likelihoods(
     b: &PixelLabels,
     n_labels: usize,
     iterations: Option<usize>,
+    cancel: &Cancel,
 ) -> Result<(Vec<f32>, Convergence)> {
     b.check(a.len(), n_labels)?;
-    let mut all = vec![0.0; a.len() * n_labels];
+    let mut all = filled(0.0, a.len().saturating_mul(n_labels))?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let write = |pass: &Pass<f32, WIDTH_F32>| {
         for (label, group, lane) in pass.labels() {
@@ -104,7 +107,7 @@ pub fn likelihoods(
             }
         }
     };
-    let convergence = for_each_pass(a, b, &labels, iterations, write);
+    let convergence = for_each_pass(a, b, &labels, iterations, cancel, write)?;
     Ok((all, convergence))
 }
 
@@ -114,26 +117,29 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
     b: &PixelLabels<T>,
     labels: &[u32],
     iterations: Option<usize>,
+    cancel: &Cancel,
     mut done: impl FnMut(&Pass<T, WIDTH>),
-) -> Convergence {
+) -> Result<Convergence> {
     // in single precision, a probe shows how large the terms left out may be
     let probed = WIDTH == WIDTH_F32;
     let tolerance = if probed { TOLERANCE_F32 } else { TOLERANCE_F64 };
     let mut series = Series::of_graph(a, iterations, tolerance);
-    let schedule = Schedule::new(a);
+    cancel.check()?;
+    let schedule = Schedule::new(a, cancel)?;
     let mut convergence = Convergence::default();
     for lanes in plan(b, labels, WIDTH, probed) {
-        let seeds = Seeds::new(b, lanes);
-        let mut pass = Pass::run(a, &schedule, &seeds, series.as_ref(), iterations);
+        let seeds = Seeds::new(b, lanes, cancel)?;
+        let mut pass = Pass::run(a, &schedule, &seeds, series.as_ref(), iterations, cancel)?;
         if series.is_some() && !pass.is_sound(b.largest_overlap()) {
             series = None;
             drop(pass);
-            pass = Pass::run(a, &schedule, &seeds, None, iterations);
+            pass = Pass::run(a, &schedule, &seeds, None, iterations, cancel)?;
         }
+        cancel.check()?;
         done(&pass);
         convergence.merge(pass.convergence);
     }
-    convergence
+    Ok(convergence)
 }
 
 #[cfg(test)]
@@ -152,11 +158,11 @@ mod tests {
     fn the_first_product_yields_the_seeds_and_the_second_mixes_them() {
         let (a, b) = pair();
         assert_eq!(
-            likelihoods(&a, &b, 2, Some(1)).unwrap().0,
+            likelihoods(&a, &b, 2, Some(1), Cancel::never()).unwrap().0,
             [0.5, 0.0, 0.0, 0.5]
         );
         assert_eq!(
-            likelihoods(&a, &b, 2, Some(2)).unwrap().0,
+            likelihoods(&a, &b, 2, Some(2), Cancel::never()).unwrap().0,
             [0.625, 0.125, 0.125, 0.625]
         );
     }
@@ -164,7 +170,7 @@ mod tests {
     #[test]
     fn without_a_bound_it_runs_to_the_fixed_point() {
         let (a, b) = pair();
-        let (z, convergence) = likelihoods(&a, &b, 2, None).unwrap();
+        let (z, convergence) = likelihoods(&a, &b, 2, None, Cancel::never()).unwrap();
         assert!(convergence.converged());
         for (value, expected) in z.iter().zip([0.75, 0.25, 0.25, 0.75]) {
             assert!((value - expected).abs() < 1e-5);
@@ -180,7 +186,7 @@ mod tests {
             weights: vec![],
             mass: vec![0.0],
         };
-        let diffused = diffuse(&a, &b, 3, Some(5), never).unwrap();
+        let diffused = diffuse(&a, &b, 3, Some(5), never, Cancel::never()).unwrap();
         assert_eq!((diffused.labels[0], diffused.confidence[0]), (0, 0.0));
     }
 
@@ -197,7 +203,7 @@ mod tests {
             weights: vec![0.01; 1000],
             mass: vec![0.01; 1000],
         };
-        let (z, convergence) = likelihoods(&a, &b, 10, Some(200)).unwrap();
+        let (z, convergence) = likelihoods(&a, &b, 10, Some(200), Cancel::never()).unwrap();
         assert!(convergence.sweeps >= 200);
         let expected: f64 = (0..100).map(|k| 0.01 * 0.99_f64.powi(k)).sum();
         assert!((f64::from(z[0]) - expected).abs() < 1e-5);
@@ -231,8 +237,8 @@ mod tests {
 
     /// A and b of `points` of which each sees `pixels` windows of two labels, in both precisions.
     fn system<T: Real>(points: &[[f64; 3]], seen: &[(u32, u32)], lambda: f64) -> System<T> {
-        let mut a =
-            PointGraph::from_neighbors(points, &Neighbors::search(points, 10), 1.0).unwrap();
+        let neighbors = Neighbors::search(points, 10, Cancel::never()).unwrap();
+        let mut a = PointGraph::from_neighbors(points, &neighbors, 1.0, Cancel::never()).unwrap();
         let mut b = PixelLabels {
             offsets: vec![0],
             labels: vec![],
@@ -249,7 +255,7 @@ mod tests {
             b.offsets.push(b.labels.len());
             b.mass.push(T::from_f64(lambda * 25.0));
         }
-        a.normalize_rows(&mut b).unwrap();
+        a.normalize_rows(&mut b, Cancel::never()).unwrap();
         (a, b)
     }
 
@@ -263,7 +269,7 @@ mod tests {
             .map(|i| (1 + i / 7000 % 2, i % 26))
             .collect();
         let (a, b) = system::<f32>(&points, &seen, 0.01);
-        let (found, _) = likelihoods(&a, &b, 3, Some(60)).unwrap();
+        let (found, _) = likelihoods(&a, &b, 3, Some(60), Cancel::never()).unwrap();
         let (a, b) = system::<f64>(&points, &seen, 0.01);
         let expected = plain_products(&a, &b, 3, 60);
         let largest = found
@@ -319,7 +325,7 @@ mod tests {
             let seen = &seen[..points.len()];
             let (a, b) = system::<f32>(&points, seen, lambda);
             let double = || Ok(system::<f64>(&points, seen, lambda));
-            let found = diffuse(&a, &b, 30, Some(iterations), double).unwrap();
+            let found = diffuse(&a, &b, 30, Some(iterations), double, Cancel::never()).unwrap();
             let (a, b) = system::<f64>(&points, seen, lambda);
             let expected = plain_products(&a, &b, 30, iterations);
             for (i, (label, z)) in found.labels.iter().zip(expected.chunks(30)).enumerate() {

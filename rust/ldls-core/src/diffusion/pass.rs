@@ -6,8 +6,8 @@ use super::seeds::{BACKGROUND_LANE, Seeds};
 use super::series::Series;
 use super::sweep::{Step, sweep};
 use super::values::{SharedValues, zeros};
-use crate::Real;
 use crate::graph::PointGraph;
+use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 
 /// Error from which on a series is given up for plain products.
@@ -36,35 +36,42 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         seeds: &'a Seeds<T>,
         series: Option<&Series>,
         iterations: Option<usize>,
-    ) -> Self {
+        cancel: &Cancel,
+    ) -> Result<Self> {
         // the first product yields the seeds, the first step of a series its last term
         let first = series.map_or(1.0, |series| series.coefficients[series.degree()]);
-        let mut pass = Self::new(a, schedule, seeds, T::from_f64(first));
+        let mut pass = Self::new(a, schedule, seeds, T::from_f64(first))?;
+        cancel.check()?;
         match (series, iterations) {
-            (Some(series), _) => pass.run_series(series),
+            (Some(series), _) => pass.run_series(series, cancel)?,
             (None, Some(products)) => {
-                pass.advance(&vec![product(); products.saturating_sub(1)]);
+                pass.advance(&vec![product(); products.saturating_sub(1)], cancel)?;
                 pass.convergence.sweeps = products;
             }
             (None, None) => {
                 pass.convergence.sweeps = 1;
                 while pass.largest_change() > CONVERGED && pass.convergence.sweeps < MOST_SWEEPS {
-                    pass.advance(&[product()]);
+                    pass.advance(&[product()], cancel)?;
                     pass.convergence.sweeps += 1;
                 }
             }
         }
         if iterations.is_none() {
-            pass.measure_residual();
+            pass.measure_residual(cancel)?;
         }
-        pass
+        Ok(pass)
     }
 
     /// z = `scale` * s, with the probe's seeds as they are.
-    fn new(a: &'a PointGraph<T>, schedule: &'a Schedule, seeds: &'a Seeds<T>, scale: T) -> Self {
+    fn new(
+        a: &'a PointGraph<T>,
+        schedule: &'a Schedule,
+        seeds: &'a Seeds<T>,
+        scale: T,
+    ) -> Result<Self> {
         let groups = seeds.lanes.len().div_ceil(WIDTH).max(1);
-        let mut z = zeros(a.len(), groups);
-        let previous = zeros(a.len(), groups);
+        let mut z = zeros(a.len(), groups)?;
+        let previous = zeros(a.len(), groups)?;
         let rows = z[0].par_iter_mut().zip(&seeds.background);
         rows.with_min_len(ROWS_A_TASK)
             .for_each(|(row, &weight)| row[BACKGROUND_LANE] = scale * weight);
@@ -76,19 +83,19 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
             rows.with_min_len(ROWS_A_TASK)
                 .for_each(|(row, &weight)| row[lane % WIDTH] = weight);
         }
-        Self {
+        Ok(Self {
             a,
             schedule,
             seeds,
-            activity: Activity::new(schedule, seeds.groups(WIDTH), groups),
+            activity: Activity::new(schedule, seeds.groups(WIDTH)?, groups),
             z,
             previous,
             convergence: Convergence::default(),
-        }
+        })
     }
 
     /// Clenshaw's recurrence: `y_k = c_k b + 2 X y_(k+1) - y_(k+2)`, `X = (A - middle) / half width`.
-    fn run_series(&mut self, series: &Series) {
+    fn run_series(&mut self, series: &Series, cancel: &Cancel) -> Result<()> {
         let step_of = |k: usize| {
             // the last step takes X once, all others twice
             let times = if k == 0 { 1.0 } else { 2.0 };
@@ -97,20 +104,21 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
             step(series.coefficients[k], along, stay, 1.0)
         };
         let steps: Vec<Step<T>> = (0..series.degree()).rev().map(step_of).collect();
-        self.advance(&steps);
+        self.advance(&steps, cancel)?;
         self.convergence.sweeps = series.degree();
         // the probe has gone through the recurrence as the last term alone
         self.convergence.error = series.tail * self.largest_probe();
+        Ok(())
     }
 
     /// Applies `steps` one after the other; what was z before the last becomes the previous values.
     #[expect(unsafe_code, reason = "threads share values by rows")]
-    fn advance(&mut self, steps: &[Step<T>]) {
+    fn advance(&mut self, steps: &[Step<T>], cancel: &Cancel) -> Result<()> {
         let values = [
             SharedValues::new(&mut self.z),
             SharedValues::new(&mut self.previous),
         ];
-        self.schedule.run(steps.len(), |rows, step| {
+        self.schedule.run(steps.len(), cancel, |rows, step| {
             let from_to = [&values[step % 2], &values[(step + 1) % 2]];
             // SAFETY: nobody else is in these rows, and what they have edges from lies in them or in tiles next to
             // them, which neither are behind `step`, so have its z, nor ahead of the step after it, so have not lost it
@@ -124,18 +132,20 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
                     rows,
                 );
             }
-        });
+        })?;
         if steps.len() % 2 == 1 {
             std::mem::swap(&mut self.z, &mut self.previous);
         }
+        Ok(())
     }
 
     /// One more product, for the residual; the values are those before it.
-    fn measure_residual(&mut self) {
-        self.advance(&[product()]);
+    fn measure_residual(&mut self, cancel: &Cancel) -> Result<()> {
+        self.advance(&[product()], cancel)?;
         self.convergence.sweeps += 1;
         self.convergence.residual = Some(self.largest_change());
         std::mem::swap(&mut self.z, &mut self.previous);
+        Ok(())
     }
 
     /// Label, values of its group at all points and lane within the group of each label.
@@ -213,9 +223,10 @@ mod tests {
             weights: likelihoods.concat(),
             mass: vec![0.5; 2],
         };
-        let schedule = Schedule::new(&a);
-        let seeds = Seeds::new(&b, vec![Some(0), Some(1)]);
-        let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1));
+        let never = Cancel::never();
+        let schedule = Schedule::new(&a, never).unwrap();
+        let seeds = Seeds::new(&b, vec![Some(0), Some(1)], never).unwrap();
+        let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1), never).unwrap();
         pass.convergence.error = error;
         pass.is_sound(overlap)
     }

@@ -8,7 +8,8 @@ use super::convergence::{CONVERGED, MOST_SWEEPS};
 use super::schedule::ROWS_A_TASK;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::{Real, Result};
+use crate::memory::{collect_parallel, filled};
+use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 
 /// A diffusion that is run some products at a time.
@@ -32,7 +33,7 @@ impl Products {
     /// the number of products, `None` as many as it takes.
     ///
     /// # Errors
-    /// [`crate::Error::Mismatch`] where `b` does not fit `a` or `n_labels`.
+    /// [`Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and [`Error::OutOfMemory`].
     pub fn new(
         a: PointGraph,
         b: PixelLabels,
@@ -40,27 +41,31 @@ impl Products {
         iterations: Option<usize>,
     ) -> Result<Self> {
         b.check(a.len(), n_labels)?;
-        let zeros = vec![0.0; a.len() * n_labels];
+        let likelihoods = a.len().saturating_mul(n_labels);
         Ok(Self {
             a,
             b,
             n_labels,
             iterations,
-            next: zeros.clone(),
-            z: zeros,
+            next: filled(0.0, likelihoods)?,
+            z: filled(0.0, likelihoods)?,
             done: 0,
             converged: false,
         })
     }
 
     /// Runs `products` more, or as many as there are left.
-    pub fn advance(&mut self, products: usize) {
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`]: the product that it was in is not done then.
+    pub fn advance(&mut self, products: usize, cancel: &Cancel) -> Result<()> {
         for _ in 0..products {
             if self.is_finished() {
-                return;
+                break;
             }
-            self.run_product();
+            self.run_product(cancel)?;
         }
+        Ok(())
     }
 
     /// True if all products asked for are done; without a number, if the last changed no likelihood by more
@@ -78,16 +83,20 @@ impl Products {
     }
 
     /// The likelihoods after the products done, row by row.
-    pub fn likelihoods(&self) -> Vec<f32> {
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn likelihoods(&self) -> Result<Vec<f32>> {
         let values = self.z.par_iter().with_min_len(ROWS_A_TASK);
-        values.map(|&value| f32::from_f64(value)).collect()
+        collect_parallel(values.map(|&value| f32::from_f64(value)))
     }
 
-    fn run_product(&mut self) {
+    fn run_product(&mut self, cancel: &Cancel) -> Result<()> {
         let (a, b, z, n_labels) = (&self.a, &self.b, &self.z, self.n_labels);
         let rows = self.next.par_chunks_mut(n_labels.max(1)).enumerate();
         // one row, one thread: sums keep their order, so results do too
-        rows.with_min_len(ROWS_A_TASK).for_each(|(i, row)| {
+        rows.with_min_len(ROWS_A_TASK).try_for_each(|(i, row)| {
+            cancel.check()?;
             row.fill(0.0);
             for (label, weight) in b.row(i) {
                 row[label] += weight.to_f64();
@@ -98,12 +107,14 @@ impl Products {
                     .zip(from)
                     .for_each(|(sum, value)| *sum += weight * value);
             }
-        });
+            Ok::<(), Error>(())
+        })?;
         std::mem::swap(&mut self.z, &mut self.next);
         self.done += 1;
         if self.iterations.is_none() {
             self.converged = self.last_change() <= CONVERGED;
         }
+        Ok(())
     }
 
     /// Largest change of any likelihood by the last product.
@@ -127,24 +138,32 @@ mod tests {
     #[test]
     fn products_are_run_from_zero_one_after_another_and_no_more_than_asked_for() {
         let mut products = products_of_pair(Some(3));
-        assert_eq!(products.likelihoods(), [0.0; 4]);
-        products.advance(1);
-        assert_eq!(products.likelihoods(), [0.5, 0.0, 0.0, 0.5]);
-        products.advance(1);
-        assert_eq!(products.likelihoods(), [0.625, 0.125, 0.125, 0.625]);
+        assert_eq!(products.likelihoods().unwrap(), [0.0; 4]);
+        products.advance(1, Cancel::never()).unwrap();
+        assert_eq!(products.likelihoods().unwrap(), [0.5, 0.0, 0.0, 0.5]);
+        products.advance(1, Cancel::never()).unwrap();
+        assert_eq!(
+            products.likelihoods().unwrap(),
+            [0.625, 0.125, 0.125, 0.625]
+        );
         assert!(!products.is_finished());
-        products.advance(5);
+        products.advance(5, Cancel::never()).unwrap();
         assert_eq!((products.done(), products.is_finished()), (3, true));
     }
 
     #[test]
     fn without_a_number_it_ends_where_a_product_changes_next_to_nothing() {
         let mut products = products_of_pair(None);
-        products.advance(usize::MAX);
+        products.advance(usize::MAX, Cancel::never()).unwrap();
         assert!(products.is_finished());
         // product t changes likelihoods by 2^-(t + 1), and 2^-17 < 1e-5 < 2^-16
         assert_eq!(products.done(), 16);
-        for (value, expected) in products.likelihoods().iter().zip([0.75, 0.25, 0.25, 0.75]) {
+        for (value, expected) in products
+            .likelihoods()
+            .unwrap()
+            .iter()
+            .zip([0.75, 0.25, 0.25, 0.75])
+        {
             assert!((value - expected).abs() < 1e-5);
         }
     }

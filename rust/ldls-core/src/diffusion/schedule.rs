@@ -7,8 +7,9 @@
 //! every step ("sparse tiling": Strout et al., Int. J. High Performance Computing Applications 18(1), 2004). The values
 //! do not depend on it.
 
-use crate::Real;
 use crate::graph::PointGraph;
+use crate::memory::{filled, push, with_room};
+use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
@@ -21,6 +22,8 @@ pub(super) const BLOCK: usize = 16;
 const TILE: usize = 4 * BLOCK;
 /// Fewest tiles for a task of the thread pool.
 const TILES_A_TASK: usize = 4;
+/// Blocks between two looks at the flag.
+const BLOCKS_A_LOOK: usize = 4096;
 /// Tiles of a region: some 16 MB of values and edges.
 const REGION: usize = 32768 / TILE;
 /// Steps that a region takes at a time.
@@ -42,13 +45,13 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    pub(super) fn new<T: Real>(a: &PointGraph<T>) -> Self {
-        Self::in_regions(a, REGION)
+    pub(super) fn new<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<Self> {
+        Self::in_regions(a, REGION, cancel)
     }
 
     /// Regions of `size` tiles each.
-    fn in_regions<T: Real>(a: &PointGraph<T>, size: usize) -> Self {
-        let (source_offsets, sources) = sources(a);
+    fn in_regions<T: Real>(a: &PointGraph<T>, size: usize, cancel: &Cancel) -> Result<Self> {
+        let (source_offsets, sources) = sources(a, cancel)?;
         let mut schedule = Self {
             rows: a.len(),
             source_offsets,
@@ -62,10 +65,12 @@ impl Schedule {
             schedule.round = ROUND;
         }
         // the region of each tile in each step: what must wait for a later region is left to that one
-        let mut regions: Vec<u32> = (0..tiles).map(|tile| (tile / size) as u32).collect();
+        let mut regions = with_room(tiles * schedule.round)?;
+        regions.extend((0..tiles).map(|tile| (tile / size) as u32));
         if schedule.round > 1 {
-            let edges = schedule.tile_edges();
+            let edges = schedule.tile_edges()?;
             for step in 1..schedule.round {
+                cancel.check()?;
                 regions.extend_from_within((step - 1) * tiles..);
                 let (before, after) = regions.split_at_mut(step * tiles);
                 let before = &before[(step - 1) * tiles..];
@@ -76,19 +81,19 @@ impl Schedule {
                 }
             }
         }
-        schedule.sort(&regions, tiles, size);
-        schedule
+        schedule.sort(&regions, tiles, size)?;
+        Ok(schedule)
     }
 
     /// Sorts the tiles by region and step.
-    fn sort(&mut self, regions: &[u32], tiles: usize, size: usize) {
+    fn sort(&mut self, regions: &[u32], tiles: usize, size: usize) -> Result<()> {
         let place = |at: usize| regions[at] as usize * self.round + at / tiles;
         let mut offsets = vec![0; tiles.div_ceil(size) * self.round + 1];
         (0..regions.len()).for_each(|at| offsets[place(at) + 1] += 1);
         for at in 1..offsets.len() {
             offsets[at] += offsets[at - 1];
         }
-        let mut order = vec![0; regions.len()];
+        let mut order = filled(0, regions.len())?;
         for at in 0..regions.len() {
             let next = &mut offsets[place(at)];
             order[*next] = (at % tiles) as u32;
@@ -98,24 +103,25 @@ impl Schedule {
         offsets.rotate_right(1);
         offsets[0] = 0;
         (self.order, self.offsets) = (order, offsets);
+        Ok(())
     }
 
     /// The pairs of different tiles with edges from one to the other, some of them twice.
-    fn tile_edges(&self) -> Vec<[u32; 2]> {
+    fn tile_edges(&self) -> Result<Vec<[u32; 2]>> {
         let mut edges = Vec::new();
         // at which tile each was last met
-        let mut met = vec![u32::MAX; self.rows.div_ceil(TILE)];
+        let mut met = filled(u32::MAX, self.rows.div_ceil(TILE))?;
         for block in 0..self.rows.div_ceil(BLOCK) {
             let tile = (block * BLOCK / TILE) as u32;
             met[tile as usize] = tile;
             for &source in self.sources(block) {
                 let other = source / (TILE / BLOCK) as u32;
                 if std::mem::replace(&mut met[other as usize], tile) != tile {
-                    edges.push([tile, other]);
+                    push(&mut edges, [tile, other])?;
                 }
             }
         }
-        edges
+        Ok(edges)
     }
 
     /// The blocks other than `block` with a row that a row of `block` has an edge from.
@@ -129,53 +135,69 @@ impl Schedule {
     ///
     /// At that time every tile next to it has taken steps 0 to `step` - 1, none has begun with `step` + 1, and what
     /// was written for those is visible.
-    pub(super) fn run(&self, steps: usize, work: impl Fn(Range<usize>, usize) + Sync) {
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`]: some tiles have taken fewer steps then.
+    pub(super) fn run(
+        &self,
+        steps: usize,
+        cancel: &Cancel,
+        work: impl Fn(Range<usize>, usize) + Sync,
+    ) -> Result<()> {
         for first in (0..steps).step_by(self.round) {
             for (place, range) in self.offsets.windows(2).enumerate() {
                 let step = first + place % self.round;
                 if step < steps {
                     let tiles = self.order[range[0]..range[1]].par_iter();
-                    tiles.with_min_len(TILES_A_TASK).for_each(|&tile| {
+                    tiles.with_min_len(TILES_A_TASK).try_for_each(|&tile| {
+                        cancel.check()?;
                         let start = tile as usize * TILE;
                         work(start..self.rows.min(start + TILE), step);
-                    });
+                        Ok::<(), Error>(())
+                    })?;
                 }
             }
         }
+        Ok(())
     }
 }
 
 /// Offsets and sources of all blocks: the other blocks that each has edges from.
-fn sources<T: Real>(a: &PointGraph<T>) -> (Vec<u32>, Vec<u32>) {
+fn sources<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<(Vec<u32>, Vec<u32>)> {
     let count = a.len().div_ceil(BLOCK);
     // few tasks: each marks the blocks that it has met in an array of its own
     let size = count.div_ceil(4 * rayon::current_num_threads()).max(1);
     let of_task = |task: usize| {
-        let (mut sources, mut ends) = (Vec::new(), Vec::with_capacity(size));
+        let (mut sources, mut ends) = (Vec::new(), with_room(size)?);
         // at which block each was last met
-        let mut met = vec![u32::MAX; count];
+        let mut met = filled(u32::MAX, count)?;
         for block in task * size..count.min((task + 1) * size) {
+            if block % BLOCKS_A_LOOK == 0 {
+                cancel.check()?;
+            }
             met[block] = block as u32;
             for &column in a.slices(block * BLOCK..a.len().min((block + 1) * BLOCK)).0 {
                 let source = column / BLOCK as u32;
                 if std::mem::replace(&mut met[source as usize], block as u32) != block as u32 {
-                    sources.push(source);
+                    push(&mut sources, source)?;
                 }
             }
             ends.push(sources.len() as u32);
         }
-        (sources, ends)
+        Ok((sources, ends))
     };
     let tasks = (0..count.div_ceil(size)).into_par_iter();
-    let parts: Vec<(Vec<u32>, Vec<u32>)> = tasks.map(of_task).collect();
-    let mut offsets = vec![0];
-    let mut all = Vec::with_capacity(parts.iter().map(|(sources, _)| sources.len()).sum());
+    let parts: Vec<(Vec<u32>, Vec<u32>)> = tasks.map(of_task).collect::<Result<_>>()?;
+    let mut offsets = with_room(count + 1)?;
+    offsets.push(0);
+    let mut all = with_room(parts.iter().map(|(sources, _)| sources.len()).sum())?;
     for (sources, ends) in parts {
+        cancel.check()?;
         let start = all.len() as u32;
         offsets.extend(ends.iter().map(|end| start + end));
         all.extend(sources);
     }
-    (offsets, all)
+    Ok((offsets, all))
 }
 
 /// The groups of lanes of each block that hold anything but zeros; bit g of a block stands for group g.
@@ -253,12 +275,12 @@ mod tests {
             region in 1_usize..20,
             steps in 0_usize..30,
         ) {
-            let schedule = Schedule::in_regions(&graph(rows, &reaches), region);
+            let schedule = Schedule::in_regions(&graph(rows, &reaches), region, Cancel::never()).unwrap();
             let count = rows.div_ceil(TILE);
-            let edges = schedule.tile_edges();
+            let edges = schedule.tile_edges().unwrap();
             let taken: Vec<AtomicUsize> = (0..count).map(|_| AtomicUsize::new(0)).collect();
             let violations = AtomicUsize::new(0);
-            schedule.run(steps, |rows, step| {
+            schedule.run(steps, Cancel::never(), |rows, step| {
                 let tile = rows.start / TILE;
                 let of_tile = edges.iter().filter(|edge| edge.contains(&(tile as u32)));
                 let ready = of_tile.flatten().all(|&other| {
@@ -268,7 +290,7 @@ mod tests {
                 if !ready || taken[tile].fetch_add(1, SeqCst) != step {
                     violations.fetch_add(1, SeqCst);
                 }
-            });
+            }).unwrap();
             prop_assert_eq!(violations.into_inner(), 0);
             prop_assert!(taken.into_iter().all(|taken| taken.into_inner() == steps));
         }
@@ -277,7 +299,7 @@ mod tests {
     #[test]
     fn a_large_cloud_is_divided_and_most_of_a_region_takes_all_steps_of_a_round_at_once() {
         let rows = 4 * REGION * TILE;
-        let schedule = Schedule::new(&graph(rows, &[1]));
+        let schedule = Schedule::new(&graph(rows, &[1]), Cancel::never()).unwrap();
         assert_eq!(
             (schedule.round, schedule.offsets.len() - 1),
             (ROUND, 4 * ROUND)

@@ -1,8 +1,9 @@
 //! The seeds of the labels that share a pass over the graph, by the lane of each label.
 
 use super::schedule::{BLOCK, ROWS_A_TASK};
-use crate::Real;
 use crate::masks::PixelLabels;
+use crate::memory::{collect, collect_parallel, filled, push, with_room};
+use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -84,7 +85,11 @@ pub(super) struct Seeds<T> {
 }
 
 impl<T: Real> Seeds<T> {
-    pub(super) fn new(b: &PixelLabels<T>, lanes: Vec<Option<u32>>) -> Self {
+    pub(super) fn new(
+        b: &PixelLabels<T>,
+        lanes: Vec<Option<u32>>,
+        cancel: &Cancel,
+    ) -> Result<Self> {
         let n_labels = b.labels.iter().max().map_or(0, |&label| label as usize + 1);
         let mut lane_of = vec![None; n_labels];
         for (lane, label) in lanes.iter().enumerate() {
@@ -98,33 +103,38 @@ impl<T: Real> Seeds<T> {
             weight.map_or(T::default(), |(_, weight)| weight)
         };
         let background = match lanes[..] {
-            [Some(0), ..] => points().map(background).collect(),
-            _ => vec![T::default(); b.rows()],
+            [Some(0), ..] => collect_parallel(points().map(background))?,
+            _ => filled(T::default(), b.rows())?,
         };
+        cancel.check()?;
         let signed = |(label, weight): (usize, T)| T::from_f64(random_sign(label)) * weight;
         let probe = if lanes.contains(&None) {
-            points().map(|i| b.row(i).map(signed).sum()).collect()
+            collect_parallel(points().map(|i| b.row(i).map(signed).sum()))?
         } else {
             Vec::new()
         };
-        let (mut entries, mut offsets) = (Vec::new(), Vec::with_capacity(b.rows() + 1));
+        let (mut entries, mut offsets) = (Vec::new(), with_room(b.rows() + 1)?);
         offsets.push(0);
         for i in 0..b.rows() {
-            let others = b.row(i).filter(|&(label, _)| label > 0);
-            entries.extend(
-                others.filter_map(|(label, weight)| Some((i as u32, lane_of[label]?, weight))),
-            );
+            if i % ROWS_A_TASK == 0 {
+                cancel.check()?;
+            }
+            for (label, weight) in b.row(i).filter(|&(label, _)| label > 0) {
+                if let Some(lane) = lane_of[label] {
+                    push(&mut entries, (i as u32, lane, weight))?;
+                }
+            }
             offsets.push(entries.len() as u32);
         }
         let weights = b.weights.iter().map(|weight| weight.to_f64());
-        Self {
+        Ok(Self {
             lanes,
             background,
             probe,
             entries,
             offsets,
             least: T::from_f64(T::NEGLIGIBLE * weights.fold(0.0, f64::max)),
-        }
+        })
     }
 
     /// Label and lane of the lanes that have a label.
@@ -139,7 +149,7 @@ impl<T: Real> Seeds<T> {
     }
 
     /// For each block of rows, bit g where lanes of group g have seeds.
-    pub(super) fn groups(&self, width: usize) -> Vec<u8> {
+    pub(super) fn groups(&self, width: usize) -> Result<Vec<u8>> {
         let rows = self.background.len();
         let probed = self.probe_lane().map_or(0, |lane| 1 << (lane / width));
         let full = self.background.iter().any(|&weight| weight > T::default());
@@ -150,7 +160,7 @@ impl<T: Real> Seeds<T> {
                 bits | 1 << (*lane as usize / width)
             })
         };
-        (0..rows).step_by(BLOCK).map(of_block).collect()
+        collect((0..rows).step_by(BLOCK).map(of_block))
     }
 
     /// Row, lane and weight of each seed of `rows`, but for the background's and the probe's.

@@ -2,6 +2,8 @@
 
 use super::pass::Pass;
 use super::schedule::ROWS_A_TASK;
+use crate::Result;
+use crate::memory::push;
 use rayon::prelude::*;
 
 /// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
@@ -64,9 +66,12 @@ pub(super) fn update<const WIDTH: usize>(best: &mut [Best], pass: &Pass<f32, WID
 }
 
 /// The points at which single precision cannot decide, where each value may be off by `error`.
-pub(super) fn contested(best: &[Best], error: f64) -> Vec<u32> {
-    let points = (0..best.len()).filter(|&point| best[point].may_win(1, error));
-    points.map(|point| point as u32).collect()
+pub(super) fn contested(best: &[Best], error: f64) -> Result<Vec<u32>> {
+    let mut points = Vec::new();
+    for point in (0..best.len()).filter(|&point| best[point].may_win(1, error)) {
+        push(&mut points, point as u32)?;
+    }
+    Ok(points)
 }
 
 /// The labels that may win at any of `points`, ascending.
@@ -101,6 +106,10 @@ pub(super) fn refine<const WIDTH: usize>(
 mod tests {
     use super::*;
 
+    fn contested_by(best: &[Best], error: f64) -> Vec<u32> {
+        contested(best, error).unwrap()
+    }
+
     fn best(values: &[(u32, f32)]) -> Best {
         let mut best = Best::default();
         for &(label, value) in values {
@@ -126,18 +135,18 @@ mod tests {
             best(&[(1, 0.5), (2, 0.25)]),
         ];
         assert!(
-            contested(&points, 0.0).is_empty(),
+            contested_by(&points, 0.0).is_empty(),
             "far more than rounding apart"
         );
-        assert_eq!(contested(&points, 0.001), [0]);
-        assert_eq!(contested(&points, 0.2), [0, 1]);
-        assert_eq!(contested(&[best(&[(1, 0.5), (2, 0.5)])], 0.0), [0]);
+        assert_eq!(contested_by(&points, 0.001), [0]);
+        assert_eq!(contested_by(&points, 0.2), [0, 1]);
+        assert_eq!(contested_by(&[best(&[(1, 0.5), (2, 0.5)])], 0.0), [0]);
     }
 
     #[test]
     fn a_label_that_nothing_reached_is_no_candidate() {
-        assert!(contested(&[best(&[(1, 0.5)])], 1.0).is_empty());
-        assert!(contested(&[Best::default()], 1.0).is_empty());
+        assert!(contested_by(&[best(&[(1, 0.5)])], 1.0).is_empty());
+        assert!(contested_by(&[Best::default()], 1.0).is_empty());
     }
 
     #[test]

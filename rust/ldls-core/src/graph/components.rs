@@ -1,7 +1,8 @@
 //! Outlier removal: an instance keeps its largest connected component and what is certainly part of it (method, step 7).
 
 use super::point_graph::PointGraph;
-use crate::{Error, Result};
+use crate::memory::{collect, filled};
+use crate::{Cancel, Error, Result};
 
 /// Share of its points that a component beside the largest needs at the distance of its object.
 const LEAST_AT_DEPTH: f64 = 0.8;
@@ -13,15 +14,17 @@ const LEAST_AT_DEPTH: f64 = 0.8;
 /// four fifths of its points are `at_depth`: as far away, by their row and label, as the object.
 ///
 /// # Errors
-/// [`Error::Mismatch`] where `labels` is of another length than the graph.
+/// [`Error::Mismatch`] where `labels` is of another length than the graph, [`Error::OutOfMemory`] and
+/// [`Error::Cancelled`].
 pub fn remove_outliers(
     graph: &PointGraph,
     labels: &[u32],
     part_size: f64,
     at_depth: impl Fn(usize, u32) -> bool,
+    cancel: &Cancel,
 ) -> Result<Vec<u32>> {
-    let indices: Vec<u32> = (0..labels.len() as u32).collect();
-    remove_outliers_by_index(graph, labels, &indices, part_size, at_depth)
+    let indices = collect(0..labels.len() as u32)?;
+    remove_outliers_by_index(graph, labels, &indices, part_size, at_depth, cancel)
 }
 
 /// The same for points whose rows are not in the order of their `indices`.
@@ -31,6 +34,7 @@ pub(crate) fn remove_outliers_by_index(
     indices: &[u32],
     part_size: f64,
     at_depth: impl Fn(usize, u32) -> bool,
+    cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     if labels.len() != graph.len() {
         let problem = format!(
@@ -43,25 +47,42 @@ pub(crate) fn remove_outliers_by_index(
             problem,
         });
     }
-    let mut sets = DisjointSets::new(labels.len());
-    for (i, &label) in labels.iter().enumerate().filter(|(_, label)| **label > 0) {
+    let look = |i: usize| {
+        if i.is_multiple_of(ROWS_A_BLOCK) {
+            cancel.check()
+        } else {
+            Ok(())
+        }
+    };
+    let mut sets = DisjointSets::new(labels.len())?;
+    for (i, &label) in labels.iter().enumerate() {
+        look(i)?;
+        if label == 0 {
+            continue;
+        }
         for (j, _) in graph.row(i).filter(|&(j, _)| labels[j] == label) {
             sets.join(i as u32, j as u32);
         }
     }
-    let roots: Vec<u32> = (0..labels.len() as u32).map(|i| sets.root(i)).collect();
-    let mut components = vec![Component::NONE; labels.len()];
+    cancel.check()?;
+    let roots = collect((0..labels.len() as u32).map(|i| sets.root(i)))?;
+    let mut components = filled(Component::NONE, labels.len())?;
     for (i, (&root, &index)) in roots.iter().zip(indices).enumerate() {
+        look(i)?;
         components[root as usize].add(root, index, labels[i] > 0 && at_depth(i, labels[i]));
     }
+    cancel.check()?;
     let largest = largest_of_each(labels, &components);
     let stays = |label: u32, root: u32| {
         let (component, largest) = (&components[root as usize], &largest[label as usize]);
         root == largest.root || (part_size < 1.0 && component.is_part_of(largest, part_size))
     };
     let kept = |(&label, &root): (&u32, &u32)| if stays(label, root) { label } else { 0 };
-    Ok(labels.iter().zip(&roots).map(kept).collect())
+    collect(labels.iter().zip(&roots).map(kept))
 }
+
+/// Points between two looks at the flag.
+const ROWS_A_BLOCK: usize = 1 << 16;
 
 /// One component: its root, its size, the points at the distance of its object, and the lowest index of a point in it.
 #[derive(Debug, Clone, Copy)]
@@ -112,10 +133,10 @@ struct DisjointSets {
 }
 
 impl DisjointSets {
-    fn new(n: usize) -> Self {
-        Self {
-            parents: (0..n as u32).collect(),
-        }
+    fn new(n: usize) -> Result<Self> {
+        Ok(Self {
+            parents: collect(0..n as u32)?,
+        })
     }
 
     fn root(&mut self, mut element: u32) -> u32 {
@@ -144,7 +165,7 @@ mod tests {
     }
 
     fn keep_largest(graph: &PointGraph, labels: &[u32]) -> Vec<u32> {
-        remove_outliers(graph, labels, 1.0, |_, _| true).unwrap()
+        remove_outliers(graph, labels, 1.0, |_, _| true, Cancel::never()).unwrap()
     }
 
     #[test]
@@ -160,7 +181,7 @@ mod tests {
     fn sets_are_joined_by_their_roots_whichever_elements_are_named() {
         // 3 is no root: joined itself, it would leave 2 behind
         for last in [[0, 3], [3, 0]] {
-            let mut sets = DisjointSets::new(5);
+            let mut sets = DisjointSets::new(5).unwrap();
             for [a, b] in [[2, 3], [3, 4], last] {
                 sets.join(a, b);
             }
@@ -177,7 +198,9 @@ mod tests {
     #[test]
     fn rows_may_come_in_another_order_than_indices() {
         let (labels, indices) = ([3, 3, 0, 3, 3], [4, 3, 2, 1, 0]);
-        let kept = remove_outliers_by_index(&chain(5), &labels, &indices, 1.0, |_, _| true);
+        let (graph, everywhere) = (chain(5), |_, _| true);
+        let kept =
+            remove_outliers_by_index(&graph, &labels, &indices, 1.0, everywhere, Cancel::never());
         assert_eq!(kept.unwrap(), [0, 0, 0, 3, 3]);
     }
 
@@ -185,7 +208,7 @@ mod tests {
     fn a_part_stays_if_it_is_large_and_at_the_distance_of_the_object() {
         let labels = [1, 1, 1, 1, 0, 1, 1, 0, 1];
         let kept = |part_size, at_depth: &dyn Fn(usize, u32) -> bool| {
-            remove_outliers(&chain(9), &labels, part_size, at_depth).unwrap()
+            remove_outliers(&chain(9), &labels, part_size, at_depth, Cancel::never()).unwrap()
         };
         assert_eq!(kept(0.5, &|_, _| true), [1, 1, 1, 1, 0, 1, 1, 0, 0]);
         assert_eq!(kept(0.5, &|i, _| i < 6), [1, 1, 1, 1, 0, 0, 0, 0, 0]);
@@ -198,6 +221,7 @@ mod tests {
         let empty = PointGraph::from_csr(vec![0], vec![], vec![]).unwrap();
         assert!(keep_largest(&empty, &[]).is_empty());
         assert_eq!(keep_largest(&chain(3), &[0; 3]), [0; 3]);
-        assert!(remove_outliers(&chain(3), &[0; 2], 1.0, |_, _| true).is_err());
+        let kept = remove_outliers(&chain(3), &[0; 2], 1.0, |_, _| true, Cancel::never());
+        assert!(kept.is_err());
     }
 }

@@ -1,14 +1,18 @@
 //! The point graph as a sparse matrix (method, steps 3 and 4).
 
 use crate::masks::PixelLabels;
+use crate::memory::{collect, collect_parallel, filled, with_room};
 use crate::neighbors::{Adjacency, Neighbors, squared_distance};
-use crate::{Error, Real, Result};
+use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Rows handled by one task of the thread pool.
 const ROWS_A_TASK: usize = 1024;
+
+/// Rows between two looks at the flag where one thread does the work.
+const ROWS_A_BLOCK: usize = 1 << 16;
 
 /// Weighted edges between points in compressed sparse rows: row i lists the points that label flows
 /// from to point i.
@@ -51,8 +55,13 @@ impl<T: Real> PointGraph<T> {
     /// neighbours with weight exp(-d^2 / `sigma`). Rows are not normalised.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] where `neighbors` is of other points.
-    pub fn from_neighbors(points: &[[f64; 3]], neighbors: &Neighbors, sigma: f64) -> Result<Self> {
+    /// [`Error::Mismatch`] where `neighbors` is of other points, [`Error::OutOfMemory`] and [`Error::Cancelled`].
+    pub fn from_neighbors(
+        points: &[[f64; 3]],
+        neighbors: &Neighbors,
+        sigma: f64,
+        cancel: &Cancel,
+    ) -> Result<Self> {
         let (n, k) = (points.len(), neighbors.k);
         if neighbors.indices.len() != n * k || neighbors.indices.iter().any(|&j| j as usize >= n) {
             let problem = format!("expected {k} numbers below {n} for each of {n} points");
@@ -61,50 +70,66 @@ impl<T: Real> PointGraph<T> {
                 problem,
             });
         }
-        let row = |i: usize| {
-            std::iter::once(i as u32).chain(neighbors.indices[i * k..(i + 1) * k].iter().copied())
+        let mut columns = with_room(n * (k + 1))?;
+        for i in 0..n {
+            columns.push(i as u32);
+            columns.extend_from_slice(&neighbors.indices[i * k..(i + 1) * k]);
+        }
+        let adjacency = Adjacency {
+            order: Vec::new(),
+            points: collect(points.iter().copied())?,
+            degree: k + 1,
+            columns: Arc::new(columns),
         };
-        let columns = (0..n).flat_map(row).collect();
-        Ok(Self::from_adjacency(
-            &Adjacency {
-                order: (0..n as u32).collect(),
-                points: points.to_vec(),
-                degree: k + 1,
-                columns: Arc::new(columns),
-            },
-            sigma,
-        ))
+        Self::from_adjacency(&adjacency, sigma, cancel)
     }
 
     /// The same graph from rows that begin with the point itself.
-    pub(crate) fn from_adjacency(adjacency: &Adjacency, sigma: f64) -> Self {
+    pub(crate) fn from_adjacency(
+        adjacency: &Adjacency,
+        sigma: f64,
+        cancel: &Cancel,
+    ) -> Result<Self> {
         let points = &adjacency.points;
         let (count, degree) = (points.len(), adjacency.degree);
-        let mut weights = vec![T::default(); count * degree];
-        let rows = weights
-            .par_chunks_mut(degree)
-            .zip(adjacency.columns.par_chunks(degree))
-            .zip(points);
-        rows.with_min_len(ROWS_A_TASK)
-            .for_each(|((weights, columns), point)| {
+        let mut weights = filled(T::default(), count * degree)?;
+        let tasks = weights
+            .par_chunks_mut(degree * ROWS_A_TASK)
+            .zip(adjacency.columns.par_chunks(degree * ROWS_A_TASK))
+            .zip(points.par_chunks(ROWS_A_TASK));
+        tasks.try_for_each(|((weights, columns), own)| {
+            cancel.check()?;
+            let rows = weights
+                .chunks_mut(degree)
+                .zip(columns.chunks(degree))
+                .zip(own);
+            for ((weights, columns), point) in rows {
                 weights[0] = T::from_f64(1.0);
                 for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
                     let squared = squared_distance(point, &points[j as usize]);
                     *weight = T::from_f64(-squared / sigma).exp();
                 }
-            });
-        Self {
+            }
+            Ok::<(), Error>(())
+        })?;
+        Ok(Self {
             layout: Layout::Uniform { count, degree },
             columns: Arc::clone(&adjacency.columns),
             weights,
-        }
+        })
     }
 
     /// Multiplies the weights of edges between a point of the ground and one that is not by `factor`.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] where `ground` does not say of each point whether it belongs to the ground.
-    pub fn weaken_ground_edges(&mut self, ground: &[bool], factor: f64) -> Result<()> {
+    /// [`Error::Mismatch`] where `ground` does not say of each point whether it belongs to the ground, and
+    /// [`Error::Cancelled`].
+    pub fn weaken_ground_edges(
+        &mut self,
+        ground: &[bool],
+        factor: f64,
+        cancel: &Cancel,
+    ) -> Result<()> {
         if ground.len() != self.len() {
             let problem = format!(
                 "{} values, the graph has {} points",
@@ -117,6 +142,9 @@ impl<T: Real> PointGraph<T> {
             });
         }
         for (i, &here) in ground.iter().enumerate() {
+            if i % ROWS_A_BLOCK == 0 {
+                cancel.check()?;
+            }
             let range = self.layout.range(i..i + 1);
             let edges = self.weights[range.clone()]
                 .iter_mut()
@@ -175,8 +203,9 @@ impl<T: Real> PointGraph<T> {
     /// Divides every row, point edges and pixel edges together, by its sum.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] where `labels` is of another number of points.
-    pub fn normalize_rows(&mut self, labels: &mut PixelLabels<T>) -> Result<()> {
+    /// [`Error::Mismatch`] where `labels` is of another number of points, [`Error::OutOfMemory`] and
+    /// [`Error::Cancelled`].
+    pub fn normalize_rows(&mut self, labels: &mut PixelLabels<T>, cancel: &Cancel) -> Result<()> {
         if labels.rows() != self.len() {
             let problem = format!("{} rows, the graph has {}", labels.rows(), self.len());
             return Err(Error::Mismatch {
@@ -191,8 +220,10 @@ impl<T: Real> PointGraph<T> {
             if sum > 0.0 { 1.0 / sum } else { 0.0 }
         };
         let masses = labels.mass.par_iter().enumerate().with_min_len(ROWS_A_TASK);
-        let scales: Vec<f64> = masses.map(scale).collect();
+        let scales = collect_parallel(masses.map(scale))?;
+        cancel.check()?;
         scale_rows(&mut self.weights, &scales, |rows| self.layout.range(rows));
+        cancel.check()?;
         let range = |rows: Range<usize>| labels.offsets[rows.start]..labels.offsets[rows.end];
         scale_rows(&mut labels.weights, &scales, range);
         labels
@@ -239,11 +270,21 @@ impl<T: Real> PointGraph<T> {
     }
 
     /// Row starts, column indices and weights.
-    pub fn into_csr(self) -> (Vec<usize>, Vec<u32>, Vec<T>) {
-        let offsets = (0..=self.len())
-            .map(|i| self.layout.range(i..i).start)
-            .collect();
-        (offsets, Arc::unwrap_or_clone(self.columns), self.weights)
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn into_csr(self) -> Result<(Vec<usize>, Vec<u32>, Vec<T>)> {
+        let offsets = match self.layout {
+            Layout::Varied { offsets } => offsets,
+            Layout::Uniform { count, degree } => {
+                let mut offsets = with_room(count + 1)?;
+                offsets.extend((0..=count).map(|i| i * degree));
+                offsets
+            }
+        };
+        let columns =
+            Arc::try_unwrap(self.columns).or_else(|shared| collect(shared.iter().copied()))?;
+        Ok((offsets, columns, self.weights))
     }
 }
 
@@ -281,7 +322,8 @@ mod tests {
 
     fn chain() -> PointGraph {
         let points: Vec<[f64; 3]> = (0..4).map(|i| [f64::from(i), 0.0, 0.0]).collect();
-        PointGraph::from_neighbors(&points, &Neighbors::search(&points, 2), 2.0).unwrap()
+        let neighbors = Neighbors::search(&points, 2, Cancel::never()).unwrap();
+        PointGraph::from_neighbors(&points, &neighbors, 2.0, Cancel::never()).unwrap()
     }
 
     #[test]
@@ -300,7 +342,7 @@ mod tests {
             mass: vec![0.5; 4],
         };
         let mut graph = chain();
-        graph.normalize_rows(&mut labels).unwrap();
+        graph.normalize_rows(&mut labels, Cancel::never()).unwrap();
         for i in 0..4 {
             let sum: f32 = graph.row(i).map(|(_, weight)| weight).sum::<f32>() + labels.mass[i];
             assert!((sum - 1.0).abs() < 1e-6, "row {i} sums to {sum}");

@@ -1,5 +1,7 @@
 //! The local offset of the ground from its smooth surface: kerbs, lawns, ramps.
 
+use crate::memory::{filled, with_room};
+use crate::{Cancel, Result};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -15,43 +17,52 @@ const THICKNESS: usize = 3;
 const LEAST_POINTS: u32 = 30;
 const LEAST_SHARE: f64 = 0.4;
 
+/// Points between two looks at the flag.
+const POINTS_A_BLOCK: usize = 1 << 16;
+
 type Cell = (i64, i64);
 type Cells = HashMap<Cell, usize, BuildHasherDefault<CellHasher>>;
 type Histogram = [u32; STEPS];
 
 /// Turns `heights` of `places` above the smooth surface, in metres, into those above the ground around each.
-pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64]) {
-    let (numbers, cells) = number_cells(places);
-    let mut counts = vec![[0; STEPS]; cells.len()];
+pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -> Result<()> {
+    let (numbers, cells) = number_cells(places, cancel)?;
+    let mut counts = filled([0; STEPS], cells.len())?;
     for (&number, height) in numbers.iter().zip(heights.iter()) {
         let step = (height + NEAR_M) / STEP_M;
         if (0.0..STEPS as f64).contains(&step) {
-            counts[number][step as usize] += 1;
+            counts[number as usize][step as usize] += 1;
         }
     }
-    let mut offsets = vec![0.0; cells.len()];
+    cancel.check()?;
+    let mut offsets = filled(0.0, cells.len())?;
     for (&cell, &number) in &cells {
         offsets[number] = offset(&around(&counts, &cells, cell));
     }
     for (height, number) in heights.iter_mut().zip(numbers) {
-        *height -= offsets[number];
+        *height -= offsets[number as usize];
     }
+    Ok(())
 }
 
 /// The number of the cell of each place, and of each cell that has one.
-fn number_cells(places: &[[f64; 3]]) -> (Vec<usize>, Cells) {
+fn number_cells(places: &[[f64; 3]], cancel: &Cancel) -> Result<(Vec<u32>, Cells)> {
     let mut cells = Cells::default();
+    let mut numbers = with_room(places.len())?;
     let mut last = ((i64::MIN, i64::MIN), 0);
-    let number = |place: &[f64; 3]| {
-        let cell = cell(place);
-        // neighbours on a scan line share a cell
-        if cell != last.0 {
-            let next = cells.len();
-            last = (cell, *cells.entry(cell).or_insert(next));
-        }
-        last.1
-    };
-    (places.iter().map(number).collect(), cells)
+    for block in places.chunks(POINTS_A_BLOCK) {
+        cancel.check()?;
+        numbers.extend(block.iter().map(|place| {
+            let cell = cell(place);
+            // neighbours on a scan line share a cell
+            if cell != last.0 {
+                let next = cells.len();
+                last = (cell, *cells.entry(cell).or_insert(next));
+            }
+            last.1 as u32
+        }));
+    }
+    Ok((numbers, cells))
 }
 
 fn cell([x, y, _]: &[f64; 3]) -> Cell {

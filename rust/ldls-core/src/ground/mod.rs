@@ -6,9 +6,13 @@
 mod local;
 mod surface;
 
-use crate::Camera;
+use crate::memory::{collect_parallel, filled};
+use crate::{Camera, Cancel, Result};
 use rayon::prelude::*;
 use surface::Surface;
+
+/// Fewest points for a task of the thread pool.
+const POINTS_A_TASK: usize = 4096;
 
 /// Heights between which points belong to the ground, in metres: lower ones lie in a pit or under a surface that is not
 /// the ground, and up to the upper one there are the noise of a lidar and tufts of grass.
@@ -17,20 +21,27 @@ pub const GROUND_M: [f64; 2] = [-0.3, 0.15];
 /// Height of each of `points` (metres) above the ground that `camera` stands on, NaN where none is found.
 ///
 /// Up is z of the lidar frame, or -y where the camera looks along its z. `local` asks for the local offset.
-pub fn ground_heights(points: &[[f64; 3]], camera: &Camera, local: bool) -> Vec<f64> {
-    let places: Vec<[f64; 3]> = points.iter().map(|point| camera.upright(point)).collect();
-    let Some(surface) = Surface::fit(&places) else {
-        return vec![f64::NAN; points.len()];
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+pub fn ground_heights(
+    points: &[[f64; 3]],
+    camera: &Camera,
+    local: bool,
+    cancel: &Cancel,
+) -> Result<Vec<f64>> {
+    let places = points.par_iter().with_min_len(POINTS_A_TASK);
+    let places = collect_parallel(places.map(|point| camera.upright(point)))?;
+    cancel.check()?;
+    let Some(surface) = Surface::fit(&places, cancel)? else {
+        return filled(f64::NAN, points.len());
     };
-    let mut heights: Vec<f64> = places
-        .par_iter()
-        .with_min_len(4096)
-        .map(|place| surface.height(place))
-        .collect();
+    let heights = places.par_iter().with_min_len(POINTS_A_TASK);
+    let mut heights = collect_parallel(heights.map(|place| surface.height(place)))?;
     if local {
-        local::level(&places, &mut heights);
+        local::level(&places, &mut heights, cancel)?;
     }
-    heights
+    Ok(heights)
 }
 
 /// True for a point of the ground, by its height above it in metres.
@@ -54,6 +65,10 @@ pub fn clear_ground(labels: &mut [u32], heights: impl IntoIterator<Item = f64>, 
 mod tests {
     use super::*;
     use crate::test_support;
+
+    fn heights_of(points: &[[f64; 3]], camera: &Camera) -> Vec<f64> {
+        ground_heights(points, camera, true, Cancel::never()).unwrap()
+    }
 
     /// A camera at the origin of a lidar frame with z upwards that looks along x.
     fn camera_ahead() -> Camera {
@@ -84,7 +99,7 @@ mod tests {
     #[test]
     fn heights_are_those_above_road_and_pavement() {
         let (points, truth): (Vec<_>, Vec<_>) = street().into_iter().unzip();
-        let heights = ground_heights(&points, &camera_ahead(), true);
+        let heights = heights_of(&points, &camera_ahead());
         let off = |tolerance: f64| {
             let pairs = heights.iter().zip(&truth);
             pairs
@@ -102,7 +117,7 @@ mod tests {
             .collect();
         for points in [&wall[..2], &[]] {
             assert!(
-                ground_heights(points, &camera_ahead(), true)
+                heights_of(points, &camera_ahead())
                     .iter()
                     .all(|height| height.is_nan())
             );
@@ -115,8 +130,8 @@ mod tests {
         let turned: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [-y, -z, x]).collect();
         let own = test_support::camera(20.0);
         assert_eq!(
-            ground_heights(&turned, &own, true),
-            ground_heights(&points, &camera_ahead(), true)
+            heights_of(&turned, &own),
+            heights_of(&points, &camera_ahead())
         );
     }
 
@@ -124,7 +139,7 @@ mod tests {
     fn a_ground_above_the_camera_is_none() {
         let (points, _): (Vec<_>, Vec<_>) = street().into_iter().unzip();
         let above: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [x, y, z + 3.0]).collect();
-        let heights = ground_heights(&above, &camera_ahead(), true);
+        let heights = heights_of(&above, &camera_ahead());
         assert!(heights.iter().all(|height| height.is_nan()));
     }
 

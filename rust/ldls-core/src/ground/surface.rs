@@ -1,6 +1,9 @@
 //! A smooth ground: a surface of degree 5 through the lowest points of polar cells, fitted so that what stands on the
 //! ground does not count.
 
+use super::POINTS_A_TASK;
+use crate::memory::collect_parallel;
+use crate::{Cancel, Result};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
@@ -53,8 +56,14 @@ pub(super) struct Surface {
 impl Surface {
     /// The surface below `places`, relative to where they were seen from; none where too few of the lowest places lie on
     /// one, or where it lies above.
-    pub(super) fn fit(places: &[[f64; 3]]) -> Option<Self> {
-        let cells = lowest(places);
+    pub(super) fn fit(places: &[[f64; 3]], cancel: &Cancel) -> Result<Option<Self>> {
+        let cells = lowest(places)?;
+        cancel.check()?;
+        Ok(Self::through(cells))
+    }
+
+    /// The surface through the lowest places of cells.
+    fn through(cells: Vec<[f64; 3]>) -> Option<Self> {
         if cells.len() < LEAST_CELLS {
             return None;
         }
@@ -156,8 +165,8 @@ fn terms_at(place: &[f64; 3]) -> Terms {
 }
 
 /// The lowest place of each cell that has one, in the order of the cells; of equally low ones the first.
-fn lowest(places: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let cells: Vec<Option<usize>> = places.par_iter().with_min_len(4096).map(cell).collect();
+fn lowest(places: &[[f64; 3]]) -> Result<Vec<[f64; 3]>> {
+    let cells = collect_parallel(places.par_iter().with_min_len(POINTS_A_TASK).map(cell))?;
     let mut lowest: Vec<Option<[f64; 3]>> = vec![None; RINGS * SECTORS];
     for (place, cell) in places.iter().zip(cells) {
         let Some(cell) = cell else { continue };
@@ -165,7 +174,7 @@ fn lowest(places: &[[f64; 3]]) -> Vec<[f64; 3]> {
             lowest[cell] = Some(*place);
         }
     }
-    lowest.into_iter().flatten().collect()
+    Ok(lowest.into_iter().flatten().collect())
 }
 
 fn cell([x, y, _]: &[f64; 3]) -> Option<usize> {

@@ -3,6 +3,8 @@
 
 use super::instance_masks::InstanceMasks;
 use super::rle::Rle;
+use crate::memory::filled;
+use crate::{Cancel, Result};
 use std::collections::HashMap;
 
 /// The labels of every pixel, column by column. Pixels hold the number of a set of labels: a set for each combination
@@ -34,17 +36,18 @@ pub(crate) struct WindowCounts {
 }
 
 impl LabelImage {
-    pub(crate) fn paint(masks: &InstanceMasks) -> Self {
+    pub(crate) fn paint(masks: &InstanceMasks, cancel: &Cancel) -> Result<Self> {
         let mut image = Self {
             height: masks.height(),
             width: masks.width(),
-            pixels: vec![0; masks.height() * masks.width()],
+            pixels: filled(0, masks.height() * masks.width())?,
             sets: vec![LabelSet { label: 0, rest: 0 }],
         };
         for (m, mask) in masks.masks().iter().enumerate() {
+            cancel.check()?;
             image.add(mask, m as u32 + 1);
         }
-        image
+        Ok(image)
     }
 
     fn add(&mut self, mask: &Rle, label: u32) {

@@ -2,8 +2,9 @@
 
 use super::instance_masks::InstanceMasks;
 use super::label_image::{LabelImage, WindowCounts};
+use crate::memory::with_room;
 use crate::projection::nearest_pixel;
-use crate::{Error, Real, Result};
+use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 
 /// Points handled by one task of the thread pool.
@@ -29,19 +30,22 @@ impl InstanceMasks {
     /// that are `admitted` for a point, given by its row, come in; the weight of the others counts in the mass alone.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] where the nearest pixel of a point lies outside the image.
+    /// [`Error::Mismatch`] where the nearest pixel of a point lies outside the image, [`Error::OutOfMemory`] and
+    /// [`Error::Cancelled`].
     pub fn pixel_labels<T: Real>(
         &self,
         uv: &[[f64; 2]],
         window: usize,
         pixel_weight: f64,
         admitted: impl Fn(usize, u32) -> bool + Sync,
+        cancel: &Cancel,
     ) -> Result<PixelLabels<T>> {
-        let image = LabelImage::paint(self);
+        let image = LabelImage::paint(self, cancel)?;
         let parts: Vec<Result<PixelLabels<T>>> = uv
             .par_chunks(POINTS_A_TASK)
             .enumerate()
             .map(|(task, uv)| {
+                cancel.check()?;
                 let mut labels = PixelLabels::default();
                 let mut counts = WindowCounts::default();
                 for (i, &uv) in (task * POINTS_A_TASK..).zip(uv) {
@@ -53,20 +57,27 @@ impl InstanceMasks {
             })
             .collect();
         let parts = parts.into_iter().collect::<Result<Vec<_>>>()?;
-        Ok(PixelLabels::concatenate(&parts))
+        PixelLabels::concatenate(&parts, cancel)
     }
 
     /// Direct projection: the label of the pixel nearest to each of `uv`; of several masks, the first.
     ///
     /// # Errors
     /// As [`InstanceMasks::pixel_labels`].
-    pub fn direct_labels(&self, uv: &[[f64; 2]]) -> Result<Vec<u32>> {
-        let image = LabelImage::paint(self);
+    pub fn direct_labels(&self, uv: &[[f64; 2]], cancel: &Cancel) -> Result<Vec<u32>> {
+        let image = LabelImage::paint(self, cancel)?;
         let label = |(i, &uv): (usize, &[f64; 2])| {
             let set = image.set_at(self.nearest_pixel(i, uv)?);
             Ok(image.labels_of(set).last().unwrap_or(0))
         };
-        uv.iter().enumerate().map(label).collect()
+        let mut labels = with_room(uv.len())?;
+        for (task, uv) in uv.chunks(POINTS_A_TASK).enumerate() {
+            cancel.check()?;
+            for at in (task * POINTS_A_TASK..).zip(uv) {
+                labels.push(label(at)?);
+            }
+        }
+        Ok(labels)
     }
 
     /// The pixel nearest to `uv`, that of point `i`.
@@ -133,17 +144,25 @@ impl<T: Real> PixelLabels<T> {
         self.offsets.push(self.labels.len());
     }
 
-    fn concatenate(parts: &[Self]) -> Self {
-        let points: usize = parts.iter().map(Self::rows).sum();
+    /// Labels of no point yet, with room for those of `points`.
+    pub(crate) fn with_room(points: usize) -> Result<Self> {
+        let mut offsets = with_room(points + 1)?;
+        offsets.push(0);
+        Ok(Self {
+            offsets,
+            labels: Vec::new(),
+            weights: Vec::new(),
+            mass: with_room(points)?,
+        })
+    }
+
+    fn concatenate(parts: &[Self], cancel: &Cancel) -> Result<Self> {
+        let mut all = Self::with_room(parts.iter().map(Self::rows).sum())?;
         let entries = parts.iter().map(|part| part.labels.len()).sum();
-        let mut all = Self {
-            offsets: Vec::with_capacity(points + 1),
-            labels: Vec::with_capacity(entries),
-            weights: Vec::with_capacity(entries),
-            mass: Vec::with_capacity(points),
-        };
-        all.offsets.push(0);
+        all.labels = with_room(entries)?;
+        all.weights = with_room(entries)?;
         for part in parts {
+            cancel.check()?;
             let start = all.labels.len();
             all.offsets
                 .extend(part.offsets.iter().map(|offset| start + offset));
@@ -151,7 +170,7 @@ impl<T: Real> PixelLabels<T> {
             all.weights.extend_from_slice(&part.weights);
             all.mass.extend_from_slice(&part.mass);
         }
-        all
+        Ok(all)
     }
 
     /// Refuses labels of another number of points, and labels from `n_labels` on.
@@ -221,7 +240,7 @@ mod tests {
     #[test]
     fn a_window_at_the_corner_has_fewer_pixels() {
         let labels = masks(6, 6, &[vec![true; 36]])
-            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0, |_, _| true)
+            .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0, |_, _| true, Cancel::never())
             .unwrap();
         assert_eq!(
             (labels.mass[0], labels.row(0).collect::<Vec<_>>()),
@@ -235,7 +254,7 @@ mod tests {
             pixels in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 63), 0..4),
             u in -0.5..8.49_f64, v in -0.5..6.49_f64, reach in 0_usize..4,
         ) {
-            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, |_, _| true).unwrap();
+            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, |_, _| true, Cancel::never()).unwrap();
             let mut expected = vec![0.0_f32; pixels.len() + 1];
             let mut mass = 0.0;
             for row in 0..7_usize {

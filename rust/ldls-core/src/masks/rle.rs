@@ -1,5 +1,6 @@
 //! One mask as run lengths: column by column, runs of zeros and ones in turn, zeros first, as COCO has it.
 
+use crate::memory::filled;
 use crate::{Error, Result};
 use std::ops::Range;
 
@@ -211,7 +212,7 @@ impl Rle {
     /// # Errors
     /// [`Error::Mismatch`] where the box leaves the image.
     pub fn crop(&self, [top, left, height, width]: [usize; 4]) -> Result<Vec<bool>> {
-        if top + height > self.height || left + width > self.width {
+        if top.saturating_add(height) > self.height || left.saturating_add(width) > self.width {
             let problem = format!(
                 "box {height} x {width} at ({top}, {left}) leaves {} x {}",
                 self.height, self.width
@@ -221,7 +222,7 @@ impl Rle {
                 problem,
             });
         }
-        let mut pixels = vec![false; height * width];
+        let mut pixels = filled(false, height * width)?;
         for (column, rows) in self.column_spans() {
             if (left..left + width).contains(&column) {
                 let rows = rows.start.max(top)..rows.end.min(top + height);

@@ -1,8 +1,11 @@
 //! The rows of the point graph: each point and its nearest neighbours, in an order in which near points are near in
 //! memory.
 
+use super::coincident;
 use super::kdtree::{FAN, KdTree, arrange};
 use super::leaf_search::search_leaf;
+use crate::memory::filled;
+use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -26,15 +29,34 @@ pub(crate) struct Adjacency {
 
 impl Adjacency {
     /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; all others where there are fewer.
-    pub(crate) fn search(points: Vec<[f64; 3]>, k: usize) -> Self {
-        let tree = KdTree::new(&points);
-        let points = arrange(&tree.order, &{ points });
+    pub(crate) fn search(points: Vec<[f64; 3]>, k: usize, cancel: &Cancel) -> Result<Self> {
+        let tree = KdTree::new(&points, cancel)?;
+        if coincident::is_crowded(&tree) {
+            drop(tree);
+            return coincident::search(&points, k, cancel);
+        }
+        Self::search_tree(tree, points, k, cancel)
+    }
+
+    /// The same for points of which no two need share a place.
+    pub(super) fn search_distinct(
+        points: Vec<[f64; 3]>,
+        k: usize,
+        cancel: &Cancel,
+    ) -> Result<Self> {
+        let tree = KdTree::new(&points, cancel)?;
+        Self::search_tree(tree, points, k, cancel)
+    }
+
+    fn search_tree(tree: KdTree, points: Vec<[f64; 3]>, k: usize, cancel: &Cancel) -> Result<Self> {
+        let points = arrange(&tree.order, &{ points })?;
         let degree = k.min(points.len().saturating_sub(1)) + 1;
-        let mut columns = vec![0; points.len() * degree];
+        let mut columns = filled(0, points.len() * degree)?;
         let tasks = columns
             .par_chunks_mut(degree * FAN * LEAVES_A_TASK)
             .enumerate();
-        tasks.for_each(|(task, rows)| {
+        tasks.try_for_each(|(task, rows)| {
+            cancel.check()?;
             let mut places = degree + SPARE;
             for (leaf, rows) in (task * LEAVES_A_TASK..).zip(rows.chunks_mut(degree * FAN)) {
                 for (position, row) in (leaf * FAN..).zip(rows.chunks_mut(degree)) {
@@ -44,13 +66,14 @@ impl Adjacency {
                     places = search_leaf(&tree, &points, degree, leaf, places, rows);
                 }
             }
-        });
-        Self {
+            Ok::<(), Error>(())
+        })?;
+        Ok(Self {
             order: tree.order,
             points,
             degree,
             columns: Arc::new(columns),
-        }
+        })
     }
 
     /// Number of points that share their place with another one.
@@ -84,7 +107,7 @@ mod tests {
     #[test]
     fn coincident_points_are_duplicates_and_islands() {
         let points = vec![[1.0, 2.0, 3.0]; 120_000];
-        let adjacency = Adjacency::search(points, 10);
+        let adjacency = Adjacency::search(points, 10, Cancel::never()).unwrap();
         assert_eq!(adjacency.duplicates(), 120_000);
         assert!(adjacency.only_islands());
     }

@@ -5,6 +5,8 @@
 //! kept in single precision. [`KdTree::rounding`] says by how much they differ from the points given: not
 //! at all where those came in single precision.
 
+use crate::memory::collect_parallel;
+use crate::{Cancel, Result};
 use rayon::prelude::*;
 
 /// Points of a leaf, leaves of a node, nodes of a larger node.
@@ -48,7 +50,7 @@ struct Item {
 
 impl KdTree {
     /// The tree of `points`, finite coordinates in metres.
-    pub(crate) fn new(points: &[[f64; 3]]) -> Self {
+    pub(crate) fn new(points: &[[f64; 3]], cancel: &Cancel) -> Result<Self> {
         let (origin, rounding) = frame(points);
         let local = |point: &[f64; 3]| {
             [
@@ -62,18 +64,19 @@ impl KdTree {
             xyz: local(point),
             index: index as u32,
         };
-        let mut items = points.par_iter().enumerate().map(item).collect::<Vec<_>>();
-        sort(&mut items);
-        let leaves = items.par_chunks(FAN).map(Leaf::new).collect();
-        let levels = levels(&items);
-        let order = items.par_iter().map(|item| item.index).collect();
-        Self {
+        let mut items = collect_parallel(points.par_iter().enumerate().map(item))?;
+        sort(&mut items, cancel)?;
+        let leaves = collect_parallel(items.par_chunks(FAN).map(Leaf::new))?;
+        let levels = levels(&items)?;
+        cancel.check()?;
+        let order = collect_parallel(items.par_iter().map(|item| item.index))?;
+        Ok(Self {
             order,
             leaves,
             levels,
             origin,
             rounding,
-        }
+        })
     }
 
     /// Number of points.
@@ -83,9 +86,9 @@ impl KdTree {
 }
 
 /// `values` in the order of the tree.
-pub(crate) fn arrange<T: Copy + Send + Sync>(order: &[u32], values: &[T]) -> Vec<T> {
+pub(crate) fn arrange<T: Copy + Send + Sync>(order: &[u32], values: &[T]) -> Result<Vec<T>> {
     let value = |&index: &u32| values[index as usize];
-    order.par_iter().with_min_len(PARALLEL).map(value).collect()
+    collect_parallel(order.par_iter().with_min_len(PARALLEL).map(value))
 }
 
 impl Leaf {
@@ -97,6 +100,12 @@ impl Leaf {
             }
         }
         leaf
+    }
+
+    /// Coordinates of the points that it has.
+    pub(crate) fn points(&self) -> impl Iterator<Item = [f32; 3]> {
+        let slots = (0..FAN).map(|slot| self.point(slot));
+        slots.take_while(|point| point[0] < f32::INFINITY)
     }
 
     /// Coordinates of the point in `slot`.
@@ -124,9 +133,9 @@ fn frame(points: &[[f64; 3]]) -> ([f64; 3], f32) {
 }
 
 /// Orders `items` so that each run of 16, 256, 4096, ... from the start is compact.
-fn sort(items: &mut [Item]) {
+fn sort(items: &mut [Item], cancel: &Cancel) -> Result<()> {
     if items.len() <= FAN {
-        return;
+        return Ok(());
     }
     let middle = split_at(items.len());
     let axis = widest_axis(items);
@@ -134,10 +143,12 @@ fn sort(items: &mut [Item]) {
     let parallel = items.len() > PARALLEL;
     let (left, right) = items.split_at_mut(middle);
     if parallel {
-        rayon::join(|| sort(left), || sort(right));
+        cancel.check()?;
+        let (left, right) = rayon::join(|| sort(left, cancel), || sort(right, cancel));
+        left.and(right)
     } else {
-        sort(left);
-        sort(right);
+        sort(left, cancel)?;
+        sort(right, cancel)
     }
 }
 
@@ -191,21 +202,21 @@ impl Hull {
     }
 }
 
-fn levels(items: &[Item]) -> Vec<Vec<Boxes>> {
+fn levels(items: &[Item]) -> Result<Vec<Vec<Boxes>>> {
     let of_point = |item: &Item| Hull {
         low: item.xyz,
         high: item.xyz,
         first: item.index,
     };
     let around_leaf = |items: &[Item]| Hull::around(items.iter().map(of_point));
-    let mut hulls: Vec<Hull> = items.par_chunks(FAN).map(around_leaf).collect();
+    let mut hulls = collect_parallel(items.par_chunks(FAN).map(around_leaf))?;
     let mut levels = Vec::new();
     loop {
-        levels.push(hulls.par_chunks(FAN).map(Boxes::new).collect());
+        levels.push(collect_parallel(hulls.par_chunks(FAN).map(Boxes::new))?);
         let around = |hulls: &[Hull]| Hull::around(hulls.iter().copied());
-        hulls = hulls.par_chunks(FAN).map(around).collect();
+        hulls = collect_parallel(hulls.par_chunks(FAN).map(around))?;
         if hulls.len() <= 1 {
-            return levels;
+            return Ok(levels);
         }
     }
 }
@@ -260,7 +271,7 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..5000_i32)
             .map(|i| [f64::from(i % 71), f64::from(i % 37), f64::from(i % 13)])
             .collect();
-        let tree = KdTree::new(&points);
+        let tree = KdTree::new(&points, Cancel::never()).unwrap();
         let mut order = tree.order.clone();
         order.sort_unstable();
         assert!(
@@ -288,9 +299,10 @@ mod tests {
     #[test]
     fn map_coordinates_are_rounded_relative_to_a_point_of_theirs() {
         let points = [[5e5 + 0.125, 5e6 + 0.1, 100.0], [5e5 + 7.0, 5e6, 101.0]];
-        let tree = KdTree::new(&points);
+        let tree = KdTree::new(&points, Cancel::never()).unwrap();
         assert_eq!(tree.origin, points[0]);
         assert!(tree.rounding > 0.0 && tree.rounding < 2e-6);
-        assert_eq!(KdTree::new(&[[0.5, 2.0, 3.0]]).rounding, 0.0);
+        let near = KdTree::new(&[[0.5, 2.0, 3.0]], Cancel::never()).unwrap();
+        assert_eq!(near.rounding, 0.0);
     }
 }

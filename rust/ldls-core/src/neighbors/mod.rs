@@ -4,6 +4,7 @@
 
 mod adjacency;
 mod candidates;
+mod coincident;
 mod kdtree;
 mod keys;
 mod leaf_search;
@@ -13,6 +14,8 @@ pub(crate) use adjacency::Adjacency;
 pub(crate) use candidates::squared_distance;
 pub(crate) use kdtree::arrange;
 
+use crate::memory::{collect_parallel, filled, with_room};
+use crate::{Cancel, Result};
 use rayon::prelude::*;
 
 /// The `k` nearest other points of every point, nearest first.
@@ -27,10 +30,15 @@ pub struct Neighbors {
 impl Neighbors {
     /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; the point itself is none
     /// of them.
-    pub fn search(points: &[[f64; 3]], k: usize) -> Self {
-        let adjacency = Adjacency::search(points.to_vec(), k);
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+    pub fn search(points: &[[f64; 3]], k: usize, cancel: &Cancel) -> Result<Self> {
+        let mut copy = with_room(points.len())?;
+        copy.extend_from_slice(points);
+        let adjacency = Adjacency::search(copy, k, cancel)?;
         let (order, k) = (&adjacency.order, adjacency.degree - 1);
-        let mut indices = vec![0; points.len() * k];
+        let mut indices = filled(0, points.len() * k)?;
         if k > 0 {
             for (&index, row) in order.iter().zip(adjacency.columns.chunks(adjacency.degree)) {
                 let slots = &mut indices[index as usize * k..][..k];
@@ -39,18 +47,18 @@ impl Neighbors {
                 }
             }
         }
-        Self { k, indices }
+        Ok(Self { k, indices })
     }
 
     /// Squared distances of the neighbours of `points`, in square metres, in the order of `indices`.
-    pub fn squared_distances(&self, points: &[[f64; 3]]) -> Vec<f64> {
-        let rows = self.indices.par_chunks(self.k.max(1)).zip(points);
-        let of_row = |(row, point): (&[u32], &[f64; 3])| {
-            let point = *point;
-            let distance = move |&j: &u32| squared_distance(&point, &points[j as usize]);
-            row.iter().map(distance).collect::<Vec<_>>()
-        };
-        rows.flat_map_iter(of_row).collect()
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn squared_distances(&self, points: &[[f64; 3]]) -> Result<Vec<f64>> {
+        let entries = self.indices.par_iter().enumerate();
+        let distance =
+            |(at, &j): (usize, &u32)| squared_distance(&points[at / self.k], &points[j as usize]);
+        collect_parallel(entries.map(distance))
     }
 }
 
@@ -59,6 +67,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use std::num::NonZero;
+
+    fn nearest(points: &[[f64; 3]], k: usize) -> Neighbors {
+        Neighbors::search(points, k, Cancel::never()).unwrap()
+    }
 
     fn brute_force(points: &[[f64; 3]], k: usize) -> Neighbors {
         let k = k.min(points.len().saturating_sub(1));
@@ -88,7 +100,17 @@ mod tests {
     proptest! {
         #[test]
         fn quantised_clouds_equal_brute_force(points in quantised(0.25, 600), k in 1_usize..14) {
-            prop_assert_eq!(Neighbors::search(&points, k), brute_force(&points, k));
+            prop_assert_eq!(nearest(&points, k), brute_force(&points, k));
+        }
+
+        #[test]
+        fn crowded_clouds_equal_brute_force(
+            points in quantised(4.0, 400), copies in 1_usize..30, k in 1_usize..40, seed in any::<u64>(),
+        ) {
+            let mut all: Vec<[f64; 3]> = points.iter().take(400 / copies).flat_map(|p| vec![*p; copies]).collect();
+            // copies lie anywhere in a cloud
+            all.sort_by_key(|p| (p[0] as i64).wrapping_mul(seed as i64 | 1) % 7);
+            prop_assert_eq!(nearest(&all, k), brute_force(&all, k));
         }
 
         #[test]
@@ -96,7 +118,7 @@ mod tests {
             for point in &mut points {
                 point[axis] = -0.0;
             }
-            prop_assert_eq!(Neighbors::search(&points, 10), brute_force(&points, 10));
+            prop_assert_eq!(nearest(&points, 10), brute_force(&points, 10));
         }
 
         #[test]
@@ -106,7 +128,7 @@ mod tests {
             far in prop_oneof![Just(0.0), Just(5e6)],
         ) {
             let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + far, p[1] - far, p[2]]).collect();
-            prop_assert_eq!(Neighbors::search(&points, k), brute_force(&points, k));
+            prop_assert_eq!(nearest(&points, k), brute_force(&points, k));
         }
 
         #[test]
@@ -114,7 +136,7 @@ mod tests {
             points in proptest::collection::vec([-9.0..9.0_f32, -9.0..9.0, -2.0..2.0], 0..600)
         ) {
             let points: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
-            prop_assert_eq!(Neighbors::search(&points, 10), brute_force(&points, 10));
+            prop_assert_eq!(nearest(&points, 10), brute_force(&points, 10));
         }
     }
 
@@ -140,7 +162,7 @@ mod tests {
             k in 1_usize..30, far in prop_oneof![Just(0.0), Just(5e5)],
         ) {
             let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + far, p[1] - far, p[2]]).collect();
-            let distances = Neighbors::search(&points, k).squared_distances(&points);
+            let distances = nearest(&points, k).squared_distances(&points).unwrap();
             let expected = distances_of_kiddo(&points, k);
             prop_assert_eq!(distances.len(), expected.len());
             // kiddo may add squares in another order
@@ -153,7 +175,7 @@ mod tests {
     #[test]
     fn coincident_points_are_each_others_neighbours() {
         let points = vec![[1.0, 2.0, 3.0]; 120_000];
-        let neighbors = Neighbors::search(&points, 10);
+        let neighbors = nearest(&points, 10);
         assert_eq!(neighbors.indices[..10], [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
         assert_eq!(
             neighbors.indices[119_999 * 10..],
@@ -167,7 +189,7 @@ mod tests {
         let points: Vec<[f64; 3]> = (0..125_000)
             .map(|i| [side(i % 50), side(i / 50 % 50), side(i / 2500)])
             .collect();
-        let neighbors = Neighbors::search(&points, 3);
+        let neighbors = nearest(&points, 3);
         assert_eq!(neighbors.indices[..3], [1, 50, 2500]);
         assert_eq!(
             neighbors.indices[3 * 124_999..],
@@ -178,7 +200,7 @@ mod tests {
     #[test]
     fn fewer_points_than_neighbours_are_joined_to_all_others() {
         let points = [[0.0; 3], [1.0; 3], [3.0; 3]];
-        assert_eq!(Neighbors::search(&points, 10).indices, [1, 2, 0, 2, 1, 0]);
-        assert_eq!(Neighbors::search(&[[0.0; 3]], 10), Neighbors::default());
+        assert_eq!(nearest(&points, 10).indices, [1, 2, 0, 2, 1, 0]);
+        assert_eq!(nearest(&[[0.0; 3]], 10), Neighbors::default());
     }
 }

@@ -2,7 +2,8 @@
 
 use super::camera::{Camera, Sight};
 use super::cloud::Cloud;
-use crate::{Error, Result};
+use crate::memory::with_room;
+use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -56,11 +57,12 @@ pub struct Counts {
 /// A point at exactly (0, 0, 0) counts as no return unless `keep_origin` is set.
 ///
 /// # Errors
-/// [`Error::CoordinateOutOfRange`] and [`Error::TooManyPoints`].
+/// [`Error::CoordinateOutOfRange`], [`Error::TooManyPoints`], [`Error::OutOfMemory`] and [`Error::Cancelled`].
 pub fn project(
     cloud: Cloud,
     images: &[(&Camera, [usize; 2])],
     keep_origin: bool,
+    cancel: &Cancel,
 ) -> Result<InView> {
     let n = cloud.len();
     check_points(n)?;
@@ -68,6 +70,7 @@ pub fn project(
     let parts: Vec<Result<InView>> = starts
         .into_par_iter()
         .map(|start| {
+            cancel.check()?;
             project_rows(
                 cloud,
                 start..n.min(start + POINTS_A_TASK),
@@ -78,7 +81,7 @@ pub fn project(
         .collect();
     // taken in order, so that the first bad row is the one reported
     let parts = parts.into_iter().collect::<Result<Vec<InView>>>()?;
-    Ok(InView::concatenate(&parts, images.len()))
+    InView::concatenate(&parts, images.len(), cancel)
 }
 
 /// Refuses clouds with more points than labels have rows for.
@@ -100,7 +103,7 @@ fn project_rows(
     images: &[(&Camera, [usize; 2])],
     keep_origin: bool,
 ) -> Result<InView> {
-    let mut part = InView::empty(images.len(), 0);
+    let mut part = InView::empty(images.len(), 0)?;
     for row in rows {
         let Some(xyz) = part.counts.usable(cloud, row, keep_origin)? else {
             continue;
@@ -130,26 +133,27 @@ fn project_rows(
 
 impl InView {
     /// No point of `images` images, with room for `points`.
-    fn empty(images: usize, points: usize) -> Self {
-        Self {
-            indices: Vec::with_capacity(points),
-            points: Vec::with_capacity(points),
+    fn empty(images: usize, points: usize) -> Result<Self> {
+        Ok(Self {
+            indices: with_room(points)?,
+            points: with_room(points)?,
             sightings: vec![Sighting::default(); images],
             counts: Counts::default(),
-        }
+        })
     }
 
-    fn concatenate(parts: &[Self], images: usize) -> Self {
-        let mut all = Self::empty(images, parts.iter().map(|part| part.indices.len()).sum());
+    fn concatenate(parts: &[Self], images: usize, cancel: &Cancel) -> Result<Self> {
+        let mut all = Self::empty(images, parts.iter().map(|part| part.indices.len()).sum())?;
         for (image, sighting) in all.sightings.iter_mut().enumerate() {
             let seen = parts
                 .iter()
                 .map(|part| part.sightings[image].seen.len())
                 .sum();
-            sighting.seen.reserve_exact(seen);
-            sighting.uv.reserve_exact(seen);
+            sighting.seen = with_room(seen)?;
+            sighting.uv = with_room(seen)?;
         }
         for part in parts {
+            cancel.check()?;
             let before = all.indices.len() as u32;
             for (sighting, own) in all.sightings.iter_mut().zip(&part.sightings) {
                 sighting.seen.extend(own.seen.iter().map(|at| before + at));
@@ -159,7 +163,7 @@ impl InView {
             all.points.extend_from_slice(&part.points);
             all.counts.merge(&part.counts);
         }
-        all
+        Ok(all)
     }
 }
 
@@ -230,7 +234,7 @@ mod tests {
             values: points,
             columns: 3,
         };
-        project(cloud, &[(&camera, [80, 100])], false)
+        project(cloud, &[(&camera, [80, 100])], false, Cancel::never())
     }
 
     #[test]
@@ -291,7 +295,7 @@ mod tests {
             columns: 3,
         };
         let images = [(&forward, [80, 100]), (&backward, [80, 100])];
-        let in_view = project(cloud, &images, false).unwrap();
+        let in_view = project(cloud, &images, false, Cancel::never()).unwrap();
         assert_eq!((in_view.indices, in_view.counts.behind), (vec![0, 2], 1));
         assert_eq!(in_view.sightings[0].seen, [0]);
         assert_eq!(in_view.sightings[1].seen, [1]);

@@ -5,12 +5,16 @@ use super::view::View;
 use crate::depth::DepthGroups;
 use crate::ground::{ground_heights, is_ground};
 use crate::masks::PixelLabels;
+use crate::memory::{collect, collect_parallel, filled, push, with_room};
 use crate::neighbors::arrange;
 use crate::projection::{Cloud, InView, Sighting, project};
-use crate::{Params, Real, Result};
+use crate::{Cancel, Params, Real, Result};
+use rayon::prelude::*;
 
 /// Slot of points that an image does not see.
 const UNSEEN: u32 = u32::MAX;
+/// Fewest points for a task of the thread pool.
+const POINTS_A_TASK: usize = 4096;
 
 /// The images of one moment, the points in view that each of them sees and the objects that they show.
 pub(crate) struct Images<'a> {
@@ -35,13 +39,16 @@ impl<'a> Images<'a> {
         views: &'a [View<'a>],
         same_object: f64,
         keep_origin: bool,
+        cancel: &Cancel,
     ) -> Result<(InView, Self)> {
         let size = |view: &View| [view.masks.height(), view.masks.width()];
         let images: Vec<_> = views.iter().map(|view| (view.camera, size(view))).collect();
-        let mut in_view = project(cloud, &images, keep_origin)?;
+        let mut in_view = project(cloud, &images, keep_origin, cancel)?;
         let sightings = std::mem::take(&mut in_view.sightings);
         let points = in_view.indices.len();
-        let slots: Vec<Vec<u32>> = sightings.iter().map(|own| slots(own, points)).collect();
+        let slots = sightings.iter().map(|own| slots(own, points));
+        let slots = slots.collect::<Result<Vec<_>>>()?;
+        cancel.check()?;
         let shared = |one: usize, other: usize| {
             let slots = slots[one].iter().zip(&slots[other]);
             let both = slots.filter(|(one, other)| **one != UNSEEN && **other != UNSEEN);
@@ -60,7 +67,7 @@ impl<'a> Images<'a> {
             slots,
             sightings,
             objects,
-            heights: vec![f64::NAN; points],
+            heights: filled(f64::NAN, points)?,
             depths: Vec::new(),
         };
         Ok((in_view, images))
@@ -68,32 +75,32 @@ impl<'a> Images<'a> {
 
     /// Finds the ground below `points` in view, by the first camera, and the object of each mask by depth, where the
     /// parameters ask for them.
-    pub(crate) fn see_depth(&mut self, points: &[[f64; 3]], params: &Params) {
+    pub(crate) fn see_depth(
+        &mut self,
+        points: &[[f64; 3]],
+        params: &Params,
+        cancel: &Cancel,
+    ) -> Result<()> {
         let Some(first) = self.views.first().filter(|_| params.need_ground()) else {
-            return;
+            return Ok(());
         };
-        self.heights = ground_heights(points, first.camera, params.local_ground);
+        self.heights = ground_heights(points, first.camera, params.local_ground, cancel)?;
         if !params.need_depth() {
-            return;
+            return Ok(());
         }
-        let standing: Vec<bool> = self
-            .heights
-            .iter()
-            .map(|&height| !is_ground(height))
-            .collect();
+        let standing = collect(self.heights.iter().map(|&height| !is_ground(height)))?;
         let of_view = |(view, sighting): (&View, &Sighting)| {
+            cancel.check()?;
+            let seen = sighting.seen.par_iter().with_min_len(POINTS_A_TASK);
             let distance = |&point: &u32| view.camera.distance(&points[point as usize]);
-            let distances = sighting.seen.iter().map(distance).collect();
-            let standing = arrange(&sighting.seen, &standing);
+            let distances = collect_parallel(seen.map(distance))?;
+            let standing = arrange(&sighting.seen, &standing)?;
             view.masks
-                .depth_groups(&sighting.uv, distances, &standing, params)
+                .depth_groups(&sighting.uv, distances, &standing, params, cancel)
         };
-        self.depths = self
-            .views
-            .iter()
-            .zip(&self.sightings)
-            .map(of_view)
-            .collect();
+        let views = self.views.iter().zip(&self.sightings);
+        self.depths = views.map(of_view).collect::<Result<_>>()?;
+        Ok(())
     }
 
     /// True if the point at `slot` of the sighting of `image` takes `label` from the pixels around it.
@@ -130,32 +137,41 @@ impl<'a> Images<'a> {
         &self,
         order: &[u32],
         params: &Params,
+        cancel: &Cancel,
     ) -> Result<PixelLabels<T>> {
         let parts = self.views.iter().enumerate().map(|(image, view)| {
+            cancel.check()?;
             let slots = order.iter().map(|&point| self.slots[image][point as usize]);
-            let seen: Vec<u32> = slots.filter(|&slot| slot != UNSEEN).collect();
-            let uv = arrange(&seen, &self.sightings[image].uv);
+            let mut seen = with_room(self.sightings[image].seen.len())?;
+            seen.extend(slots.filter(|&slot| slot != UNSEEN));
+            let uv = arrange(&seen, &self.sightings[image].uv)?;
             let admitted = |at: usize, label| self.admits(image, seen[at] as usize, label);
+            let (window, weight) = (params.window, params.pixel_weight);
             view.masks
-                .pixel_labels(&uv, params.window, params.pixel_weight, admitted)
+                .pixel_labels(&uv, window, weight, admitted, cancel)
         });
         let mut parts = parts.collect::<Result<Vec<_>>>()?;
         if parts.len() == 1 {
             // the image sees every point, and its instances are the labels: nothing to add up
             return Ok(parts.remove(0));
         }
-        Ok(self.together(order, &parts))
+        self.together(order, &parts, cancel)
     }
 
     /// Rows of all images that see a point added up, their instances named by the objects they show.
-    fn together<T: Real>(&self, order: &[u32], parts: &[PixelLabels<T>]) -> PixelLabels<T> {
+    fn together<T: Real>(
+        &self,
+        order: &[u32],
+        parts: &[PixelLabels<T>],
+        cancel: &Cancel,
+    ) -> Result<PixelLabels<T>> {
         let mut next = vec![0; parts.len()];
-        let mut all = PixelLabels {
-            offsets: vec![0],
-            ..PixelLabels::default()
-        };
+        let mut all = PixelLabels::with_room(order.len())?;
         let mut row: Vec<(u32, T)> = Vec::new();
-        for &point in order {
+        for (at, &point) in order.iter().enumerate() {
+            if at % POINTS_A_TASK == 0 {
+                cancel.check()?;
+            }
             row.clear();
             let mut mass = T::default();
             for (image, part) in parts.iter().enumerate() {
@@ -174,22 +190,24 @@ impl<'a> Images<'a> {
                 }
             }
             row.sort_unstable_by_key(|&(label, _)| label);
-            all.labels.extend(row.iter().map(|&(label, _)| label));
-            all.weights.extend(row.iter().map(|&(_, weight)| weight));
+            for &(label, weight) in &row {
+                push(&mut all.labels, label)?;
+                push(&mut all.weights, weight)?;
+            }
             all.mass.push(mass);
             all.offsets.push(all.labels.len());
         }
-        all
+        Ok(all)
     }
 }
 
 /// Position of each of `n` points in view in a sighting.
-fn slots(sighting: &Sighting, n: usize) -> Vec<u32> {
-    let mut slots = vec![UNSEEN; n];
+fn slots(sighting: &Sighting, n: usize) -> Result<Vec<u32>> {
+    let mut slots = filled(UNSEEN, n)?;
     for (slot, &point) in sighting.seen.iter().enumerate() {
         slots[point as usize] = slot as u32;
     }
-    slots
+    Ok(slots)
 }
 
 /// Label of each instance of each view: the number of its object.
