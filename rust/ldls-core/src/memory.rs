@@ -4,6 +4,8 @@
 //! where a lack of memory is an [`Error::OutOfMemory`].
 
 use crate::{Error, Result};
+use bytemuck::Zeroable;
+use bytemuck::allocation::try_zeroed_vec;
 use rayon::prelude::*;
 
 /// An empty vector with room for `len` values.
@@ -52,6 +54,15 @@ pub fn filled<T: Clone>(value: T, len: usize) -> Result<Vec<T>> {
     let mut values = with_room(len)?;
     values.resize(len, value);
     Ok(values)
+}
+
+/// `len` zeros. Memory fresh from the system is zero: nobody touches it before its user does.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn zeros<T: Zeroable>(len: usize) -> Result<Vec<T>> {
+    let bytes = size_of::<T>().saturating_mul(len);
+    try_zeroed_vec(len).map_err(|()| Error::OutOfMemory { bytes })
 }
 
 /// `values`, of which there are no more than they say.

@@ -1,5 +1,6 @@
 //! The two precisions that the method runs in: single for speed, double where single cannot decide.
 
+use bytemuck::Zeroable;
 use std::fmt::Debug;
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Mul, Sub};
@@ -18,6 +19,7 @@ pub trait Real:
     + AddAssign
     + Sub<Output = Self>
     + Mul<Output = Self>
+    + Zeroable
     + 'static
 {
     /// Share of the largest seed below which a likelihood is lost in the rounding of what it competes with.

@@ -14,6 +14,8 @@ use crate::{Cancel, Error, Params, Real, Result};
 
 /// Label of points that no image sees.
 const OUT_OF_VIEW: i32 = -1;
+/// Points between two looks at the flag where one thread does the work.
+const POINTS_A_BLOCK: usize = 1 << 16;
 /// Most edges of a graph: what 32 bits index.
 const MAX_EDGES: u64 = u32::MAX as u64;
 
@@ -68,28 +70,31 @@ pub fn segment(
         Adjacency::search(in_view.points, k, cancel)
     })?;
     let order = &nearest.order;
+    let heights = &arrange(order, &scene.heights, cancel)?;
     let pixels = || scene.pixel_labels(order, params, cancel);
     let pixel_labels = timed(&mut t.pixel_labels, pixels)?;
     let (a, b) = timed(&mut t.graph, || {
-        normalize(nearest, pixel_labels, scene, params, cancel)
+        normalize(nearest, pixel_labels, heights, params, cancel)
     })?;
     let pixels = || scene.pixel_labels(order, params, cancel);
-    let exact = || normalize(nearest, pixels()?, scene, params, cancel);
+    let exact = || normalize(nearest, pixels()?, heights, params, cancel);
     let diffused = timed(&mut t.diffusion, || {
         diffuse(&a, &b, scene.n_labels(), params.iterations, exact, cancel)
     })?;
     let mut kept = timed(&mut t.components, || {
         remove_outliers(&a, &diffused.labels, order, scene, params, cancel)
     })?;
+    let heights = heights.iter().copied();
+    clear_ground(&mut kept, heights, params.ground_clearance);
     let confidence = judge(&mut kept, &diffused, &scene.scores(), params)?;
     cancel.check()?;
 
     // back to the rows of the cloud
-    let rows = arrange(order, &in_view.indices)?;
+    let rows = arrange(order, &in_view.indices, cancel)?;
     Ok(Segmentation {
-        labels: labels_of_cloud(cloud.len(), &rows, &kept)?,
-        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels)?,
-        confidence: scatter(cloud.len(), &rows, 0.0, confidence)?,
+        labels: labels_of_cloud(cloud.len(), &rows, &kept, cancel)?,
+        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels, cancel)?,
+        confidence: scatter(cloud.len(), &rows, 0.0, confidence, cancel)?,
         report: Report::new(in_view.counts, nearest, diffused.convergence),
         in_view: in_view.indices,
         sightings: images.sightings,
@@ -121,21 +126,20 @@ fn check_edges(points: usize, neighbors: usize) -> Result<()> {
 fn normalize<T: Real>(
     nearest: &Adjacency,
     mut b: PixelLabels<T>,
-    images: &Images,
+    heights: &[f64],
     params: &Params,
     cancel: &Cancel,
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
     let mut a = PointGraph::from_adjacency(nearest, params.sigma, cancel)?;
     if params.ground_edges < 1.0 {
-        let ground = |&point: &u32| is_ground(images.heights[point as usize]);
-        let ground = collect(nearest.order.iter().map(ground))?;
+        let ground = collect(heights.iter().map(|&height| is_ground(height)))?;
         a.weaken_ground_edges(&ground, params.ground_edges, cancel)?;
     }
     a.normalize_rows(&mut b, cancel)?;
     Ok((a, b))
 }
 
-/// The labels of the largest component of each instance and its parts, off the ground, where the parameters ask for it.
+/// The labels of the largest component of each instance and its parts, where the parameters ask for it.
 fn remove_outliers(
     a: &PointGraph,
     labels: &[u32],
@@ -149,14 +153,12 @@ fn remove_outliers(
         let at_depth = |row: usize, label| images.at_depth(order[row], label);
         kept = remove_outliers_by_index(a, labels, order, params.part_size, at_depth, cancel)?;
     }
-    let heights = order.iter().map(|&point| images.heights[point as usize]);
-    clear_ground(&mut kept, heights, params.ground_clearance);
     Ok(kept)
 }
 
-fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32]) -> Result<Vec<i32>> {
+fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32], cancel: &Cancel) -> Result<Vec<i32>> {
     let signed = labels.iter().map(|&label| label as i32);
-    scatter(n, rows, OUT_OF_VIEW, signed)
+    scatter(n, rows, OUT_OF_VIEW, signed, cancel)
 }
 
 /// `values` laid out over a cloud of `n` points, each in its row.
@@ -165,10 +167,15 @@ fn scatter<T: Copy>(
     rows: &[u32],
     elsewhere: T,
     values: impl IntoIterator<Item = T>,
+    cancel: &Cancel,
 ) -> Result<Vec<T>> {
     let mut all = filled(elsewhere, n)?;
-    for (&row, value) in rows.iter().zip(values) {
-        all[row as usize] = value;
+    let mut values = values.into_iter();
+    for rows in rows.chunks(POINTS_A_BLOCK) {
+        cancel.check()?;
+        for (&row, value) in rows.iter().zip(&mut values) {
+            all[row as usize] = value;
+        }
     }
     Ok(all)
 }

@@ -27,7 +27,7 @@ impl Products {
         let a = graph(py, &point_graph)?;
         // nobody asks for it, but there is one for each row
         let rows = labels.0.as_array().len().saturating_sub(1);
-        let mass = or_raise(py, memory::filled(0.0, rows))?;
+        let mass = or_raise(py, memory::zeros(rows))?;
         let b = pixel_labels(py, &labels, mass)?;
         let state = run_here(py, || ldls_core::Products::new(a, b, n_labels, iterations))?;
         Ok(Self { state, n_labels })

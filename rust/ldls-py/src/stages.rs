@@ -113,7 +113,7 @@ pub fn neighbors(
     let points = rows::<3>(py, "points", &points)?;
     let (found, squared_distances) = run(py, threads, |cancel| {
         let found = ldls_core::Neighbors::search(&points, k, cancel)?;
-        let squared_distances = found.squared_distances(&points)?;
+        let squared_distances = found.squared_distances(&points, cancel)?;
         Ok((found, squared_distances))
     })?;
     if found.k == 0 {

@@ -1,6 +1,6 @@
 //! How far pixels lie from the edge of a mask, inside and outside.
 
-use crate::memory::{collect, filled};
+use crate::memory::{collect, zeros};
 use crate::{Result, Rle};
 use std::ops::Range;
 
@@ -31,7 +31,7 @@ impl Edges {
             side.start.saturating_sub(margin)..(side.end + margin).min(end)
         };
         let (columns, rows) = (around(columns, mask.width()), around(rows, mask.height()));
-        let mut inside = filled(false, columns.len() * rows.len())?;
+        let mut inside = zeros(columns.len() * rows.len())?;
         for (column, span) in mask.column_spans() {
             let start = (column - columns.start) * rows.len();
             inside[start + span.start - rows.start..start + span.end - rows.start].fill(true);

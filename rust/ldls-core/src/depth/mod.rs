@@ -7,7 +7,7 @@ mod edges;
 mod groups;
 
 use crate::masks::InstanceMasks;
-use crate::memory::{collect, filled, push, with_room};
+use crate::memory::{collect, push, with_room, zeros};
 use crate::projection::nearest_pixel;
 use crate::{Cancel, Params, Result, Rle};
 use edges::Edges;
@@ -96,7 +96,7 @@ impl InstanceMasks {
         };
         let found = self.masks().par_iter().map(of_mask);
         let found = found.collect::<Result<Vec<_>>>()?;
-        let mut unsure = filled(false, uv.len())?;
+        let mut unsure = zeros(uv.len())?;
         if params.edge_margin > 0.0 {
             let points = found.iter().flatten().flat_map(|(_, beside)| beside);
             points.for_each(|&(_, point)| unsure[point] = true);

@@ -26,7 +26,7 @@ use self::sweep::{WIDTH_F32, WIDTH_F64};
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect_parallel, filled};
+use crate::memory::{collect_parallel, filled, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 
@@ -98,7 +98,7 @@ pub fn likelihoods(
     cancel: &Cancel,
 ) -> Result<(Vec<f32>, Convergence)> {
     b.check(a.len(), n_labels)?;
-    let mut all = filled(0.0, a.len().saturating_mul(n_labels))?;
+    let mut all = zeros(a.len().saturating_mul(n_labels))?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let write = |pass: &Pass<f32, WIDTH_F32>| {
         for (label, group, lane) in pass.labels() {

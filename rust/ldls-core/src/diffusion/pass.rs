@@ -40,7 +40,7 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
     ) -> Result<Self> {
         // the first product yields the seeds, the first step of a series its last term
         let first = series.map_or(1.0, |series| series.coefficients[series.degree()]);
-        let mut pass = Self::new(a, schedule, seeds, T::from_f64(first))?;
+        let mut pass = Self::new(a, schedule, seeds, T::from_f64(first), cancel)?;
         cancel.check()?;
         match (series, iterations) {
             (Some(series), _) => pass.run_series(series, cancel)?,
@@ -68,10 +68,11 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         schedule: &'a Schedule,
         seeds: &'a Seeds<T>,
         scale: T,
+        cancel: &Cancel,
     ) -> Result<Self> {
         let groups = seeds.lanes.len().div_ceil(WIDTH).max(1);
-        let mut z = zeros(a.len(), groups)?;
-        let previous = zeros(a.len(), groups)?;
+        let mut z = zeros(a.len(), groups, cancel)?;
+        let previous = zeros(a.len(), groups, cancel)?;
         let rows = z[0].par_iter_mut().zip(&seeds.background);
         rows.with_min_len(ROWS_A_TASK)
             .for_each(|(row, &weight)| row[BACKGROUND_LANE] = scale * weight);

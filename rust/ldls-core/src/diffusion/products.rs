@@ -8,7 +8,7 @@ use super::convergence::{CONVERGED, MOST_SWEEPS};
 use super::schedule::ROWS_A_TASK;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect_parallel, filled};
+use crate::memory::{collect_parallel, zeros};
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 
@@ -47,8 +47,8 @@ impl Products {
             b,
             n_labels,
             iterations,
-            next: filled(0.0, likelihoods)?,
-            z: filled(0.0, likelihoods)?,
+            next: zeros(likelihoods)?,
+            z: zeros(likelihoods)?,
             done: 0,
             converged: false,
         })

@@ -8,7 +8,7 @@
 //! do not depend on it.
 
 use crate::graph::PointGraph;
-use crate::memory::{filled, push, with_room};
+use crate::memory::{filled, push, with_room, zeros};
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -93,7 +93,7 @@ impl Schedule {
         for at in 1..offsets.len() {
             offsets[at] += offsets[at - 1];
         }
-        let mut order = filled(0, regions.len())?;
+        let mut order = zeros(regions.len())?;
         for at in 0..regions.len() {
             let next = &mut offsets[place(at)];
             order[*next] = (at % tiles) as u32;

@@ -2,7 +2,7 @@
 
 use super::schedule::{BLOCK, ROWS_A_TASK};
 use crate::masks::PixelLabels;
-use crate::memory::{collect, collect_parallel, filled, push, with_room};
+use crate::memory::{collect, collect_parallel, push, with_room, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -104,7 +104,7 @@ impl<T: Real> Seeds<T> {
         };
         let background = match lanes[..] {
             [Some(0), ..] => collect_parallel(points().map(background))?,
-            _ => filled(T::default(), b.rows())?,
+            _ => zeros(b.rows())?,
         };
         cancel.check()?;
         let signed = |(label, weight): (usize, T)| T::from_f64(random_sign(label)) * weight;

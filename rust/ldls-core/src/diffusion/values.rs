@@ -6,8 +6,8 @@
 #![expect(unsafe_code, reason = "threads share values by rows")]
 
 use super::seeds::MOST_GROUPS;
-use crate::memory::filled;
-use crate::{Real, Result};
+use crate::memory;
+use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -16,9 +16,13 @@ use std::ops::Range;
 pub(super) fn zeros<T: Real, const WIDTH: usize>(
     points: usize,
     groups: usize,
+    cancel: &Cancel,
 ) -> Result<Vec<Vec<[T; WIDTH]>>> {
     // threads share out what the allocator has to clear
-    let group = |_| filled([T::default(); WIDTH], points);
+    let group = |_| {
+        cancel.check()?;
+        memory::zeros(points)
+    };
     (0..groups).into_par_iter().map(group).collect()
 }
 

@@ -1,7 +1,7 @@
 //! The point graph as a sparse matrix (method, steps 3 and 4).
 
 use crate::masks::PixelLabels;
-use crate::memory::{collect, collect_parallel, filled, with_room};
+use crate::memory::{collect, collect_parallel, with_room, zeros};
 use crate::neighbors::{Adjacency, Neighbors, squared_distance};
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
@@ -92,7 +92,7 @@ impl<T: Real> PointGraph<T> {
     ) -> Result<Self> {
         let points = &adjacency.points;
         let (count, degree) = (points.len(), adjacency.degree);
-        let mut weights = filled(T::default(), count * degree)?;
+        let mut weights = zeros(count * degree)?;
         let tasks = weights
             .par_chunks_mut(degree * ROWS_A_TASK)
             .zip(adjacency.columns.par_chunks(degree * ROWS_A_TASK))

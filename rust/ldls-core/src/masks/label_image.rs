@@ -3,7 +3,7 @@
 
 use super::instance_masks::InstanceMasks;
 use super::rle::Rle;
-use crate::memory::filled;
+use crate::memory::zeros;
 use crate::{Cancel, Result};
 use std::collections::HashMap;
 
@@ -40,7 +40,7 @@ impl LabelImage {
         let mut image = Self {
             height: masks.height(),
             width: masks.width(),
-            pixels: filled(0, masks.height() * masks.width())?,
+            pixels: zeros(masks.height() * masks.width())?,
             sets: vec![LabelSet { label: 0, rest: 0 }],
         };
         for (m, mask) in masks.masks().iter().enumerate() {

@@ -1,6 +1,6 @@
 //! One mask as run lengths: column by column, runs of zeros and ones in turn, zeros first, as COCO has it.
 
-use crate::memory::filled;
+use crate::memory::zeros;
 use crate::{Error, Result};
 use std::ops::Range;
 
@@ -222,7 +222,7 @@ impl Rle {
                 problem,
             });
         }
-        let mut pixels = filled(false, height * width)?;
+        let mut pixels = zeros(height * width)?;
         for (column, rows) in self.column_spans() {
             if (left..left + width).contains(&column) {
                 let rows = rows.start.max(top)..rows.end.min(top + height);

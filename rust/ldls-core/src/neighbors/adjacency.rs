@@ -4,7 +4,7 @@
 use super::coincident;
 use super::kdtree::{FAN, KdTree, arrange};
 use super::leaf_search::search_leaf;
-use crate::memory::filled;
+use crate::memory::zeros;
 use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -49,9 +49,9 @@ impl Adjacency {
     }
 
     fn search_tree(tree: KdTree, points: Vec<[f64; 3]>, k: usize, cancel: &Cancel) -> Result<Self> {
-        let points = arrange(&tree.order, &{ points })?;
+        let points = arrange(&tree.order, &{ points }, cancel)?;
         let degree = k.min(points.len().saturating_sub(1)) + 1;
-        let mut columns = filled(0, points.len() * degree)?;
+        let mut columns = zeros(points.len() * degree)?;
         let tasks = columns
             .par_chunks_mut(degree * FAN * LEAVES_A_TASK)
             .enumerate();

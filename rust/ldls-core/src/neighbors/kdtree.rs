@@ -14,6 +14,10 @@ pub(crate) const FAN: usize = 16;
 /// Points above which the two sides of a split are built by two threads.
 const PARALLEL: usize = 4096;
 
+/// Items that a selection goes through without a look at the flag, and how many of more of them are its sample.
+const ITEMS_A_PASS: usize = 1 << 20;
+const SAMPLE: usize = 1000;
+
 /// Coordinates of the points of one leaf; infinite where it has fewer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Leaf(pub(crate) [[f32; FAN]; 3]);
@@ -67,8 +71,8 @@ impl KdTree {
         let mut items = collect_parallel(points.par_iter().enumerate().map(item))?;
         sort(&mut items, cancel)?;
         let leaves = collect_parallel(items.par_chunks(FAN).map(Leaf::new))?;
-        let levels = levels(&items)?;
         cancel.check()?;
+        let levels = levels(&items, cancel)?;
         let order = collect_parallel(items.par_iter().map(|item| item.index))?;
         Ok(Self {
             order,
@@ -86,9 +90,17 @@ impl KdTree {
 }
 
 /// `values` in the order of the tree.
-pub(crate) fn arrange<T: Copy + Send + Sync>(order: &[u32], values: &[T]) -> Result<Vec<T>> {
-    let value = |&index: &u32| values[index as usize];
-    collect_parallel(order.par_iter().with_min_len(PARALLEL).map(value))
+pub(crate) fn arrange<T: Copy + Send + Sync>(
+    order: &[u32],
+    values: &[T],
+    cancel: &Cancel,
+) -> Result<Vec<T>> {
+    // most time goes into fetching values from all over memory: once cancelled, the first one stands for all
+    let place = |&index: &u32| if cancel.check().is_ok() { index } else { 0 };
+    let value = |index: &u32| values[place(index) as usize];
+    let arranged = collect_parallel(order.par_iter().with_min_len(PARALLEL).map(value))?;
+    cancel.check()?;
+    Ok(arranged)
 }
 
 impl Leaf {
@@ -139,7 +151,7 @@ fn sort(items: &mut [Item], cancel: &Cancel) -> Result<()> {
     }
     let middle = split_at(items.len());
     let axis = widest_axis(items);
-    items.select_nth_unstable_by(middle, |a, b| a.xyz[axis].total_cmp(&b.xyz[axis]));
+    select(items, middle, axis, cancel)?;
     let parallel = items.len() > PARALLEL;
     let (left, right) = items.split_at_mut(middle);
     if parallel {
@@ -150,6 +162,47 @@ fn sort(items: &mut [Item], cancel: &Cancel) -> Result<()> {
         sort(left, cancel)?;
         sort(right, cancel)
     }
+}
+
+/// Puts the `middle` lowest items along `axis` first. Of millions of items, a pivot from a sample narrows down where the
+/// border lies, a pass at a time, so that there is a moment to look at the flag.
+fn select(items: &mut [Item], middle: usize, axis: usize, cancel: &Cancel) -> Result<()> {
+    let compare = |a: &Item, b: &Item| a.xyz[axis].total_cmp(&b.xyz[axis]);
+    let (mut low, mut high) = (0, items.len());
+    while high - low > ITEMS_A_PASS {
+        cancel.check()?;
+        let within = &mut items[low..high];
+        let share = (middle - low) as f64 / within.len() as f64;
+        // just beyond the border, on its longer side, which is thus left out
+        let rank = share + if share > 0.5 { -0.04 } else { 0.04 };
+        let mut sample: Vec<Item> = within
+            .iter()
+            .step_by(within.len() / SAMPLE)
+            .copied()
+            .collect();
+        sample.sort_unstable_by(compare);
+        let pivot = sample[(rank * sample.len() as f64) as usize];
+        let below = partition(within, |item| compare(item, &pivot).is_lt());
+        let up_to = below + partition(&mut within[below..], |item| compare(item, &pivot).is_eq());
+        match middle - low {
+            border if border < below => high = low + below,
+            border if border < up_to => return Ok(()),
+            _ => low += up_to,
+        }
+    }
+    items[low..high].select_nth_unstable_by(middle - low, compare);
+    Ok(())
+}
+
+/// Puts the items first that `belong` there; how many they are.
+fn partition(items: &mut [Item], belong: impl Fn(&Item) -> bool) -> usize {
+    let mut first = 0;
+    for at in 0..items.len() {
+        let belongs = belong(&items[at]);
+        items.swap(first, at);
+        first += usize::from(belongs);
+    }
+    first
 }
 
 /// Half of `len`, up to whole nodes of the largest size that is smaller than `len`.
@@ -202,7 +255,7 @@ impl Hull {
     }
 }
 
-fn levels(items: &[Item]) -> Result<Vec<Vec<Boxes>>> {
+fn levels(items: &[Item], cancel: &Cancel) -> Result<Vec<Vec<Boxes>>> {
     let of_point = |item: &Item| Hull {
         low: item.xyz,
         high: item.xyz,
@@ -212,6 +265,7 @@ fn levels(items: &[Item]) -> Result<Vec<Vec<Boxes>>> {
     let mut hulls = collect_parallel(items.par_chunks(FAN).map(around_leaf))?;
     let mut levels = Vec::new();
     loop {
+        cancel.check()?;
         levels.push(collect_parallel(hulls.par_chunks(FAN).map(Boxes::new))?);
         let around = |hulls: &[Hull]| Hull::around(hulls.iter().copied());
         hulls = collect_parallel(hulls.par_chunks(FAN).map(around))?;

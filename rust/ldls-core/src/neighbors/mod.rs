@@ -14,9 +14,12 @@ pub(crate) use adjacency::Adjacency;
 pub(crate) use candidates::squared_distance;
 pub(crate) use kdtree::arrange;
 
-use crate::memory::{collect_parallel, filled, with_room};
-use crate::{Cancel, Result};
+use crate::memory::{with_room, zeros};
+use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
+
+/// Points handled by one task of the thread pool, or between two looks at the flag.
+const POINTS_A_TASK: usize = 4096;
 
 /// The `k` nearest other points of every point, nearest first.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -38,9 +41,13 @@ impl Neighbors {
         copy.extend_from_slice(points);
         let adjacency = Adjacency::search(copy, k, cancel)?;
         let (order, k) = (&adjacency.order, adjacency.degree - 1);
-        let mut indices = filled(0, points.len() * k)?;
+        let mut indices = zeros(points.len() * k)?;
         if k > 0 {
-            for (&index, row) in order.iter().zip(adjacency.columns.chunks(adjacency.degree)) {
+            let rows = adjacency.columns.chunks(adjacency.degree);
+            for (at, (&index, row)) in order.iter().zip(rows).enumerate() {
+                if at % POINTS_A_TASK == 0 {
+                    cancel.check()?;
+                }
                 let slots = &mut indices[index as usize * k..][..k];
                 for (slot, &position) in slots.iter_mut().zip(&row[1..]) {
                     *slot = order[position as usize];
@@ -53,12 +60,22 @@ impl Neighbors {
     /// Squared distances of the neighbours of `points`, in square metres, in the order of `indices`.
     ///
     /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub fn squared_distances(&self, points: &[[f64; 3]]) -> Result<Vec<f64>> {
-        let entries = self.indices.par_iter().enumerate();
-        let distance =
-            |(at, &j): (usize, &u32)| squared_distance(&points[at / self.k], &points[j as usize]);
-        collect_parallel(entries.map(distance))
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+    pub fn squared_distances(&self, points: &[[f64; 3]], cancel: &Cancel) -> Result<Vec<f64>> {
+        let mut squared = zeros(self.indices.len())?;
+        let entries = self.k.max(1) * POINTS_A_TASK;
+        let tasks = squared
+            .par_chunks_mut(entries)
+            .zip(self.indices.par_chunks(entries))
+            .zip(points.par_chunks(POINTS_A_TASK));
+        tasks.try_for_each(|((squared, indices), own)| {
+            cancel.check()?;
+            for (at, (squared, &j)) in squared.iter_mut().zip(indices).enumerate() {
+                *squared = squared_distance(&own[at / self.k], &points[j as usize]);
+            }
+            Ok::<(), Error>(())
+        })?;
+        Ok(squared)
     }
 }
 
@@ -162,7 +179,7 @@ mod tests {
             k in 1_usize..30, far in prop_oneof![Just(0.0), Just(5e5)],
         ) {
             let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + far, p[1] - far, p[2]]).collect();
-            let distances = nearest(&points, k).squared_distances(&points).unwrap();
+            let distances = nearest(&points, k).squared_distances(&points, Cancel::never()).unwrap();
             let expected = distances_of_kiddo(&points, k);
             prop_assert_eq!(distances.len(), expected.len());
             // kiddo may add squares in another order

@@ -94,7 +94,7 @@ impl<'a> Images<'a> {
             let seen = sighting.seen.par_iter().with_min_len(POINTS_A_TASK);
             let distance = |&point: &u32| view.camera.distance(&points[point as usize]);
             let distances = collect_parallel(seen.map(distance))?;
-            let standing = arrange(&sighting.seen, &standing)?;
+            let standing = arrange(&sighting.seen, &standing, cancel)?;
             view.masks
                 .depth_groups(&sighting.uv, distances, &standing, params, cancel)
         };
@@ -141,10 +141,15 @@ impl<'a> Images<'a> {
     ) -> Result<PixelLabels<T>> {
         let parts = self.views.iter().enumerate().map(|(image, view)| {
             cancel.check()?;
-            let slots = order.iter().map(|&point| self.slots[image][point as usize]);
             let mut seen = with_room(self.sightings[image].seen.len())?;
-            seen.extend(slots.filter(|&slot| slot != UNSEEN));
-            let uv = arrange(&seen, &self.sightings[image].uv)?;
+            for points in order.chunks(POINTS_A_TASK) {
+                cancel.check()?;
+                let slots = points
+                    .iter()
+                    .map(|&point| self.slots[image][point as usize]);
+                seen.extend(slots.filter(|&slot| slot != UNSEEN));
+            }
+            let uv = arrange(&seen, &self.sightings[image].uv, cancel)?;
             let admitted = |at: usize, label| self.admits(image, seen[at] as usize, label);
             let (window, weight) = (params.window, params.pixel_weight);
             view.masks
