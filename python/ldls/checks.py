@@ -224,6 +224,8 @@ def _kind(hint: Any) -> _Kind:  # noqa: ANN401
         return _union([_kind(part) for part in parts])
     if origin is PathLike:
         return _Kind(lambda value: isinstance(value, PathLike), "a path", is_noun=True)
+    if origin is Callable:
+        return _Kind(callable, "a function", is_noun=True)
     return _container(origin, [_kind(part) for part in parts if part is not Ellipsis], Ellipsis in parts)
 
 

@@ -5,7 +5,7 @@ use crate::{Bytes, Outcome};
 use ldls_core::{Neighbors, PixelLabels, PointGraph, Products, Real, diffuse, likelihoods};
 
 /// Largest error of a likelihood on the graph of a cloud, as a share of the largest there is.
-const TOLERANCE: f64 = 1e-4;
+const TOLERANCE: f64 = 5e-4;
 /// The same on graphs that no cloud has: where values flow one way, a series may leave plain products unseen.
 const TOLERANCE_OF_ANY: f64 = 2e-2;
 /// Largest change of a likelihood by one more product where a diffusion is said to have converged.
