@@ -262,11 +262,7 @@ def _container(origin: type, kinds: Sequence[_Kind], any_length: bool) -> _Kind:
         # one that is used up by looking at it is taken as it is
         kind = kinds[0]
         return _Kind(
-            lambda value: (
-                isinstance(value, Iterable)
-                and not isinstance(value, str | bytes)
-                and not (_is_sequence(value) and not all(map(kind.accepts, value)))
-            ),
+            lambda value: all(map(kind.accepts, value)) if _is_sequence(value) else _is_iterable(value),
             f"a list of {_plural(kind.name)}",
             is_noun=kind.is_noun,
         )
@@ -301,12 +297,16 @@ def _is_sequence(value: object) -> bool:
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
+def _is_iterable(value: object) -> bool:
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes | np.ndarray)
+
+
 def _bound(
     signature: inspect.Signature, callee: Callable[..., Any], arguments: Sequence[Any], keywords: Mapping[str, Any]
 ) -> dict[str, Any]:
     unknown = [word for word in keywords if word not in signature.parameters]
     if unknown:
-        near = get_close_matches(unknown[0], [name for name in signature.parameters if name != "self"], n=1)
+        near = get_close_matches(unknown[0], [name for name in signature.parameters if name != "self"], n=1, cutoff=0.5)
         known = ", ".join(name for name in signature.parameters if name not in ("self", "cls"))
         hint = f"did you mean {near[0]!r}?" if near else f"expected {known or 'none'}"
         name = callee.__qualname__.removesuffix(".__init__")

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.checks import as_array, checked, numbers, shown
 from ldls.errors import InputError, ShapeError
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.segmentation import Segmentation
 
 BACKGROUND = "background"
 MAX_LABEL = 2**31 - 1

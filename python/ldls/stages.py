@@ -116,6 +116,7 @@ def project(
         keep_origin: Whether points at exactly (0, 0, 0) are more than missing returns.
         threads: As in `Params`.
     """
+    Params(threads=threads)
     return _ldls.project(
         as_points(points),
         camera.core,
@@ -142,6 +143,7 @@ def ground(
         local_ground: As in `Params`.
         threads: As in `Params`.
     """
+    Params(threads=threads)
     return _ldls.ground(_finite_xyz(points), camera.core, local_ground, threads)
 
 
@@ -191,7 +193,7 @@ def neighbors(
         k: Neighbours wanted.
         threads: As in `Params`.
     """
-    Params(neighbors=k)
+    Params(neighbors=k, threads=threads)
     return _ldls.neighbors(_finite_xyz(points), k, threads)
 
 
@@ -217,7 +219,7 @@ def point_graph(
         ground_edges: As in `Params`.
         threads: As in `Params`.
     """
-    Params(sigma=sigma, ground_edges=ground_edges)
+    Params(sigma=sigma, ground_edges=ground_edges, threads=threads)
     xyz, on_ground = _finite_xyz(points), None
     columns = numbers("indices", indices, np.uint32, (len(xyz), "k"))
     if heights is not None:
@@ -241,7 +243,7 @@ def pixel_labels(
     With `depths`, a mask labels points at the distance of its object only, and background pixels those that masks are
     sure of; the weight of other edges counts in the mass alone.
     """
-    Params(window=window, pixel_weight=pixel_weight)
+    Params(window=window, pixel_weight=pixel_weight, threads=threads)
     uv = numbers("pixels", pixels, np.float64, ("n", 2))
     groups = None if depths is None else _checked(depths, len(uv), len(masks))
     weights, mass = _ldls.pixel_labels(uv, masks.core, window, pixel_weight, groups, threads)

@@ -96,6 +96,7 @@ class ClassSet:
             ParameterError: A name is scored and left out, or `leave_out` holds a name of no vocabulary.
         """
         known = _known_names()
+        leave_out = None if leave_out is None else tuple(leave_out)
         unknown = [name for name in leave_out or () if name not in known]
         if unknown:
             raise ParameterError(f"leave_out: no data set has {unknown}; expected names such as {', '.join(KITTI)}")

@@ -193,9 +193,16 @@ def _sam_rle(index: int, record: Mapping[str, Any]) -> _ldls.Rle:
 
 def _check_parts(name: str, source: object, parts: Sequence[str]) -> None:
     """Refuse an object of another program that has not the parts that its class has."""
-    missing = [part for part in parts if not hasattr(source, part)]
+    missing = [part for part in parts if not _has(source, part)]
     if missing:
         raise MaskError(f"{name}: {missing[0]!r} is missing, got {shown(source)}; is it of another class?")
+
+
+def _has(source: object, part: str) -> bool:
+    try:
+        return hasattr(source, part)
+    except Exception:  # an attribute that cannot be asked for, as `data` of some arrays
+        return False
 
 
 def to_numpy(values: Any) -> NDArray[Any]:  # noqa: ANN401
