@@ -401,6 +401,12 @@ def error_of(call, arguments):
             id="negative indices",
         ),
         pytest.param(
+            lambda: ldls.segment(W.points, np.zeros((0, 60, 80), bool)),
+            ldls.InputError,
+            "^masks: expected InstanceMasks or a list of View, got ndarray",
+            id="pixels of no mask for views",
+        ),
+        pytest.param(
             lambda: stages.diffuse(np.eye(3), W.b),
             ldls.DtypeError,
             "^A: expected a sparse matrix of SciPy",

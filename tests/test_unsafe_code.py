@@ -1,4 +1,4 @@
-"""Where the Rust code may be `unsafe`: in the kernel of the sweeps and in the binding of the allocator, nowhere else."""
+"""Where the Rust code may be `unsafe`: in the kernel of the sweeps and in the binding of the allocator."""
 
 import re
 from pathlib import Path

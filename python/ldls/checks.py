@@ -254,7 +254,12 @@ def _container(origin: type, kinds: Sequence[_Kind], any_length: bool) -> _Kind:
     if origin in (list, Sequence) or (origin is tuple and any_length):
         kind = kinds[0]
         return _Kind(
-            lambda value: _is_sequence(value) and all(map(kind.accepts, value)),
+            # no array holds instances of classes, least of all one without rows
+            lambda value: (
+                _is_sequence(value)
+                and not (kind.is_noun and isinstance(value, np.ndarray))
+                and all(map(kind.accepts, value))
+            ),
             f"a list of {_plural(kind.name)}",
             is_noun=kind.is_noun,
         )

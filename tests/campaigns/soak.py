@@ -66,7 +66,7 @@ def label(number, generator):
 def break_something(number, points, masks):
     """One of several mistakes, each of which is refused."""
     mistakes = (
-        lambda: ldls.segment(points.T[:2], masks, ldls.Camera(projection=MATRIX)),
+        lambda: ldls.segment(points[:, :2], masks, ldls.Camera(projection=MATRIX)),
         lambda: ldls.segment(np.full((9, 3), 1e30), masks, ldls.Camera(projection=MATRIX)),
         lambda: ldls.Camera(projection=np.zeros((3, 3))),
         lambda: ldls.InstanceMasks.from_array(np.full((1, 4, 4), 7)),
