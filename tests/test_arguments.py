@@ -439,6 +439,30 @@ def test_an_unknown_keyword_names_the_nearest(call, wrong, near):
         call(**{wrong: 1})
 
 
+READERS = {
+    "read_points": (ldls.read_points, {"path": "none.bin", "columns": 4, "recover": False}),
+    "read_camera": (ldls.read_camera, {"path": "none.txt", "format": None, "camera": None, "image_size": None}),
+    "read_masks": (ldls.read_masks, {"path": "none.json", "image_id": None, "image_size": None, "names": None}),
+    "read_image": (ldls.read_image, {"path": "none.png"}),
+    "read_result": (ldls.read_result, {"path": "none.npz"}),
+    "save": (ldls.save, {"thing": W.result, "path": "none/none.npz"}),
+}
+READER_CASES = [
+    pytest.param(*READERS[which], name, id=f"{which} {name}") for which in READERS for name in READERS[which][1]
+]
+
+
+@pytest.mark.parametrize(("call", "arguments", "name"), READER_CASES)
+def test_nonsense_in_an_argument_of_a_reader_is_refused_or_the_file_is_missing(tmp_path, call, arguments, name):
+    there = {**arguments, "path": tmp_path / arguments["path"]}
+    assert isinstance(error_of(call, there), FileNotFoundError)
+    for nonsense in NONSENSE:
+        if name != "path" or not isinstance(nonsense, str):
+            refusal = error_of(call, {**there, name: nonsense})
+            allowed = ldls.InputError if name == "path" else (ldls.LdlsError, FileNotFoundError)
+            assert isinstance(refusal, allowed), (nonsense, refusal)
+
+
 MANY = 2**31 + 5
 
 

@@ -66,7 +66,10 @@ def _checked(callee: Checked, error: type[InputError] | None) -> Checked:
     @functools.cache
     def kinds() -> dict[str, _Kind]:
         # the names in annotations are those of the module once it is whole
-        return {name: _kind(_resolved(each.annotation, names)) for name, each in signature.parameters.items()}
+        return {
+            name: _ANYTHING if each.kind in _COLLECTING else _kind(_resolved(each.annotation, names))
+            for name, each in signature.parameters.items()
+        }
 
     @functools.wraps(callee)
     def call(*arguments: Any, **keywords: Any) -> Any:  # noqa: ANN401
@@ -188,6 +191,7 @@ class _Kind:
 
 
 _ANYTHING = _Kind(lambda value: True, "")
+_COLLECTING = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 
 
 def _resolved(annotation: object, names: dict[str, Any]) -> object:
@@ -310,7 +314,8 @@ def _bound(
     signature: inspect.Signature, callee: Callable[..., Any], arguments: Sequence[Any], keywords: Mapping[str, Any]
 ) -> dict[str, Any]:
     unknown = [word for word in keywords if word not in signature.parameters]
-    if unknown:
+    takes_all = any(each.kind is inspect.Parameter.VAR_KEYWORD for each in signature.parameters.values())
+    if unknown and not takes_all:
         near = get_close_matches(unknown[0], [name for name in signature.parameters if name != "self"], n=1, cutoff=0.5)
         known = ", ".join(name for name in signature.parameters if name not in ("self", "cls"))
         hint = f"did you mean {near[0]!r}?" if near else f"expected {known or 'none'}"
