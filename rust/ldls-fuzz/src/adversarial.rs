@@ -14,7 +14,7 @@ pub fn adversarial_clouds(count: usize) -> Vec<(&'static str, Vec<Point>)> {
     let each = |point: fn(f64) -> Point| (0..count).map(|i| point(i as f64)).collect::<Vec<_>>();
     let of_scattered = |point: fn(&Point) -> Point| scattered.iter().map(point).collect::<Vec<_>>();
     let mut ascending = scattered.clone();
-    ascending.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
+    ascending.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let descending: Vec<Point> = ascending.iter().rev().copied().collect();
     let mut outlier = scattered.clone();
     outlier[count / 2] = [9e6, -9e6, 9e6];

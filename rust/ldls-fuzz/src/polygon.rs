@@ -10,6 +10,9 @@ const FINE: f64 = 5.0;
 const FARTHEST: f64 = 1e5;
 
 /// The mask of one polygon or several.
+///
+/// # Panics
+/// If fast and slow differ.
 pub fn polygon(data: &[u8]) -> Outcome {
     let mut bytes = Bytes::new(data);
     let [height, width] = std::array::from_fn(|_| 1 + bytes.below(30));
@@ -25,7 +28,7 @@ pub fn polygon(data: &[u8]) -> Outcome {
     }
     let fits = |polygon: &Vec<f64>| {
         polygon.len() >= 6
-            && polygon.len() % 2 == 0
+            && polygon.len().is_multiple_of(2)
             && polygon.iter().all(|x| x.is_finite() && x.abs() <= FARTHEST)
     };
     let found = Rle::from_polygons(height, width, &polygons);
