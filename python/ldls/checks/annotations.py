@@ -1,14 +1,9 @@
-"""Arguments of the public face, refused by name where they are of a wrong type or shape, before any work.
-
-`checked` holds the arguments of a function or class against their annotations; arrays, whose annotations say little,
-go through `as_array` and `numbers`. What the values mean is for the callee to check.
-"""
+"""Arguments held against the annotations of functions and classes, at each call."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-import operator
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -17,14 +12,11 @@ from os import PathLike
 from typing import Any, Literal, TypeGuard, TypeVar, Union, cast, get_args, get_origin
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ldls.errors import DtypeError, InputError, LimitError, ParameterError, ShapeError
+from ldls.checks.values import is_whole, shown
+from ldls.errors import InputError, ParameterError
 
-MAX_ROWS = 2**31 - 1
-"""Most rows of an array: points and labels are numbered by 32 bits with sign."""
-LONGEST = 80
-"""Characters of a value that a message shows."""
 MAKERS = {
     "Camera": "make one with Camera(projection=..., T_camera_lidar=...), or ldls.read_camera of a file",
     "InstanceMasks": "make them with InstanceMasks.from_array, or ldls.read_masks of a file",
@@ -81,102 +73,6 @@ def _checked(callee: Checked, error: type[InputError] | None) -> Checked:
     return cast(Checked, call)
 
 
-def whole_number(
-    name: str, value: object, low: int, high: int = MAX_ROWS, error: type[InputError] = ParameterError
-) -> int:
-    """`value` as an int.
-
-    Raises:
-        ParameterError: It is no whole number from `low` to `high`; or another `error`.
-    """
-    if not _is_whole(value) or not low <= operator.index(value) <= high:  # type: ignore[arg-type]
-        raise error(f"{name}: got {shown(value)}, expected a whole number from {low} to {high}")
-    return operator.index(value)  # type: ignore[arg-type]
-
-
-def as_image_size(name: str, value: object, error: type[InputError] = ParameterError) -> tuple[int, int]:
-    """`value` as (height, width) in pixels.
-
-    Raises:
-        ParameterError: It is no pair of whole numbers from 1; or another `error`.
-    """
-    pair = tuple(value) if isinstance(value, list | tuple) else ()
-    if len(pair) != 2 or not all(_is_whole(side) and 0 < operator.index(side) <= MAX_ROWS for side in pair):
-        raise error(f"{name} is {shown(value)}, expected (height, width) in whole pixels")
-    return operator.index(pair[0]), operator.index(pair[1])
-
-
-def as_array(name: str, values: object, error: type[InputError] | None = None) -> NDArray[Any]:
-    """`values` as an array of whatever type and shape; no copy of one that is an array already.
-
-    Raises:
-        ShapeError: Rows of different lengths; `error` if given, as in all that follows.
-        DtypeError: A masked array, or what cannot be made an array.
-        LimitError: More rows than can be numbered.
-    """
-    if isinstance(values, np.ma.MaskedArray):
-        raise (error or DtypeError)(f"{name}: got a masked array; pass {name}.filled(...) with a value")
-    try:
-        array = np.asarray(values)
-    except MemoryError:
-        raise
-    except Exception as problem:  # of NumPy, or of whatever object calls itself an array
-        kind = ShapeError if "inhomogeneous" in str(problem) else DtypeError
-        raise (error or kind)(f"{name}: expected an array of numbers, got {shown(values)}; {problem}") from None
-    if array.ndim and len(array) > MAX_ROWS:
-        raise LimitError(f"{name}: {len(array)} rows exceed the limit of {MAX_ROWS}; split the input")
-    return array
-
-
-def numbers(
-    name: str,
-    values: object,
-    dtype: type[np.generic],
-    *shapes: tuple[int | str, ...],
-    error: type[InputError] | None = None,
-) -> NDArray[Any]:
-    """`values` as a C-contiguous, aligned array of `dtype` and of one of `shapes`, copied only where it must be.
-
-    Args:
-        name: What messages call them.
-        values: Anything that NumPy makes an array of.
-        dtype: A float type takes whole numbers too; an integer type those that it can hold; bool nothing else.
-        shapes: Lengths by axis; text stands for any length.
-        error: What to raise instead of the following.
-
-    Raises:
-        ShapeError: Another shape.
-        DtypeError: Text, objects, complex numbers, or real ones where whole ones are expected.
-        InputError: A whole number that `dtype` cannot hold.
-        LimitError: More rows than can be numbered.
-    """
-    array = as_array(name, values, error)
-    wanted = np.dtype(dtype)
-    if array.size == 0 and not isinstance(values, np.ndarray):
-        array = array.astype(wanted)  # lists without a number have no type of their own
-    if array.dtype.kind not in {"f": "fiu", "i": "iu", "u": "iu", "b": "b"}[wanted.kind]:
-        kind = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "bool"}[wanted.kind]
-        raise (error or DtypeError)(f"{name}: expected {kind}, got {array.dtype}; pass {name}.astype({wanted})")
-    if not any(_fits(array.shape, shape) for shape in shapes):
-        expected = " or ".join(f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})" for shape in shapes)
-        raise (error or ShapeError)(f"{name}: expected shape {expected}, got {array.shape}")
-    if wanted.kind in "iu" and array.size:
-        low, high = np.iinfo(dtype).min, np.iinfo(dtype).max  # type: ignore[type-var]
-        if not (array.min() >= low and array.max() <= high):
-            raise (error or InputError)(f"{name}: got {array.min()} to {array.max()}, expected {low} to {high}")
-    with np.errstate(over="ignore"):
-        return np.require(array, wanted, ["C", "A"])
-
-
-def shown(value: object) -> str:
-    """`value` as messages show it: short, whatever it is."""
-    try:
-        text = repr(value) if not isinstance(value, np.ndarray) else f"an array of shape {value.shape}"
-    except Exception:  # a whole number of thousands of digits, or an object that cannot say what it is
-        return f"a value of type {type(value).__name__}"
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
-
-
 class _Kind:
     """What an annotation allows.
 
@@ -205,7 +101,7 @@ def _resolved(annotation: object, names: dict[str, Any]) -> object:
 
 def _kind(hint: Any) -> _Kind:  # noqa: ANN401
     simple = {
-        int: _Kind(_is_whole, "a whole number"),
+        int: _Kind(is_whole, "a whole number"),
         float: _Kind(_is_real, "a finite number"),
         bool: _Kind(lambda value: isinstance(value, bool | np.bool_), "True or False"),
         str: _Kind(lambda value: isinstance(value, str), "text"),
@@ -282,14 +178,6 @@ def _plural(name: str) -> str:
     return f"{name.removeprefix('a ')}s" if name.startswith("a ") else name or "values"
 
 
-def _is_whole(value: object) -> bool:
-    try:
-        operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        return False
-    return not isinstance(value, bool | np.bool_ | np.ndarray)
-
-
 def _is_real(value: object) -> bool:
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
@@ -336,9 +224,3 @@ def _refused(name: str, value: object, kind: _Kind, error: type[InputError] | No
 
 def _is_list(value: object) -> TypeGuard[list[Any] | tuple[Any, ...]]:
     return isinstance(value, list | tuple)
-
-
-def _fits(found: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
-    return len(found) == len(shape) and all(
-        isinstance(want, str) or have == want for have, want in zip(found, shape, strict=True)
-    )
