@@ -51,6 +51,25 @@ pictures: ## Make the pictures of the documentation anew, by the commands beside
 kills: ## Kill 200 runs of `ldls run` and hold what they leave, resumed, against an undisturbed one.
 	python tests/campaigns/kills.py
 
+.PHONY: fuzz
+fuzz: ## Hold fast paths of the core against slow ones on many random inputs.
+	cargo run --release -p ldls-fuzz -- knn --count 10000
+	cargo run --release -p ldls-fuzz -- rle --count 1500000
+	cargo run --release -p ldls-fuzz -- polygon --count 100000
+	cargo run --release -p ldls-fuzz -- diffusion --count 5000
+
+.PHONY: fuzz-face
+fuzz-face: ## Try the Python face on thousands of arrays, cameras and parameters at random.
+	pytest --hypothesis-profile=fuzz -n auto --dist=load tests/test_face.py
+
+.PHONY: same-bits
+same-bits: ## Label 50 scenes with 1 to 16 threads, 20 times each, and compare every bit.
+	python tests/campaigns/same_bits.py
+
+.PHONY: soak
+soak: ## Label 20,000 frames in one process and tell by how much its memory grows.
+	python tests/campaigns/soak.py
+
 .PHONY: sample
 sample: ## Make the frame of `ldls demo` anew, from its seed.
 	python tests/simulation/make_sample.py

@@ -13,6 +13,8 @@ from ldls.cli import app
 
 # the same examples in every run, and no clock: a loaded machine is no fault of the code
 settings.register_profile("tests", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+# other examples in every run, and many
+settings.register_profile("fuzz", settings.get_profile("tests"), derandomize=False, max_examples=5_000)
 settings.load_profile("tests")
 
 KITTI_FRAMES = ("000000", "000001", "000002", "000003", "000571")

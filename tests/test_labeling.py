@@ -15,8 +15,10 @@ from ldls.evaluation import ClassSet, Labeling
         pytest.param({"instances": [0, 2**31]}, InputError, "expected 0 to 2147483647", id="instance too high"),
         pytest.param({"classes": [0.0, 1.0]}, DtypeError, "classes: expected whole numbers", id="float classes"),
         pytest.param({"ignored": [0, 1]}, DtypeError, "ignored: expected bool, got int64", id="ignored numbers"),
-        pytest.param({"instances": [0]}, ShapeError, r"instances: expected \(2,\), got \(1,\)", id="length"),
-        pytest.param({"classes": [[0], [1]]}, ShapeError, r"classes: expected \(2,\), got \(2, 1\)", id="two axes"),
+        pytest.param({"instances": [0]}, ShapeError, r"instances: expected shape \(2,\), got \(1,\)", id="length"),
+        pytest.param(
+            {"classes": [[0], [1]]}, ShapeError, r"classes: expected shape \(2,\), got \(2, 1\)", id="two axes"
+        ),
         pytest.param({"names": ("Car", "background", "x")}, InputError, "'background' first", id="no background"),
         pytest.param({"names": ("background", "Car", "Car")}, InputError, "every name once", id="double name"),
     ],
@@ -38,7 +40,7 @@ def test_it_holds_int32_and_counts_what_is_not_ignored():
 def test_restricted_ignores_the_others_too():
     found = labeling([0, 1, 1], ignored=[0]).restricted(np.array([True, True, False]))
     assert found.ignored.tolist() == [True, False, True]
-    with pytest.raises(ShapeError, match=r"keep: expected \(3,\)"):
+    with pytest.raises(ShapeError, match=r"keep: expected shape \(3,\)"):
         found.restricted(np.array([True]))
     with pytest.raises(DtypeError, match="keep: expected bool"):
         found.restricted(np.array([0, 1, 1]))

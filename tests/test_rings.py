@@ -87,7 +87,7 @@ def test_streams_and_files_take_rings(tmp_path):
     ("call", "error", "message"),
     [
         pytest.param(lambda v: ldls.segment(WALL, v, camera(20)), ldls.InputError, "None beside views", id="camera"),
-        pytest.param(lambda v: ldls.segment(WALL, [*v, 3]), ldls.InputError, "got int in it", id="no view"),
+        pytest.param(lambda v: ldls.segment(WALL, [*v, 3]), ldls.InputError, "got int in a list", id="no view"),
         pytest.param(lambda v: ldls.segment(WALL, v, same_object=0), ldls.ParameterError, "same_object", id="bound"),
         pytest.param(
             lambda v: ldls.LabelDiffusion([camera(20)]).segment(WALL, [x.masks for x in v]),

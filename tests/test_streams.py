@@ -35,7 +35,7 @@ def test_a_stream_takes_the_arguments_of_segment_and_refuses_the_same(small_scen
     points[0, 0] = np.nan
     with pytest.raises(ldls.NonFiniteError, match="row 0"):
         stream.segment(points, masks, nonfinite="raise")
-    with pytest.raises(ldls.InputError, match="camera: expected Camera, got dict"):
+    with pytest.raises(ldls.InputError, match="camera: expected Camera or a list of Camera, got dict"):
         ldls.LabelDiffusion({})
     with pytest.raises(ldls.ParameterError, match="params: expected Params, got int"):
         ldls.LabelDiffusion(camera, 3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ldls.checks import as_array
 from ldls.errors import DtypeError, ShapeError
 
 MAX_COLUMNS = 64
@@ -24,10 +25,9 @@ def as_points(points: ArrayLike) -> Points:
     Raises:
         DtypeError: The values are not float32 or float64, or are masked.
         ShapeError: The array is not (N, >= 3).
+        LimitError: More rows than labels can be numbered for; before any copy.
     """
-    if isinstance(points, np.ma.MaskedArray):
-        raise DtypeError("points: got a masked array; pass points.filled(numpy.nan)")
-    array = np.asarray(points)
+    array = as_array("points", points)
     if array.dtype.kind != "f" or array.dtype.itemsize not in (4, 8):
         fix = "a plain array of rows" if array.dtype.kind in "OV" else "points.astype(numpy.float32)"
         raise DtypeError(f"points: expected float32 or float64, got {array.dtype}; pass {fix}")

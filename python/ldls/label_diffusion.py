@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
 from ldls.camera import Camera
+from ldls.checks import checked
 from ldls.cloud import Points, as_points
 from ldls.errors import (
     DuplicateWarning,
@@ -24,7 +25,7 @@ from ldls.errors import (
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Instance, Report, Segmentation
-from ldls.view import SeenView, View, check_camera
+from ldls.view import SeenView, View
 
 COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
@@ -34,6 +35,7 @@ SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
 
+@checked
 def segment(
     points: ArrayLike,
     masks: InstanceMasks | Sequence[View],
@@ -86,6 +88,7 @@ class LabelDiffusion:
         ...     labels = diffusion.segment(points, masks).labels
     """
 
+    @checked
     def __init__(self, camera: Camera | Sequence[Camera] = (), params: Params | None = None) -> None:
         """Prepare for the images of a camera or of several; the parameters are the best known by default.
 
@@ -95,14 +98,11 @@ class LabelDiffusion:
             InputError: `camera` or `params` is of another type.
         """
         cameras = tuple(camera) if isinstance(camera, Sequence) else (camera,)
-        for one in cameras:
-            check_camera(one)
-        if params is not None and not isinstance(params, Params):
-            raise ParameterError(f"params: expected Params, got {type(params).__name__}")
         self.camera = camera
         self._cameras = cameras
         self.params = params or Params()
 
+    @checked
     def segment(
         self,
         points: ArrayLike,
@@ -130,16 +130,15 @@ class LabelDiffusion:
         return f"LabelDiffusion({self.camera!r}, {self.params!r})"
 
 
-def _views(masks: object, camera: Camera | None) -> tuple[View, ...]:
-    if isinstance(masks, Sequence):
+def _views(masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View], camera: Camera | None) -> tuple[View, ...]:
+    if not isinstance(masks, InstanceMasks):
         if camera is not None:
             raise InputError("camera: expected None beside views, which have cameras of their own")
         for view in masks:
             if not isinstance(view, View):
                 raise InputError(f"masks: expected InstanceMasks or a list of View, got {type(view).__name__} in it")
         return tuple(view for view in masks if isinstance(view, View))
-    check_camera(camera)
-    # a View refuses what is no InstanceMasks
+    # a View refuses what is no camera
     return (View(masks, camera),)  # type: ignore[arg-type]
 
 
@@ -152,7 +151,8 @@ def _segment(
     same_object: float,
 ) -> Segmentation:
     cloud = as_points(points)
-    _check_nonfinite(cloud, nonfinite)
+    if nonfinite == "raise":
+        _check_finite(cloud)
     if not 0 < same_object <= 1:
         raise ParameterError(f"same_object: got {same_object!r}, expected more than 0 and at most 1")
     arrays = _ldls.segment(
@@ -211,11 +211,7 @@ def _seen(
     )
 
 
-def _check_nonfinite(cloud: Points, nonfinite: str) -> None:
-    if nonfinite == "drop":
-        return
-    if nonfinite != "raise":
-        raise ParameterError(f"nonfinite: got {nonfinite!r}, expected 'drop' or 'raise'")
+def _check_finite(cloud: Points) -> None:
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(cloud[:, :3]).all(axis=1))
     if not finite.all():
         raise NonFiniteError(
@@ -243,8 +239,8 @@ def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
 
 
 def _warning(message: str, category: type[Warning]) -> None:
-    # the warning names the line that calls segment, four calls up
-    warnings.warn(message, category, stacklevel=5)
+    # the warning names the line that calls segment, five calls up
+    warnings.warn(message, category, stacklevel=6)
 
 
 def _report(arrays: _ldls.SegmentationArrays, views: tuple[View, ...], instances: tuple[Instance, ...]) -> Report:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls.errors import DtypeError, InputError, ShapeError
-
-if TYPE_CHECKING:
-    from ldls.segmentation import Segmentation
+from ldls.checks import as_array, checked, numbers, shown
+from ldls.errors import InputError, ShapeError
+from ldls.segmentation import Segmentation
 
 BACKGROUND = "background"
 MAX_LABEL = 2**31 - 1
+MOST_CODES = 65_535
+"""Largest class number of a data set: they have 16 bits."""
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Labeling:
     """Class and instance of each of N points.
@@ -46,16 +48,16 @@ class Labeling:
         if names[:1] != (BACKGROUND,) or len(set(names)) != len(names):
             raise InputError(f"names: got {names}, expected 'background' first and every name once")
         object.__setattr__(self, "names", names)
-        length = np.shape(self.classes)
+        count = len(as_array("classes", self.classes).ravel())
         for name, highest in (("classes", len(names) - 1), ("instances", MAX_LABEL)):
-            object.__setattr__(self, name, _whole_numbers(name, getattr(self, name), length, highest))
-        ignored = np.asarray(self.ignored)
-        _check_shape("ignored", ignored, length)
-        if ignored.dtype != np.bool_:
-            raise DtypeError(f"ignored: expected bool, got {ignored.dtype}")
-        object.__setattr__(self, "ignored", ignored)
+            values = numbers(name, getattr(self, name), np.int64, (count,))
+            if count and not (values.min() >= 0 and values.max() <= highest):
+                raise InputError(f"{name}: got {values.min()} to {values.max()}, expected 0 to {highest}")
+            object.__setattr__(self, name, values.astype(np.int32))
+        object.__setattr__(self, "ignored", numbers("ignored", self.ignored, np.bool_, (count,)))
 
     @classmethod
+    @checked
     def from_codes(
         cls, codes: NDArray[Any], table: Mapping[int, str], *, instances: NDArray[Any] | None = None
     ) -> Self:
@@ -64,6 +66,11 @@ class Labeling:
         Raises:
             InputError: A number has no name; the message names the point.
         """
+        if not table or not all(0 <= number <= MOST_CODES for number in table):
+            raise InputError(f"table: got {shown(table)}, expected names of class numbers from 0 to {MOST_CODES}")
+        codes = as_array("codes", codes)
+        if codes.ndim != 1 or codes.dtype.kind not in "iuf":  # whole numbers, which some data sets keep as floats
+            raise ShapeError(f"codes: expected (N,) whole numbers, got {codes.dtype} {codes.shape}")
         names = (BACKGROUND, *(name for name in table.values() if name != BACKGROUND))
         lookup = np.full(max(table) + 2, -1, np.int32)
         lookup[list(table)] = [names.index(name) for name in table.values()]
@@ -77,11 +84,13 @@ class Labeling:
         return cls(classes, none if instances is None else instances, none.astype(bool), names)
 
     @classmethod
+    @checked
     def from_segmentation(cls, result: Segmentation) -> Self:
         """Labels of a segmentation, its instances by their masks; points out of view are ignored."""
         return cls.from_instance_labels(result.labels, [instance.name for instance in result.instances])
 
     @classmethod
+    @checked
     def from_instance_labels(cls, labels: NDArray[np.signedinteger], class_names: Iterable[str]) -> Self:
         """Labels of points by instance, (N,): -1 ignored, 0 background, m of class `class_names[m - 1]`.
 
@@ -89,6 +98,7 @@ class Labeling:
             InputError: A label has no name.
         """
         objects = [str(name) for name in class_names]
+        labels = numbers("labels", labels, np.int32, ("N",))
         if labels.size and not (labels.min() >= -1 and labels.max() <= len(objects)):
             raise InputError(f"labels: got {labels.min()} to {labels.max()}, expected -1 to {len(objects)}")
         names = tuple(dict.fromkeys([BACKGROUND, *objects]))
@@ -108,25 +118,8 @@ class Labeling:
         numbers = np.bincount(self.classes[~self.ignored], minlength=len(self.names))
         return dict(zip(self.names, numbers.tolist(), strict=True))
 
+    @checked
     def restricted(self, keep: ArrayLike) -> Labeling:
         """This labeling with every point outside `keep`, (N,) bool, ignored as well."""
-        inside = np.asarray(keep)
-        _check_shape("keep", inside, self.classes.shape)
-        if inside.dtype != np.bool_:
-            raise DtypeError(f"keep: expected bool, got {inside.dtype}")
+        inside = numbers("keep", keep, np.bool_, self.classes.shape)
         return replace(self, ignored=self.ignored | ~inside)
-
-
-def _whole_numbers(name: str, values: ArrayLike, shape: tuple[int, ...], highest: int) -> NDArray[np.int32]:
-    array = np.asarray(values)
-    _check_shape(name, array, shape)
-    if array.dtype.kind not in "iu":
-        raise DtypeError(f"{name}: expected whole numbers, got {array.dtype}; pass {name}.astype(numpy.int32)")
-    if array.size and not (array.min() >= 0 and array.max() <= highest):
-        raise InputError(f"{name}: got {array.min()} to {array.max()}, expected 0 to {highest}")
-    return array.astype(np.int32, copy=False)
-
-
-def _check_shape(name: str, array: NDArray[Any], expected: tuple[int, ...]) -> None:
-    if array.ndim != 1 or array.shape != expected:
-        raise ShapeError(f"{name}: expected ({expected[0] if expected else 'N'},), got {array.shape}; one a point")

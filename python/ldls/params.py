@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import operator
 from dataclasses import dataclass, fields
-from numbers import Real
 
 import ldls._ldls as _ldls
-from ldls.errors import ParameterError
+from ldls.checks import checked, whole_number
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class Params:
     """Parameters of the method; the defaults are the best known, for any lidar. Checked when made.
@@ -69,18 +68,13 @@ class Params:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value, kind = getattr(self, field.name), str(field.type)
-            if value is None and "None" in kind:
-                continue
-            if kind.startswith("int"):
-                check_whole_number(field.name, value)
-            elif kind == "float":
-                _number(field.name, value)
-            elif not isinstance(value, bool):
-                raise ParameterError(f"{field.name}: got {value!r}, expected a bool")
+            value = getattr(self, field.name)
+            if str(field.type).startswith("int") and value is not None:
+                whole_number(field.name, value, 0)
         _ldls.check_params(self)
 
     @classmethod
+    @checked
     def paper(cls, *, threads: int | None = None) -> Params:
         """The parameters of Wang et al. 2019, with nothing added to the method."""
         return cls(
@@ -96,26 +90,3 @@ class Params:
             calibrated=False,
             threads=threads,
         )
-
-
-def check_whole_number(name: str, value: object) -> None:
-    """Refuse what is no whole number from 0 to 2^31 - 1.
-
-    Raises:
-        ParameterError: `value` is another one, or of another type; bool counts as such.
-    """
-    try:
-        number = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise ParameterError(f"{name}: got {value!r}, expected a whole number") from None
-    if isinstance(value, bool) or not 0 <= number < 2**31:
-        raise ParameterError(f"{name}: got {value!r}, expected a whole number in range")
-
-
-def _number(name: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise ParameterError(f"{name}: got {value!r}, expected a number")
-    try:
-        float(value)
-    except OverflowError:
-        raise ParameterError(f"{name}: got a number of {len(str(value))} digits, expected a finite one") from None

@@ -27,10 +27,11 @@ from numpy.typing import ArrayLike, NDArray
 import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.camera import Camera
+from ldls.checks import as_image_size, checked, numbers, shown, whole_number
 from ldls.cloud import as_points
-from ldls.errors import DtypeError, InputError, NonFiniteError, ParameterError, ShapeError
+from ldls.errors import DtypeError, InputError, NonFiniteError, ShapeError
 from ldls.masks import InstanceMasks
-from ldls.params import Params, check_whole_number
+from ldls.params import Params
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -53,6 +54,7 @@ class PixelLabels:
     mass: NDArray[np.float32]
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class DepthGroups:
     """The object of each of M masks among n points in view, by distance to the camera.
@@ -68,6 +70,14 @@ class DepthGroups:
     intervals: NDArray[np.float64]
     distances: NDArray[np.float64]
     unsure: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for name, dtype, shape in (
+            ("intervals", np.float64, ("M", 2)),
+            ("distances", np.float64, ("n",)),
+            ("unsure", np.bool_, ("n",)),
+        ):
+            object.__setattr__(self, name, numbers(name, getattr(self, name), dtype, shape))
 
     @property
     def core(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
@@ -88,6 +98,7 @@ class DepthGroups:
         return behind
 
 
+@checked
 def project(
     points: ArrayLike,
     camera: Camera,
@@ -105,15 +116,17 @@ def project(
         keep_origin: Whether points at exactly (0, 0, 0) are more than missing returns.
         threads: As in `Params`.
     """
+    Params(threads=threads)
     return _ldls.project(
         as_points(points),
         camera.core,
-        *image_size,
+        *as_image_size("image_size", image_size),
         keep_origin,
         threads,
     )
 
 
+@checked
 def ground(
     points: ArrayLike, camera: Camera, *, local_ground: bool = _BEST.local_ground, threads: int | None = None
 ) -> NDArray[np.float64]:
@@ -130,9 +143,11 @@ def ground(
         local_ground: As in `Params`.
         threads: As in `Params`.
     """
+    Params(threads=threads)
     return _ldls.ground(_finite_xyz(points), camera.core, local_ground, threads)
 
 
+@checked
 def depth_groups(
     points: ArrayLike,
     pixels: ArrayLike,
@@ -158,14 +173,14 @@ def depth_groups(
         edge_margin: As in `Params`.
         threads: As in `Params`.
     """
-    xyz, uv = _finite_xyz(points), np.ascontiguousarray(pixels, np.float64)
-    above = _per_point("heights", heights, len(xyz), np.float64)
-    if uv.shape != (len(xyz), 2):
-        raise ShapeError(f"pixels: expected ({len(xyz)}, 2), one for each point, got shape {uv.shape}")
+    xyz = _finite_xyz(points)
+    uv = numbers("pixels", pixels, np.float64, (len(xyz), 2))
+    above = numbers("heights", heights, np.float64, (len(xyz),))
     params = Params(depth_gap=depth_gap, bridged_gap=bridged_gap, edge_margin=edge_margin, threads=threads)
     return DepthGroups(*_ldls.depth_groups(xyz, uv, masks.core, camera.core, above, params))
 
 
+@checked
 def neighbors(
     points: ArrayLike, k: int = _BEST.neighbors, *, threads: int | None = None
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
@@ -178,10 +193,11 @@ def neighbors(
         k: Neighbours wanted.
         threads: As in `Params`.
     """
-    Params(neighbors=k)
+    Params(neighbors=k, threads=threads)
     return _ldls.neighbors(_finite_xyz(points), k, threads)
 
 
+@checked
 def point_graph(
     points: ArrayLike,
     indices: ArrayLike,
@@ -203,17 +219,16 @@ def point_graph(
         ground_edges: As in `Params`.
         threads: As in `Params`.
     """
-    Params(sigma=sigma, ground_edges=ground_edges)
-    columns = np.ascontiguousarray(indices, np.uint32)
-    if columns.ndim != 2:
-        raise ShapeError(f"indices: expected (n, k), got shape {columns.shape}")
+    Params(sigma=sigma, ground_edges=ground_edges, threads=threads)
     xyz, on_ground = _finite_xyz(points), None
+    columns = numbers("indices", indices, np.uint32, (len(xyz), "k"))
     if heights is not None:
-        above = _per_point("heights", heights, len(xyz), np.float64)
+        above = numbers("heights", heights, np.float64, (len(xyz),))
         on_ground = (above > GROUND_M[0]) & (above < GROUND_M[1])
     return _csr(_ldls.point_graph(xyz, columns, sigma, on_ground, ground_edges, threads), len(columns))
 
 
+@checked
 def pixel_labels(
     pixels: ArrayLike,
     masks: InstanceMasks,
@@ -228,21 +243,25 @@ def pixel_labels(
     With `depths`, a mask labels points at the distance of its object only, and background pixels those that masks are
     sure of; the weight of other edges counts in the mass alone.
     """
-    Params(window=window, pixel_weight=pixel_weight)
-    uv = np.ascontiguousarray(pixels, np.float64)
+    Params(window=window, pixel_weight=pixel_weight, threads=threads)
+    uv = numbers("pixels", pixels, np.float64, ("n", 2))
     groups = None if depths is None else _checked(depths, len(uv), len(masks))
     weights, mass = _ldls.pixel_labels(uv, masks.core, window, pixel_weight, groups, threads)
     return PixelLabels(_csr(weights, len(masks) + 1), mass)
 
 
+@checked
 def direct_labels(pixels: ArrayLike, masks: InstanceMasks) -> NDArray[np.int32]:
     """Direct projection: the label (n,) of the pixel nearest to each of `pixels` (n, 2); of several, the first."""
-    return _ldls.direct_labels(np.ascontiguousarray(pixels, np.float64), masks.core)
+    return _ldls.direct_labels(numbers("pixels", pixels, np.float64, ("n", 2)), masks.core)
 
 
+@checked
 def normalize_rows(graph: csr_array, labels: PixelLabels) -> tuple[csr_array, csr_array]:
     """A (n, n) and b (n, M + 1): point and pixel edges over the sum of both, row by row (step 4)."""
-    a, (b, _) = _ldls.normalize_rows(_arrays(graph), _arrays(labels.weights), labels.mass)
+    edges, weights = _arrays("graph", graph), _arrays("labels", labels.weights)
+    mass = numbers("labels.mass", labels.mass, np.float32, ("n",))
+    a, (b, _) = _ldls.normalize_rows(edges, weights, mass)
     return _csr(a, graph.shape[1]), _csr(b, labels.weights.shape[1])
 
 
@@ -268,6 +287,7 @@ def diffuse(
 ) -> Iterator[NDArray[np.float32]]: ...
 
 
+@checked
 def diffuse(
     A: csr_array,
     b: csr_array,
@@ -292,15 +312,14 @@ def diffuse(
         threads: As in `Params`. Results do not depend on it.
     """
     Params(iterations=iterations, threads=threads)
+    edges, seeds = _arrays("A", A), _arrays("b", b)
     if every is None:
         # the pixel edges of a point weigh what its point edges leave
         mass = np.maximum(1.0 - A.astype(np.float64).sum(axis=1), 0.0).astype(np.float32)
-        z, _, _ = _ldls.diffuse(_arrays(A), _arrays(b), mass, b.shape[1], iterations, threads)
+        z, _, _ = _ldls.diffuse(edges, seeds, mass, b.shape[1], iterations, threads)
         return z
-    check_whole_number("every", every)
-    if every < 1:
-        raise ParameterError(f"every: got {every!r}, expected 1 or more products from one array to the next")
-    products = _ldls.Products(_arrays(A), _arrays(b), b.shape[1], iterations)
+    every = whole_number("every", every, 1)
+    products = _ldls.Products(edges, seeds, b.shape[1], iterations)
     return _as_it_happens(products, every, threads)
 
 
@@ -309,6 +328,7 @@ def _as_it_happens(products: _ldls.Products, every: int, threads: int | None) ->
         yield products.advance(every, threads)
 
 
+@checked
 def remove_outliers(
     graph: csr_array,
     labels: ArrayLike,
@@ -328,23 +348,23 @@ def remove_outliers(
         part_size: As in `Params`; its default with `depths`, 1 without.
         ground_clearance: As in `Params`.
     """
-    array = np.asarray(labels)
-    if array.dtype.kind not in "iu" or array.ndim != 1:
-        raise DtypeError(f"labels: expected (n,) whole numbers, got {array.dtype} {array.shape}")
-    if array.size and array.min() < 0:
-        raise InputError("labels: expected 0 or more; pass the points in view only")
+    array = numbers("labels", labels, np.int64, ("n",))
+    if array.size and not 0 <= array.min() <= array.max() < 2**31:
+        found = f"{array.min()} to {array.max()}"
+        raise InputError(f"labels: got {found}, expected 0 or more; pass the points in view only")
     groups, least = None, 1.0
     if depths is not None:
         groups, least = _checked(depths, len(array), int(array.max(initial=0))), _BEST.part_size
     size = least if part_size is None else part_size
     Params(part_size=size, ground_clearance=ground_clearance)
-    kept = _ldls.remove_outliers(_arrays(graph), np.ascontiguousarray(array, np.uint32), size, groups)
+    kept = _ldls.remove_outliers(_arrays("graph", graph), array.astype(np.uint32), size, groups)
     if heights is None:
         return kept
-    above = _per_point("heights", heights, len(kept), np.float64)
+    above = numbers("heights", heights, np.float64, (len(kept),))
     return _ldls.clear_ground(kept.astype(np.uint32), above, ground_clearance)
 
 
+@checked
 def confidence(z: ArrayLike, labels: ArrayLike, masks: InstanceMasks) -> NDArray[np.float32]:
     """Probability (n,) that each label is of the right class, as fitted on simulated frames.
 
@@ -353,10 +373,10 @@ def confidence(z: ArrayLike, labels: ArrayLike, masks: InstanceMasks) -> NDArray
         labels: (n,) of `remove_outliers`, 0 to M.
         masks: The M masks, for their scores.
     """
-    likelihoods = np.asarray(z, np.float32)
-    kept = _per_point("labels", labels, len(likelihoods), np.uint32)
-    if likelihoods.ndim != 2 or likelihoods.shape[1] != len(masks) + 1 or kept.max(initial=0) > len(masks):
-        raise ShapeError(f"z: expected (n, {len(masks) + 1}) and labels up to {len(masks)}, got {likelihoods.shape}")
+    likelihoods = numbers("z", z, np.float32, ("n", len(masks) + 1))
+    kept = numbers("labels", labels, np.uint32, (len(likelihoods),))
+    if kept.max(initial=0) > len(masks):
+        raise InputError(f"labels: got {kept.max()}, expected 0 to {len(masks)}")
     total = likelihoods.sum(axis=1)
     best = likelihoods.max(axis=1, initial=0)
     shares = np.divide(best, total, out=np.zeros_like(best), where=total > 0)
@@ -373,13 +393,6 @@ def _checked(depths: DepthGroups, points: int, masks: int) -> tuple[Any, Any, An
     return depths.core
 
 
-def _per_point(name: str, values: ArrayLike, points: int, dtype: type) -> NDArray[Any]:
-    array: NDArray[Any] = np.ascontiguousarray(values, dtype)
-    if array.shape != (points,):
-        raise ShapeError(f"{name}: expected ({points},), one for each point, got shape {array.shape}")
-    return array
-
-
 def _finite_xyz(points: ArrayLike) -> NDArray[np.float64]:
     xyz = np.ascontiguousarray(as_points(points)[:, :3], np.float64)
     if not np.isfinite(xyz).all():
@@ -394,9 +407,11 @@ def _csr(arrays: tuple[Any, Any, Any], columns: int) -> csr_array:
     return sparse.csr_array((values, indices, offsets), shape=shape)
 
 
-def _arrays(
-    matrix: csr_array,
-) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]:
+def _arrays(name: str, matrix: csr_array) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]]:
+    if not require("scipy.sparse", "eval").issparse(matrix):
+        raise DtypeError(f"{name}: expected a sparse matrix of SciPy, got {shown(matrix)}")
+    if matrix.ndim != 2 or matrix.dtype.kind not in "fiu":
+        raise ShapeError(f"{name}: expected a sparse matrix of numbers, got {matrix.dtype} {matrix.shape}")
     csr = matrix.tocsr()
     return (
         np.ascontiguousarray(csr.indptr, np.int64),

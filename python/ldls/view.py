@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
-from ldls.errors import InputError, MaskError
+from ldls.checks import checked
+from ldls.errors import MaskError
 from ldls.masks import InstanceMasks
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class View:
     """Instance masks of an image, and the camera that took it.
@@ -32,12 +34,6 @@ class View:
     name: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.masks, InstanceMasks):
-            raise InputError(
-                f"masks: expected InstanceMasks, got {type(self.masks).__name__}; "
-                "make them with InstanceMasks.from_array, or ldls.read_masks of a file"
-            )
-        check_camera(self.camera)
         expected, size = self.camera.image_size, self.masks.image_size
         if expected is not None and size != tuple(expected):
             hint = "; swapped?" if size == tuple(expected)[::-1] else ""
@@ -64,16 +60,3 @@ class SeenView:
 def camera_names(views: Sequence[SeenView]) -> tuple[str, ...]:
     """Name of each view: its own, or "camera 0", "camera 1" and so on where it has none."""
     return tuple(seen.view.name or f"camera {number}" for number, seen in enumerate(views))
-
-
-def check_camera(camera: object) -> None:
-    """Refuse what is no camera.
-
-    Raises:
-        InputError: It is of another type.
-    """
-    if not isinstance(camera, Camera):
-        raise InputError(
-            f"camera: expected Camera, got {type(camera).__name__}; "
-            "make one with Camera(projection=..., T_camera_lidar=...), or ldls.read_camera of a file"
-        )

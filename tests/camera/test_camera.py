@@ -88,7 +88,7 @@ def test_a_missing_calibration_stays_file_not_found(tmp_path):
     ("arguments", "message"),
     [
         pytest.param({"projection": np.eye(4)}, "projection: expected shape", id="shape"),
-        pytest.param({"projection": "abc"}, "projection: expected an array", id="text"),
+        pytest.param({"projection": "abc"}, "projection: expected numbers, got <U", id="text"),
         pytest.param({"projection": np.zeros((3, 3))}, "rank below 3", id="zeros"),
         pytest.param({"projection": np.eye(3), "T_camera_lidar": np.eye(3)}, "T_camera_lidar: exp", id="3x3"),
         pytest.param(

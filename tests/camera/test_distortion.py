@@ -77,7 +77,7 @@ def test_models_have_many_names(model, coefficients, known_as):
         pytest.param("omni", (1, 2), "'omni' is unknown, expected one of none, plumb_bob", id="unknown"),
         pytest.param("plumb_bob", (1, 2, 3), "plumb_bob has 4 or 5 coefficients, got 3", id="three"),
         pytest.param("equidistant", (1, 2, 3, np.nan), "finite", id="NaN"),
-        pytest.param("equidistant", ("a",), "expected numbers", id="text"),
+        pytest.param("equidistant", ("a",), "expected a list of finite numbers", id="text"),
         pytest.param("rational_polynomial", (0.1,) * 14, "8 coefficients, got 14", id="thin prism"),
     ],
 )

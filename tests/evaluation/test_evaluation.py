@@ -64,7 +64,7 @@ def test_objects_have_a_range_and_an_iou():
 def test_errors_name_the_frame():
     with pytest.raises(ShapeError, match="frame a: prediction has 1 points, truth 4"):
         pair(prediction=labeling([1]))
-    with pytest.raises(ShapeError, match=r"frame a: ranges_m has shape \(3,\), expected \(4,\)"):
+    with pytest.raises(ShapeError, match=r"frame a: ranges_m: expected shape \(4,\), got \(3,\)"):
         pair(ranges_m=np.zeros(3))
     with pytest.raises(InputError, match="frame a: max_range_m needs the points' ranges_m"):
         evaluate([pair()], classes=CLASSES, max_range_m=10)

@@ -115,5 +115,5 @@ def test_a_confidence_is_from_0_to_1(wrong):
 
 
 def test_a_confidence_is_told_for_each_point():
-    with pytest.raises(ShapeError, match=r"frame a: confidence has shape \(1,\), expected \(2,\)"):
+    with pytest.raises(ShapeError, match=r"frame a: confidence: expected shape \(2,\), got \(1,\)"):
         Pair("a", labeling([0, 1]), labeling([0, 1]), confidence=np.array([0.5]))

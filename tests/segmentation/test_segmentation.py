@@ -167,7 +167,7 @@ def test_points_that_cannot_be_used_are_refused(small_scene, points, error, mess
 
 def test_other_arguments_are_refused_by_name(small_scene):
     points, masks, camera = small_scene
-    with pytest.raises(ldls.InputError, match="^masks: expected InstanceMasks, got ndarray"):
+    with pytest.raises(ldls.InputError, match="^masks: expected InstanceMasks or a list of View, got ndarray"):
         ldls.segment(points, masks.to_array(), camera)
     with pytest.raises(ldls.InputError, match="^camera: expected Camera, got ndarray"):
         ldls.segment(points, masks, camera.projection)

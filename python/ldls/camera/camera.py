@@ -13,6 +13,7 @@ import ldls._ldls as _ldls
 from ldls.camera import camera_info, nuscenes
 from ldls.camera.distortion import Distortion
 from ldls.camera.rigid import as_matrix, as_transform, from_parts
+from ldls.checks import as_image_size, checked_as
 from ldls.errors import CalibrationError, within
 
 
@@ -20,6 +21,7 @@ def _identity() -> NDArray[np.float64]:
     return np.eye(4)
 
 
+@checked_as(CalibrationError)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Camera:
     """A camera: a rigid transform from the lidar, the distortion of the lens if any, then a projection to pixels.
@@ -53,6 +55,8 @@ class Camera:
         for name, matrix in (("projection", projection), ("T_camera_lidar", transform)):
             matrix.flags.writeable = False
             object.__setattr__(self, name, matrix)
+        if self.image_size is not None:
+            object.__setattr__(self, "image_size", as_image_size("image_size", self.image_size, CalibrationError))
         if not self.distortion.is_none and projection[:, 3].any():
             raise CalibrationError(
                 f"projection: the last column is {projection[:, 3].tolist()}, expected zeros beside a distortion; pass "
@@ -76,6 +80,7 @@ class Camera:
         object.__setattr__(self, "core", self._core())
 
     @classmethod
+    @checked_as(CalibrationError)
     def from_opencv(
         cls,
         K: ArrayLike,
@@ -108,6 +113,7 @@ class Camera:
         )
 
     @classmethod
+    @checked_as(CalibrationError)
     def from_camera_info(cls, message: object, T_camera_lidar: ArrayLike, *, rectified: bool = False) -> Self:
         """Camera of a CameraInfo message of ROS 1 or ROS 2, with its region of interest and binning.
 
@@ -127,6 +133,7 @@ class Camera:
             return cls(**arguments)
 
     @classmethod
+    @checked_as(CalibrationError)
     def from_nuscenes(
         cls,
         calibrated_camera: Mapping[str, Any],

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ldls.checks import as_array, checked_as, numbers
 from ldls.errors import CalibrationError
 
 MODELS: dict[str, tuple[int, ...]] = {
@@ -25,6 +26,7 @@ SPELLINGS = {
 """Names that Kalibr, OpenCV and others give to the models of ROS."""
 
 
+@checked_as(CalibrationError)
 @dataclass(frozen=True)
 class Distortion:
     """Lens distortion by the models of ROS and OpenCV.
@@ -44,7 +46,7 @@ class Distortion:
 
     def __post_init__(self) -> None:
         model = SPELLINGS.get(self.model.strip().lower(), self.model.strip().lower())
-        values = _numbers(self.coefficients)
+        values = _finite(self.coefficients)
         if model not in MODELS:
             raise CalibrationError(
                 f"distortion: model {self.model!r} is unknown, expected one of {', '.join(MODELS)}; undistort the "
@@ -64,9 +66,10 @@ class Distortion:
         object.__setattr__(self, "coefficients", values if model != "none" else ())
 
     @classmethod
+    @checked_as(CalibrationError)
     def from_opencv(cls, coefficients: ArrayLike, *, fisheye: bool = False) -> Self:
         """Distortion from OpenCV's `distCoeffs` of 4, 5 or 8 numbers, or the 4 of `cv2.fisheye`."""
-        values = tuple(np.asarray(coefficients, np.float64).ravel().tolist())
+        values = _finite(coefficients)
         rational = len(values) >= MODELS["rational_polynomial"][0]
         return cls("equidistant" if fisheye else "rational_polynomial" if rational else "plumb_bob", values)
 
@@ -84,11 +87,9 @@ class Distortion:
         return "rational", np.concatenate([self.coefficients, np.zeros(8 - len(self.coefficients))])
 
 
-def _numbers(values: tuple[float, ...]) -> tuple[float, ...]:
-    try:
-        numbers = tuple(float(value) for value in values)
-    except (TypeError, ValueError):
-        raise CalibrationError(f"distortion: expected numbers, got {values!r}") from None
-    if not np.isfinite(numbers).all():
-        raise CalibrationError(f"distortion: expected finite coefficients, got {numbers}")
-    return numbers
+def _finite(coefficients: ArrayLike) -> tuple[float, ...]:
+    values = as_array("distortion", coefficients, CalibrationError).ravel()
+    values = numbers("distortion", values, np.float64, ("n",), error=CalibrationError)
+    if not np.isfinite(values).all():
+        raise CalibrationError(f"distortion: expected finite coefficients, got {tuple(values.tolist())}")
+    return tuple(values.tolist())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ldls.checks import numbers
 from ldls.errors import CalibrationError
 
 Matrix = NDArray[np.float64]
@@ -28,14 +29,8 @@ def as_matrix(name: str, values: ArrayLike, shapes: tuple[tuple[int, ...], ...])
     Raises:
         CalibrationError: They are no such matrix; the message names the argument.
     """
-    try:
-        matrix = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise CalibrationError(f"{name}: expected an array of numbers") from None
-    if matrix.shape not in shapes:
-        expected = " or ".join(map(str, shapes))
-        raise CalibrationError(f"{name}: expected shape {expected}, got {matrix.shape}")
-    return matrix
+    # a copy, which nobody else changes
+    return numbers(name, values, np.float64, *shapes, error=CalibrationError).copy()
 
 
 def rigid(place: str, matrix: Matrix) -> Matrix:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
+from ldls.checks import checked
 from ldls.cloud import as_points
 from ldls.io.labels.kitti_objects import KittiObject, in_camera_frame, label_by_boxes
 from ldls.labeling import Labeling
@@ -45,6 +46,7 @@ class Annotation:
         return dict(Counter(self.labeling.names[k] for k in pairs[0]))
 
 
+@checked
 def annotate(objects: Sequence[KittiObject], points: ArrayLike, camera: Camera, *, clean: bool = True) -> Annotation:
     """Annotations of `points` by the boxes that hold them, as `label_by_boxes` makes them.
 

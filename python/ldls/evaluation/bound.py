@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks import checked
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.on_masks import overlaps_with_masks, points_on_masks
 from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
 
 
+@checked
 def bound_labels(result: Segmentation, truth: Labeling, classes: ClassSet) -> NDArray[np.int32]:
     """Labels (N,) in which every true object wholly has the label of the mask that overlaps it best.
 

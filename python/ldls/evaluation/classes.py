@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.categories import COCO_NAMES
+from ldls.checks import checked
 from ldls.errors import InputError, ParameterError
 from ldls.io.labels.kitti_objects import KITTI
 from ldls.io.labels.nuscenes_labels import NUSCENES
@@ -38,6 +39,7 @@ SYNONYMS: tuple[tuple[str, ...], ...] = (
 """Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes."""
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class ClassSet:
     """The scored classes and how names of other vocabularies map onto them.
@@ -71,6 +73,7 @@ class ClassSet:
             raise ParameterError(f"left_out: {sorted(both)} are scored too; score a class or leave it out")
 
     @classmethod
+    @checked
     def kitti(
         cls,
         names: Sequence[str] = ("Car", "Pedestrian"),
@@ -93,6 +96,7 @@ class ClassSet:
             ParameterError: A name is scored and left out, or `leave_out` holds a name of no vocabulary.
         """
         known = _known_names()
+        leave_out = None if leave_out is None else tuple(leave_out)
         unknown = [name for name in leave_out or () if name not in known]
         if unknown:
             raise ParameterError(f"leave_out: no data set has {unknown}; expected names such as {', '.join(KITTI)}")
@@ -117,6 +121,7 @@ class ClassSet:
         """Names of a mapped labeling: background, then the scored classes."""
         return (BACKGROUND, *self.names)
 
+    @checked
     def map(self, labeling: Labeling, *, truth: bool = False) -> Labeling:
         """The labels of `labeling` with the names of `vocabulary`.
 
@@ -135,11 +140,13 @@ class ClassSet:
             ignored = ignored | np.array([name in self.left_out for name in labeling.names])[labeling.classes]
         return Labeling(classes, _distinct_instances(labeling, classes), ignored, self.vocabulary)
 
+    @checked
     def index(self, name: str) -> int:
         """Number of the class of `name` in `vocabulary`; 0 for whatever is not scored."""
         scored = self.aliases.get(name, name)
         return self.names.index(scored) + 1 if scored in self.names else 0
 
+    @checked
     def knows(self, name: str) -> bool:
         """True for a name that truth may hold."""
         return name == BACKGROUND or self.index(name) > 0 or name in self.left_out or name in self.background

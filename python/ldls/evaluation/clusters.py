@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls._optional import require
+from ldls.checks import checked
 from ldls.cloud import as_points
 from ldls.evaluation.on_masks import overlaps_with_masks
 
@@ -51,6 +52,7 @@ def linked(points: NDArray[np.floating], radius_m: float = RADII_M[0]) -> NDArra
     return np.where(sizes[numbers] > 1, numbers, -1)
 
 
+@checked
 def largest_clusters(points: ArrayLike, labels: NDArray[np.int32], clusterer: Clusterer = dbscan) -> NDArray[np.int32]:
     """Labels (N,) with every point outside the largest cluster of its instance turned into background."""
     xyz, kept = as_points(points)[:, :3], labels.copy()
@@ -63,6 +65,7 @@ def largest_clusters(points: ArrayLike, labels: NDArray[np.int32], clusterer: Cl
     return kept
 
 
+@checked
 def best_clusters(points: ArrayLike, on: csr_array) -> NDArray[np.int32]:
     """Labels (n,) by the clusters of all points that fit instances best.
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ldls.checks import checked
 
+
+@checked
 @dataclass(frozen=True)
 class Counts:
     """Numbers of things (points, or instances) found, invented and missed.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ldls.errors import ParameterError
+from ldls.checks import checked, shown
+from ldls.errors import InputError, ParameterError
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.instance import PAPER_THRESHOLDS, InstanceScores
@@ -59,6 +60,7 @@ class Evaluation:
     reliability: Reliability | None
 
 
+@checked
 def evaluate(
     pairs: Iterable[Pair | tuple[str, Labeling, Labeling]],
     *,
@@ -92,7 +94,7 @@ def evaluate(
     reliability: Reliability | None = Reliability()
     frames = []
     for item in pairs:
-        pair = (item if isinstance(item, Pair) else Pair(*item)).mapped(classes, max_range_m=max_range_m)
+        pair = _as_pair(item).mapped(classes, max_range_m=max_range_m)
         of_frame = SemanticScores(classes.names)
         of_frame.add(pair.prediction, pair.truth)
         semantic.merge(of_frame)
@@ -106,6 +108,14 @@ def evaluate(
     return Evaluation(
         classes.names, semantic, instance, well_seen, panoptic, tuple(frames), reliability if frames else None
     )
+
+
+def _as_pair(item: Pair | tuple[str, Labeling, Labeling]) -> Pair:
+    if isinstance(item, Pair):
+        return item
+    if not isinstance(item, tuple) or len(item) != 3:
+        raise InputError(f"pairs: expected Pair or (name, prediction, truth), got {shown(item)}")
+    return Pair(*item)
 
 
 def _frame_counts(pair: Pair, scores: SemanticScores) -> FrameCounts:

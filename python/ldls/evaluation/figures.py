@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ldls._optional import require
+from ldls.checks import checked
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.reliability import Reliability
@@ -28,6 +29,7 @@ LEAST_SHARE = 0.001
 """Share of the points from which on a bin is drawn."""
 
 
+@checked
 def scores_against_range(curves: Mapping[str, Mapping[float, Counts]], path: str | PathLike[str]) -> None:
     """Draw precision and recall, side by side, against the maximum range.
 
@@ -47,6 +49,7 @@ def scores_against_range(curves: Mapping[str, Mapping[float, Counts]], path: str
     _save(figure, path)
 
 
+@checked
 def iou_against_range(scatter: Mapping[str, Sequence[tuple[float, float]]], path: str | PathLike[str]) -> None:
     """Draw the IoU of each object against its range.
 
@@ -67,6 +70,7 @@ def iou_against_range(scatter: Mapping[str, Sequence[tuple[float, float]]], path
     _save(figure, path)
 
 
+@checked
 def iou_against(
     curves: Mapping[str, Mapping[float, float | None]],
     path: str | PathLike[str],
@@ -100,6 +104,7 @@ def iou_against(
     _save(figure, path)
 
 
+@checked
 def right_against_confidence(reliabilities: Mapping[str, Reliability], path: str | PathLike[str]) -> None:
     """Draw the share of right labels against confidence, by bins; those of hardly a point are left out.
 
@@ -124,6 +129,7 @@ def right_against_confidence(reliabilities: Mapping[str, Reliability], path: str
     _save(figure, path, columns=2)
 
 
+@checked
 def precision_against_coverage(reliabilities: Mapping[str, Reliability], path: str | PathLike[str]) -> None:
     """Draw the precision of the points of objects against how many of them a threshold on confidence keeps.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls._optional import require
+from ldls.checks import checked, whole_number
 from ldls.errors import InputError, ParameterError
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.counts import Counts
@@ -54,6 +55,7 @@ class InstanceScores:
         minimum_points: Points from which on a true instance counts.
     """
 
+    @checked
     def __init__(
         self, names: Sequence[str], *, thresholds: Sequence[float] = PAPER_THRESHOLDS, minimum_points: int = 0
     ) -> None:
@@ -67,9 +69,10 @@ class InstanceScores:
                 raise ParameterError(f"thresholds: got {threshold}, expected more than 0 and at most 1")
         self.names = tuple(names)
         self.thresholds = tuple(thresholds)
-        self.minimum_points = check_minimum(minimum_points)
+        self.minimum_points = whole_number("minimum_points", minimum_points, 0)
         self._counts = {(name, threshold): Counts() for name in self.names for threshold in self.thresholds}
 
+    @checked
     def add(self, prediction: Labeling, truth: Labeling) -> None:
         """Count the instances of a frame; both labelings mapped to these classes."""
         check_vocabulary(self.names, prediction, truth)
@@ -79,6 +82,7 @@ class InstanceScores:
             for threshold in self.thresholds:
                 self._counts[name, threshold] += _count(overlap, matched, threshold, self.minimum_points)
 
+    @checked
     def merge(self, other: InstanceScores) -> None:
         """Add the instances that `other` counted."""
         if self._counts.keys() != other._counts.keys() or self.minimum_points != other.minimum_points:
@@ -155,6 +159,7 @@ class ObjectScore:
     iou: float
 
 
+@checked
 def object_scores(pair: Pair, *, classes: ClassSet) -> tuple[ObjectScore, ...]:
     """IoU and range of every true instance of the scored classes in a frame with `ranges_m`.
 
@@ -165,13 +170,6 @@ def object_scores(pair: Pair, *, classes: ClassSet) -> tuple[ObjectScore, ...]:
         raise InputError(f"frame {pair.name}: the ranges of objects need the points' ranges_m, got none")
     mapped = pair.mapped(classes)
     return tuple(score for name in classes.names for score in _objects(mapped, name, np.asarray(pair.ranges_m)))
-
-
-def check_minimum(minimum_points: int) -> int:
-    """`minimum_points` if it is a number of points."""
-    if minimum_points < 0:
-        raise ParameterError(f"minimum_points: got {minimum_points}, expected 0 or more")
-    return minimum_points
 
 
 def _segments(labeling: Labeling, k: int, rows: NDArray[np.intp]) -> NDArray[np.int32]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls import stages
+from ldls.checks import checked
 from ldls.evaluation.bound import bound_labels
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.clusters import best_clusters, largest_clusters, linked
@@ -31,6 +32,7 @@ FULL = "ldls"
 BOUND = "bound"
 
 
+@checked
 def compare(
     full: Segmentation, paper: Segmentation, truth: Labeling, classes: ClassSet
 ) -> Mapping[str, NDArray[np.int32]]:

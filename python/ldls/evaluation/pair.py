@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks import checked, numbers
 from ldls.cloud import Points
-from ldls.errors import InputError, ShapeError
+from ldls.errors import InputError, ShapeError, within
 from ldls.evaluation.classes import ClassSet
 from ldls.labeling import Labeling
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Prediction and truth of one frame.
@@ -43,23 +45,22 @@ class Pair:
                 f"frame {self.name}: prediction has {n_predicted:,} points, truth {n_true:,}; "
                 "both must label the whole cloud in its order"
             )
-        for name in ("ranges_m", "confidence"):
-            values = getattr(self, name)
-            if values is not None and np.shape(values) != (n_true,):
-                raise ShapeError(f"frame {self.name}: {name} has shape {np.shape(values)}, expected ({n_true},)")
+        with within(f"frame {self.name}"):
+            for name in ("ranges_m", "confidence"):
+                if getattr(self, name) is not None:
+                    object.__setattr__(self, name, numbers(name, getattr(self, name), np.float64, (n_true,)))
         if self.confidence is not None and not ((self.confidence >= 0) & (self.confidence <= 1)).all():
             raise InputError(f"frame {self.name}: expected confidence from 0 to 1")
 
+    @checked
     def mapped(self, classes: ClassSet, *, max_range_m: float | None = None) -> Pair:
         """This pair in the vocabulary of `classes`; points farther than `max_range_m` are ignored.
 
         Raises:
             InputError: Truth holds an unknown class, or a range is asked for and none is known.
         """
-        try:
+        with within(f"frame {self.name}"):
             truth = classes.map(self.truth, truth=True)
-        except InputError as error:
-            raise InputError(f"frame {self.name}: {error}") from None
         if self.ranges_m is not None:
             farthest = np.finfo(np.float64).max if max_range_m is None else max_range_m
             truth = truth.restricted(np.asarray(self.ranges_m) <= farthest)

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ldls.checks import checked, whole_number
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts, mean
-from ldls.evaluation.instance import check_minimum, overlaps
+from ldls.evaluation.instance import overlaps
 from ldls.evaluation.semantic import check_vocabulary
 from ldls.labeling import Labeling
 
@@ -60,18 +61,21 @@ class PanopticScores:
         minimum_points: Points from which on an unmatched segment counts.
     """
 
+    @checked
     def __init__(self, names: Sequence[str], *, minimum_points: int = 0) -> None:
         """Start without a segment."""
         self.names = tuple(names)
-        self.minimum_points = check_minimum(minimum_points)
+        self.minimum_points = whole_number("minimum_points", minimum_points, 0)
         self._qualities = dict.fromkeys(self.names, PanopticQuality())
 
+    @checked
     def add(self, prediction: Labeling, truth: Labeling) -> None:
         """Count the segments of a frame; both labelings mapped to these classes."""
         check_vocabulary(self.names, prediction, truth)
         for k, name in enumerate(self.names, start=1):
             self._add(name, _quality(prediction, truth, k, self.minimum_points))
 
+    @checked
     def merge(self, other: PanopticScores) -> None:
         """Add the segments that `other` counted."""
         if (self.names, self.minimum_points) != (other.names, other.minimum_points):

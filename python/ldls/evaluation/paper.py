@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls._ldls import default_threads
+from ldls.checks import checked
 from ldls.datasets import Frame, Source
 from ldls.errors import InputError
 from ldls.evaluation.classes import ClassSet
@@ -75,6 +76,7 @@ def label(
         yield from workers.map(lambda at: _label(frames[at], classes, one_thread, iterations), range(len(frames)))
 
 
+@checked
 def score(labelled: Sequence[LabelledPairs], *, classes: ClassSet, ranges_m: Sequence[float] = RANGES_M) -> Experiment:
     """The scores of every method over all frames.
 

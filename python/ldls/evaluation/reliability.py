@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks import checked
 from ldls.labeling import Labeling
 
 BINS = 15
@@ -74,6 +75,7 @@ class Reliability:
     objects: Bins = field(default_factory=lambda: Bins(BINS))
     by_threshold: Bins = field(default_factory=lambda: Bins(THRESHOLDS))
 
+    @checked
     def add(self, prediction: Labeling, truth: Labeling, confidence: NDArray[np.floating]) -> None:
         """Count the points of a frame that neither labeling ignores; both mapped to the same classes."""
         counted = ~(prediction.ignored | truth.ignored)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks import checked
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts, mean
 from ldls.labeling import BACKGROUND, Labeling
@@ -20,11 +21,13 @@ class SemanticScores:
         confusion: (K + 1, K + 1) int64: points by true class (row) and predicted class (column), background first.
     """
 
+    @checked
     def __init__(self, names: Sequence[str]) -> None:
         """Start without a point."""
         self.names = tuple(names)
         self.confusion: NDArray[np.int64] = np.zeros((len(self.names) + 1,) * 2, np.int64)
 
+    @checked
     def add(self, prediction: Labeling, truth: Labeling) -> None:
         """Count the points of a frame that neither labeling ignores; both mapped to these classes."""
         check_vocabulary(self.names, prediction, truth)
@@ -34,6 +37,7 @@ class SemanticScores:
         cells = truth.classes[counted].astype(np.int64) * side + prediction.classes[counted]
         self.confusion += np.bincount(cells, minlength=side * side).reshape(side, side)
 
+    @checked
     def merge(self, other: SemanticScores) -> None:
         """Add the points that `other` counted."""
         if other.names != self.names:

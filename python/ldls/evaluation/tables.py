@@ -12,6 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ldls.checks import checked
 from ldls.errors import ParameterError
 from ldls.evaluation.evaluation import WELL_SEEN_POINTS, Evaluation
 from ldls.evaluation.reliability import BINS
@@ -26,6 +27,7 @@ SHOWN_THRESHOLDS = (0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 PERCENT = "Scores in percent; '-': neither truth nor prediction has the class."
 
 
+@checked
 @dataclass(frozen=True)
 class Table:
     """A table of scores.
@@ -99,6 +101,7 @@ class Table:
         return bool(self.rows) and not any(isinstance(row[column], str) for row in self.rows)
 
 
+@checked
 def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Precision, recall and IoU of each class by method, over all points (Table I of the paper)."""
     names = _classes(evaluations)
@@ -111,6 +114,7 @@ def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     return Table("Points by class", columns, tuple(rows), PERCENT)
 
 
+@checked
 def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Instances found, invented and missed at each threshold of IoU, by method and class (Table II)."""
     rows: list[tuple[Cell, ...]] = []
@@ -124,6 +128,7 @@ def instance_table(evaluations: Mapping[str, Evaluation]) -> Table:
     return Table("Instances", columns, tuple(rows), f"{PERCENT} {WELL_SEEN_POINTS}+: of instances of so many points.")
 
 
+@checked
 def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Panoptic, segmentation and recognition quality by method and class, and the mean of the classes."""
     rows: list[tuple[Cell, ...]] = []
@@ -138,6 +143,7 @@ def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     return Table("Panoptic quality", columns, tuple(rows), PERCENT)
 
 
+@checked
 def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """IoU of each class by variant, the gain in mean IoU over the first (Table III), and mean panoptic quality."""
     names = _classes(evaluations)
@@ -153,6 +159,7 @@ def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
     return Table("Ablation", columns, tuple(rows), f"{PERCENT} Gain: points of mean IoU over the first row.")
 
 
+@checked
 def frame_table(evaluation: Evaluation) -> Table:
     """Points, those that count, and IoU of each class, by frame."""
     names = evaluation.names
@@ -163,6 +170,7 @@ def frame_table(evaluation: Evaluation) -> Table:
     return Table("Frames", columns, tuple(rows), PERCENT)
 
 
+@checked
 def range_table(by_range: Mapping[float, Evaluation]) -> Table:
     """Precision, recall and IoU of each class over the points up to each maximum range (the paper's range figures)."""
     rows = [(f"{limit_m:g}", *scores) for limit_m, each in by_range.items() for scores in _class_scores(each)]
@@ -170,6 +178,7 @@ def range_table(by_range: Mapping[float, Evaluation]) -> Table:
     return Table("Points by maximum range", columns, tuple(rows), PERCENT)
 
 
+@checked
 def iteration_table(by_iterations: Mapping[int, Evaluation]) -> Table:
     """IoU of each class and their mean after each number of iterations."""
     names = next(iter(by_iterations.values())).names if by_iterations else ()
@@ -181,6 +190,7 @@ def iteration_table(by_iterations: Mapping[int, Evaluation]) -> Table:
     return Table("Points by number of iterations", columns, tuple(rows), PERCENT)
 
 
+@checked
 def reliability_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Mean confidence, share of right labels and calibration error, by method that tells a confidence."""
     rows: list[tuple[Cell, ...]] = []
@@ -195,6 +205,7 @@ def reliability_table(evaluations: Mapping[str, Evaluation]) -> Table:
     return Table("Reliability", columns, tuple(rows), note)
 
 
+@checked
 def coverage_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """Points of objects that are at least so sure, and the precision of these, by method that tells a confidence."""
     rows: list[tuple[Cell, ...]] = []

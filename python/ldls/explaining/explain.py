@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import ldls.stages as stages
 from ldls._optional import require
+from ldls.checks import checked, shown
 from ldls.errors import InputError, ParameterError
 from ldls.explaining.explanation import Components, Edges, Explanation, Island, Likelihood, Neighbor, Provenance
 from ldls.explaining.rebuilt import Rebuilt, rebuild
@@ -24,6 +25,7 @@ LEFT = 1e-9
 MOST_PRODUCTS = 20_000
 
 
+@checked
 def explain(result: Segmentation, point: int) -> Explanation:
     """Explain the label of the point in row `point` of the cloud of `result`. Needs the extra `eval`.
 
@@ -56,14 +58,10 @@ def explain(result: Segmentation, point: int) -> Explanation:
 
 
 def _checked_row(point: int, count: int) -> int:
-    try:
-        row = operator.index(point)
-    except TypeError:
-        raise ParameterError(f"point: got {point!r}, expected a whole number, its row in the cloud") from None
-    if isinstance(point, bool) or not 0 <= row < count:
+    if not 0 <= point < count:
         expected = f"0 to {count - 1}" if count else "nothing, for the cloud is empty"
-        raise ParameterError(f"point: got {point!r}, expected {expected}, its row in the cloud")
-    return row
+        raise ParameterError(f"point: got {shown(point)}, expected {expected}, its row in the cloud")
+    return operator.index(point)
 
 
 def _in_the_graph(result: Segmentation, system: Rebuilt, row: int) -> dict[str, Any]:

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ldls.checks import checked
 from ldls.errors import CorruptFileError, LimitError
 
 
+@checked
 def read_image(path: str | PathLike[str]) -> NDArray[np.uint8]:
     """(H, W, 3) RGB pixels.
 
@@ -26,6 +28,7 @@ def read_image(path: str | PathLike[str]) -> NDArray[np.uint8]:
         return np.asarray(image.convert("RGB"))
 
 
+@checked
 def read_image_size(path: str | PathLike[str]) -> tuple[int, int]:
     """(height, width) in pixels, by the head of the file.
 

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from ldls.checks import checked
 from ldls.errors import InputError, UnsupportedFormatError
 from ldls.io import result_npz, tables
 from ldls.io.labels import nuscenes_labels, semantic_kitti
@@ -31,6 +32,7 @@ WRITERS: dict[str, Callable[[Path, Segmentation], None]] = {
 """Writers of results, by the ending of the name."""
 
 
+@checked
 def read_result(path: str | PathLike[str]) -> Segmentation:
     """The whole result that `save` wrote to an `.npz` file.
 
@@ -42,6 +44,7 @@ def read_result(path: str | PathLike[str]) -> Segmentation:
     return result_npz.read(path)
 
 
+@checked
 def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
     """Write a result or instance masks; the ending of the name chooses the format.
 

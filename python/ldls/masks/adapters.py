@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, category_ids
+from ldls.checks import as_array, numbers, shown
 from ldls.errors import MaskError, within
 from ldls.masks.coco import from_rle
 from ldls.masks.pixels import checked_size, encode
@@ -37,7 +38,7 @@ def from_torchvision(
     missing = [key for key in ("labels", "scores", "masks") if key not in output]
     if missing:
         raise MaskError(f"output: {missing[0]!r} is missing, found {sorted(output)}; a detector without masks?")
-    masks = to_numpy(output["masks"])
+    masks = as_array("masks", to_numpy(output["masks"]), MaskError)
     if masks.ndim != 4 or masks.shape[1] != 1:
         raise MaskError(f"masks: expected (N, 1, height, width), got shape {masks.shape}")
     return {
@@ -67,6 +68,7 @@ def from_supervision(
     Raises:
         MaskError: There are boxes and no masks, or arrays that do not fit one another.
     """
+    _check_parts("detections", detections, ("mask", "xyxy", "confidence", "class_id", "data"))
     masks = detections.mask
     if masks is None and len(detections.xyxy):
         raise MaskError(
@@ -117,6 +119,7 @@ def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
     Raises:
         MaskError: An index that `names` does not have, or parts that do not fit one another.
     """
+    _check_parts("result", result, ("masks", "boxes", "names", "orig_shape"))
     size = checked_size(result.orig_shape)
     ids, names = category_ids(result.names)
     if result.masks is None:
@@ -173,8 +176,8 @@ def from_sam(
     if not rles and image_size is None:
         raise MaskError("records: none, so the image's size is not known; pass image_size=(height, width)")
     size = (rles[0].height, rles[0].width) if image_size is None else image_size
-    scores = np.array([record.get("predicted_iou", 1.0) for record in records], np.float32)
-    scores = np.clip(scores, 0, 1)
+    ious = numbers("predicted_iou", [record.get("predicted_iou", 1.0) for record in records], np.float32, ("M",))
+    scores = np.clip(ious, 0, 1)
     return {"rles": rles, "image_size": size, "categories": categories, "scores": scores, "names": names}
 
 
@@ -188,10 +191,24 @@ def _sam_rle(index: int, record: Mapping[str, Any]) -> _ldls.Rle:
         return from_rle(segmentation)
 
 
+def _check_parts(name: str, source: object, parts: Sequence[str]) -> None:
+    """Refuse an object of another program that has not the parts that its class has."""
+    missing = [part for part in parts if not _has(source, part)]
+    if missing:
+        raise MaskError(f"{name}: {missing[0]!r} is missing, got {shown(source)}; is it of another class?")
+
+
+def _has(source: object, part: str) -> bool:
+    try:
+        return hasattr(source, part)
+    except Exception:  # an attribute that cannot be asked for, as `data` of some arrays
+        return False
+
+
 def to_numpy(values: Any) -> NDArray[Any]:  # noqa: ANN401
     """`values`, an array or a tensor on any device, with or without gradient."""
     if not hasattr(values, "detach"):
-        return np.asarray(values)
+        return as_array("array", values, MaskError)
     tensor = values.detach().cpu()
     try:
         return np.asarray(tensor.numpy())
@@ -205,7 +222,7 @@ def whole_numbers(name: str, values: Any) -> list[int]:  # noqa: ANN401
     Raises:
         MaskError: One of them is no whole number; the message names its instance.
     """
-    array = to_numpy(values)
+    array = as_array(name, to_numpy(values), MaskError)
     if array.ndim != 1 or array.dtype.kind not in "iuf":
         raise MaskError(f"{name}: expected one number an instance, got {array.dtype} of shape {array.shape}")
     for i, value in enumerate(array.tolist()):

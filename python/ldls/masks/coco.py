@@ -70,7 +70,7 @@ def results(masks: Iterable[InstanceMask], image_size: tuple[int, int], image_id
 
 def _parts(content: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, Any]], dict[Any, str]]:
     """Annotations, images by id, and category names of a data set or a bare list of results."""
-    if isinstance(content, list):
+    if isinstance(content, list | tuple):
         return _records("results", content), {}, {}
     if not isinstance(content, Mapping) or "annotations" not in content:
         raise CorruptFileError("expected COCO's object with images, annotations and categories, or a list of results")
@@ -94,9 +94,9 @@ def _by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict
 
 
 def _records(name: str, values: object) -> list[dict[str, Any]]:
-    if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
+    if not isinstance(values, list | tuple) or not all(isinstance(value, dict) for value in values):
         raise CorruptFileError(f"expected {name} to be a list of objects")
-    return values
+    return list(values)
 
 
 def _choose_image(

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.checks import as_array
 from ldls.errors import MaskError, ParameterError
+from ldls.masks.pixels import check_pixels
 
 
 def arguments(
@@ -59,11 +61,12 @@ def split(image: ArrayLike) -> tuple[NDArray[Any], list[_ldls.Rle]]:
     Raises:
         MaskError: Another shape, or values that are no instance numbers.
     """
-    values = np.asarray(image)
+    values = as_array("instance image", image, MaskError)
     if values.dtype.kind not in "biu":
         raise MaskError(f"instance image: expected whole numbers, got {values.dtype}")
     if values.ndim != 2 or values.size == 0:
         raise MaskError(f"instance image: expected (height, width), got shape {values.shape}")
+    check_pixels(*values.shape)
     if values.min() < 0:
         row, column = np.argwhere(values < 0)[0]
         raise MaskError(f"instance image: pixel ({row}, {column}) is {values[row, column]}, expected 0 or more")

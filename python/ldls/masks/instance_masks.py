@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -10,11 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, find_categories
-from ldls.errors import MaskError, ParameterError, within
+from ldls.checks import as_array, checked, numbers, shown, whole_number
+from ldls.errors import InputError, LimitError, MaskError, ParameterError, within
 from ldls.masks import adapters, coco, instance_image
 from ldls.masks.instance_mask import InstanceMask
 from ldls.masks.pixels import checked_size, encode, rectangles
 
+MAX_INSTANCES = 65_535
+"""Most masks of an image: labels of pixels have 16 bits."""
 MAX_RADIUS = 10_000
 """Farthest that masks grow or shrink, in pixels."""
 
@@ -31,6 +34,7 @@ class InstanceMasks:
         names: Name of each category id.
     """
 
+    @checked
     def __init__(
         self,
         rles: Sequence[_ldls.Rle],
@@ -51,6 +55,7 @@ class InstanceMasks:
         self._check()
 
     @classmethod
+    @checked
     def from_array(
         cls,
         masks: ArrayLike | Iterable[ArrayLike],
@@ -75,14 +80,13 @@ class InstanceMasks:
         Raises:
             MaskError: Masks of different sizes, values that are no mask, an unknown category or a bad score.
         """
-        if instance_axis != 0:
-            masks = np.moveaxis(np.asarray(masks), _checked_axis(instance_axis), 0)
-        rles = [encode(i, mask) for i, mask in enumerate(masks)]  # type: ignore[arg-type]
+        rles = [encode(i, mask) for i, mask in enumerate(_one_by_one(masks, instance_axis))]
         if image_size is None:
             image_size = _image_size(masks, rles)
         return cls(rles, image_size, categories=categories, scores=scores, names=names)
 
     @classmethod
+    @checked
     def from_coco(
         cls,
         content: Mapping[str, Any] | Sequence[Mapping[str, Any]],
@@ -110,6 +114,7 @@ class InstanceMasks:
             return cls(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
 
     @classmethod
+    @checked
     def from_instance_image(
         cls,
         image: ArrayLike,
@@ -126,6 +131,7 @@ class InstanceMasks:
         return cls._named("instance image", arguments)
 
     @classmethod
+    @checked
     def from_boxes(
         cls,
         boxes: ArrayLike,
@@ -146,6 +152,7 @@ class InstanceMasks:
         return cls(rles, image_size, categories=categories, scores=scores, names=names)
 
     @classmethod
+    @checked
     def from_torchvision(
         cls, output: Mapping[str, Any], *, threshold: float = 0.5, names: Mapping[int, str] | None = None
     ) -> Self:
@@ -153,6 +160,7 @@ class InstanceMasks:
         return cls._named("torchvision output", adapters.from_torchvision(output, threshold=threshold, names=names))
 
     @classmethod
+    @checked
     def from_supervision(
         cls,
         detections: Any,  # noqa: ANN401
@@ -164,11 +172,13 @@ class InstanceMasks:
         return cls._named("detections", adapters.from_supervision(detections, names=names, image_size=image_size))
 
     @classmethod
+    @checked
     def from_ultralytics(cls, result: Any) -> Self:  # noqa: ANN401
         """Masks from Ultralytics' `Results` of one image; see `adapters.from_ultralytics`."""
         return cls._named("result", adapters.from_ultralytics(result))
 
     @classmethod
+    @checked
     def from_sam(
         cls,
         records: Sequence[Mapping[str, Any]],
@@ -199,6 +209,7 @@ class InstanceMasks:
     def __len__(self) -> int:
         return len(self.core)
 
+    @checked
     def __getitem__(self, index: int) -> InstanceMask:
         category = int(self.categories[index])  # an index out of range raises here
         rle = self.core.rle(index % len(self))
@@ -224,6 +235,7 @@ class InstanceMasks:
         """
         return instance_image.join([mask.rle for mask in self], self.image_size)
 
+    @checked
     def to_coco(self, *, image_id: int = 1, file_name: str | None = None) -> dict[str, Any]:
         """COCO's data set of this one image, with compressed run lengths; its `annotations` are results as well."""
         image: dict[str, Any] = {"id": image_id, "height": self.height, "width": self.width}
@@ -236,11 +248,13 @@ class InstanceMasks:
             "annotations": [{"id": i, "iscrowd": 0, **result} for i, result in enumerate(results, start=1)],
         }
 
+    @checked
     def select(self, indices: ArrayLike) -> Self:
         """The masks at `indices`, whole numbers or one bool a mask, in that order."""
-        chosen = np.arange(len(self))[_as_index(indices)]
+        chosen = np.arange(len(self))[_as_index(indices, len(self))]
         return self._with([self.core.rle(int(i)) for i in chosen], chosen)
 
+    @checked
     def filter(
         self,
         *,
@@ -267,6 +281,7 @@ class InstanceMasks:
             kept &= np.array([mask.area >= min_area for mask in self], np.bool_)
         return self if kept.all() else self.select(kept)
 
+    @checked
     def resolve_overlaps(self, by: Literal["score", "area", "order"] = "score") -> Self:
         """These masks, each pixel left to one of them; a mask may become empty.
 
@@ -292,17 +307,21 @@ class InstanceMasks:
             taken = own if taken is None else own.union(taken)
         return self._with(rles)
 
+    @checked
     def grow(self, radius: int) -> Self:
         """These masks with every pixel at most `radius` pixels from them, centre to centre."""
-        return self._with([mask.rle.grow(_radius(radius)) for mask in self])
+        pixels = whole_number("radius", radius, 0, MAX_RADIUS)
+        return self._with([mask.rle.grow(pixels) for mask in self])
 
+    @checked
     def shrink(self, radius: int) -> Self:
         """These masks without the pixels at most `radius` pixels from what is beside them; a mask may become empty.
 
         Masks of networks bleed over edges; points behind an object then fall on its mask. At the edge of the image
         nothing is taken away.
         """
-        return self._with([mask.rle.shrink(_radius(radius)) for mask in self])
+        pixels = whole_number("radius", radius, 0, MAX_RADIUS)
+        return self._with([mask.rle.shrink(pixels) for mask in self])
 
     def _with(self, rles: Sequence[_ldls.Rle], chosen: Any = ...) -> Self:  # noqa: ANN401
         return type(self)(
@@ -344,37 +363,41 @@ def _image_size(masks: object, rles: Sequence[_ldls.Rle]) -> tuple[int, int]:
     raise MaskError("masks: none given; pass image_size=(height, width) or an array of (0, H, W)")
 
 
-def _per_mask(name: str, values: ArrayLike, count: int, dtype: type) -> NDArray[Any]:
-    array = np.asarray(values)
-    whole_numbers = dtype is np.int32
-    if array.dtype.kind not in ("iu" if whole_numbers and array.size else "iuf"):
-        raise MaskError(f"{name}: expected {'whole numbers' if whole_numbers else 'numbers'}, got {array.dtype}")
+def _per_mask(name: str, values: ArrayLike, count: int, dtype: type[np.generic]) -> NDArray[Any]:
+    array = as_array(name, values, MaskError)
     if array.ndim == 0:
         array = np.full(count, array)
     if array.shape != (count,):
         raise MaskError(f"{name}: expected one for each of {count} masks, got shape {array.shape}")
-    if whole_numbers and array.size and not (array.min() >= -(2**31) and array.max() < 2**31):
-        raise MaskError(f"{name}: found {array.min()} to {array.max()}, expected at most {2**31 - 1}")
-    array = array.astype(dtype)
+    # a list without a number has no type of its own
+    array = numbers(name, array if count else array.tolist(), dtype, ("M",), error=MaskError).copy()
     array.flags.writeable = False
     return array
 
 
-def _checked_axis(instance_axis: int) -> int:
+def _one_by_one(masks: ArrayLike | Iterable[ArrayLike], instance_axis: int) -> Iterable[ArrayLike]:
+    """The masks of an array or list, or of what yields one after another."""
     if instance_axis not in (0, -1):
         raise ParameterError(f"instance_axis: got {instance_axis!r}, expected 0 or -1")
-    return instance_axis
+    if isinstance(masks, np.ndarray) or instance_axis or not isinstance(masks, Iterable):
+        array = as_array("masks", masks, MaskError)
+        if array.ndim == 0 or (instance_axis and array.ndim != 3):
+            expected = "(height, width, M)" if instance_axis else "(M, height, width)"
+            raise MaskError(f"masks: expected {expected} or a list of arrays, got {shown(masks)}")
+        masks = np.moveaxis(array, instance_axis, 0)
+    if isinstance(masks, Sized) and len(masks) > MAX_INSTANCES:
+        raise LimitError(f"masks: {len(masks)} instances exceed the limit of {MAX_INSTANCES}")
+    return masks
 
 
-def _as_index(indices: ArrayLike) -> NDArray[Any]:
-    array = np.asarray(indices)
-    return array.astype(np.int64) if array.size == 0 and array.dtype.kind == "f" else array
-
-
-def _radius(radius: int) -> int:
-    if not isinstance(radius, int | np.integer) or not 0 <= radius <= MAX_RADIUS:
-        raise ParameterError(f"radius: got {radius!r}, expected 0 to {MAX_RADIUS} pixels")
-    return int(radius)
+def _as_index(indices: ArrayLike, count: int) -> NDArray[Any]:
+    array = as_array("indices", indices)
+    if array.dtype.kind == "b":
+        return np.flatnonzero(numbers("indices", array, np.bool_, (count,)))
+    chosen = numbers("indices", array if array.size else [], np.int64, ("n",))
+    if chosen.size and not (chosen.min() >= -count and chosen.max() < count):
+        raise InputError(f"indices: got {chosen.min()} to {chosen.max()}, expected -{count} to {count - 1}")
+    return chosen
 
 
 def _some(names: Mapping[int, str]) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
-from ldls.errors import MaskError, ParameterError
+from ldls.checks import as_array, as_image_size, numbers
+from ldls.errors import MaskError, ParameterError, within
 
 
 def encode(index: int, mask: ArrayLike, threshold: float = 0.5) -> _ldls.Rle:
@@ -24,15 +25,23 @@ def encode(index: int, mask: ArrayLike, threshold: float = 0.5) -> _ldls.Rle:
     """
     if not 0 < threshold <= 1:
         raise ParameterError(f"threshold: got {threshold!r}, expected above 0 and up to 1")
-    pixels = np.asarray(mask)
+    pixels = as_array(f"mask {index}", mask, MaskError)
     if pixels.ndim != 2:
         raise MaskError(
             f"mask {index}: expected (height, width), got shape {pixels.shape}; pass masks as (M, height, width)"
         )
-    try:
+    with within(f"mask {index}"):
+        check_pixels(*pixels.shape)
         return _ldls.Rle.from_pixels(np.ascontiguousarray(_as_bool(pixels, threshold)))
-    except MaskError as error:
-        raise MaskError(f"mask {index}: {error}") from None
+
+
+def check_pixels(height: int, width: int) -> None:
+    """Refuse an image that is too large for masks, before anything of its size is made.
+
+    Raises:
+        LimitError: It has more pixels than masks may have.
+    """
+    _ldls.Masks(height, width, [])
 
 
 def _as_bool(pixels: NDArray[Any], threshold: float) -> NDArray[np.bool_]:
@@ -54,25 +63,26 @@ def _as_bool(pixels: NDArray[Any], threshold: float) -> NDArray[np.bool_]:
     return pixels >= threshold
 
 
-def rectangles(boxes: ArrayLike, image_size: tuple[int, int]) -> list[_ldls.Rle]:
+def rectangles(boxes: ArrayLike, size: tuple[int, int]) -> list[_ldls.Rle]:
     """The pixels whose centres lie within each box, its edges included, as far as the image goes.
 
     Args:
         boxes: (M, 4) left, top, right, bottom in pixels; pixel centres lie at whole numbers.
-        image_size: (height, width) in pixels.
+        size: (height, width) of the image in pixels.
 
     Raises:
         MaskError: A box that is none, by its index.
         LimitError: The image is too large.
     """
-    edges = np.asarray(boxes, np.float64)
+    edges = as_array("boxes", boxes, MaskError)
     if edges.size == 0:
-        edges = edges.reshape(0, 4)
+        edges = np.zeros((0, 4))
     if edges.ndim != 2 or edges.shape[1] != 4:
         raise MaskError(f"boxes: expected (M, 4) left, top, right, bottom, got shape {edges.shape}")
-    size = checked_size(image_size)
-    _ldls.Masks(*size, [])  # refuses an image too large for masks before any is made
-    return [_rectangle(i, box, size) for i, box in enumerate(edges.tolist())]
+    edges = numbers("boxes", edges, np.float64, ("M", 4), error=MaskError)
+    checked = checked_size(size)
+    check_pixels(*checked)
+    return [_rectangle(i, box, checked) for i, box in enumerate(edges.tolist())]
 
 
 def _rectangle(index: int, box: list[float], image_size: tuple[int, int]) -> _ldls.Rle:
@@ -103,8 +113,4 @@ def checked_size(size: object) -> tuple[int, int]:
     Raises:
         MaskError: It is no pair of whole numbers from 1 to 2**31 - 1.
     """
-    pair = tuple(size) if isinstance(size, list | tuple) else ()
-    whole = all(isinstance(side, int | np.integer) and not isinstance(side, bool) for side in pair)
-    if len(pair) != 2 or not whole or not all(0 < side < 2**31 for side in pair):
-        raise MaskError(f"size is {size!r}, expected (height, width) in whole pixels")
-    return int(pair[0]), int(pair[1])
+    return as_image_size("size", size, MaskError)

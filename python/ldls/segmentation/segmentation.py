@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.checks import as_array, checked, shown
 from ldls.cloud import Points
-from ldls.errors import InputError
+from ldls.errors import DtypeError, InputError, ShapeError
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation.objects import SegmentedObject
@@ -106,6 +107,7 @@ class Segmentation:
         """(N,) int32: category id of each point; 0 for background and out of view."""
         return self.per_point(np.array([0, *(instance.category for instance in self.instances)], np.int32))
 
+    @checked
     def per_point(self, values: ArrayLike, *, out_of_view: ArrayLike | None = None) -> NDArray[Any]:
         """(N, ...) the value of each point's label.
 
@@ -113,8 +115,19 @@ class Segmentation:
             values: (M + 1, ...): `values[0]` is that of the background, `values[m]` that of `instances[m - 1]`.
             out_of_view: Value of points out of view; by default that of the background.
         """
-        by_label = np.asarray(values)
-        last = by_label[:1] if out_of_view is None else np.asarray(out_of_view, by_label.dtype)[None]
+        by_label = as_array("values", values)
+        if by_label.ndim == 0 or len(by_label) != len(self.instances) + 1:
+            raise ShapeError(f"values: expected ({len(self.instances) + 1}, ...), one a label, got {by_label.shape}")
+        last = by_label[:1]
+        if out_of_view is not None:
+            try:
+                last = np.asarray(out_of_view, by_label.dtype)[None]
+            except (TypeError, ValueError, OverflowError) as problem:
+                raise DtypeError(
+                    f"out_of_view: expected {by_label.dtype}, got {shown(out_of_view)}; {problem}"
+                ) from None
+            if last.shape[1:] != by_label.shape[1:]:
+                raise ShapeError(f"out_of_view: expected shape {by_label.shape[1:]}, got {last.shape[1:]}")
         # label -1 picks the last entry
         of_points: NDArray[Any] = np.concatenate([by_label, last])[self.labels]
         return of_points

@@ -54,7 +54,7 @@ def own_arrays(**changes):
         pytest.param({"run_counts": np.array([4, -1])}, ldls.MaskError, "run_counts sum", id="negative count"),
         pytest.param({"categories": np.array([0])}, ldls.MaskError, "mask 0: category is 0", id="category 0"),
         pytest.param({"categories": np.array([2])}, ldls.MaskError, "mask 0: category 2 is unknown", id="unknown"),
-        pytest.param({"categories": np.array([2**32 + 1])}, ldls.MaskError, "found 4294967297", id="64-bit category"),
+        pytest.param({"categories": np.array([2**32 + 1])}, ldls.MaskError, "got 4294967297", id="64-bit category"),
         pytest.param({"scores": np.array([np.nan])}, ldls.MaskError, "mask 0: score is nan", id="NaN score"),
         pytest.param({"scores": np.array([1.0, 1])}, ldls.MaskError, "scores: expected one", id="two scores"),
         pytest.param({"category_names": np.array([])}, ldls.MaskError, "shorter", id="no names"),

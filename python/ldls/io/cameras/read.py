@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ldls.camera import Camera
 from ldls.camera.fields import Fields
 from ldls.camera.rigid import as_transform
+from ldls.checks import checked
 from ldls.errors import CalibrationError, ParameterError, UnsupportedFormatError
 from ldls.io.cameras import kalibr, kitti, opencv
 from ldls.io.cameras.yaml_file import read_yaml
@@ -33,6 +34,7 @@ KALIBR_KEY = re.compile(r"cam\d+")
 HEAD_BYTES = 4096
 
 
+@checked
 def read_camera(
     path: str | PathLike[str],
     *,

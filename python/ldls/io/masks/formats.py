@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
+from ldls.checks import checked
 from ldls.errors import MaskError, UnsupportedFormatError
 from ldls.io.masks import coco_json, instance_png, kitti_boxes, npz, numpy_stack
 from ldls.io.options import check_options
@@ -33,6 +34,7 @@ WRITERS: dict[str, Callable[..., None]] = {
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
+@checked
 def read_masks(
     path: str | PathLike[str],
     *,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 
+from ldls.checks import checked
 from ldls.cloud import Points, as_points
 from ldls.errors import ParameterError, UnsupportedFormatError, within
 from ldls.io.arrays import read_npy
@@ -34,6 +35,7 @@ READERS: dict[str, Callable[..., Points]] = {
 """Readers of clouds, by the suffix of the name."""
 
 
+@checked
 def read_points(path: str | PathLike[str], *, columns: int | None = None, recover: bool = False) -> Points:
     """(N, >= 3) float32 or float64 points, x y z first and intensity fourth where there is one, in metres.
 

@@ -1,0 +1,10 @@
+"""Arguments of the public face, refused by name where they are of a wrong type or shape, before any work.
+
+`checked` holds the arguments of a function or class against their annotations; arrays, whose annotations say little,
+go through `as_array` and `numbers`. What the values mean is for the callee to check.
+"""
+
+from ldls.checks.annotations import checked, checked_as
+from ldls.checks.values import as_array, as_image_size, numbers, shown, whole_number
+
+__all__ = ["as_array", "as_image_size", "checked", "checked_as", "numbers", "shown", "whole_number"]

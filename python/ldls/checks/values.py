@@ -1,0 +1,127 @@
+"""Numbers, sizes and arrays of a type and shape, or an error that names the argument."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import DtypeError, InputError, LimitError, ParameterError, ShapeError
+
+MAX_ROWS = 2**31 - 1
+"""Most rows of an array: points and labels are numbered by 32 bits with sign."""
+LONGEST = 80
+"""Characters of a value that a message shows."""
+
+
+def whole_number(
+    name: str, value: object, low: int, high: int = MAX_ROWS, error: type[InputError] = ParameterError
+) -> int:
+    """`value` as an int.
+
+    Raises:
+        ParameterError: It is no whole number from `low` to `high`; or another `error`.
+    """
+    if not is_whole(value) or not low <= operator.index(value) <= high:  # type: ignore[arg-type]
+        raise error(f"{name}: got {shown(value)}, expected a whole number from {low} to {high}")
+    return operator.index(value)  # type: ignore[arg-type]
+
+
+def as_image_size(name: str, value: object, error: type[InputError] = ParameterError) -> tuple[int, int]:
+    """`value` as (height, width) in pixels.
+
+    Raises:
+        ParameterError: It is no pair of whole numbers from 1; or another `error`.
+    """
+    pair = tuple(value) if isinstance(value, list | tuple) else ()
+    if len(pair) != 2 or not all(is_whole(side) and 0 < operator.index(side) <= MAX_ROWS for side in pair):
+        raise error(f"{name} is {shown(value)}, expected (height, width) in whole pixels")
+    return operator.index(pair[0]), operator.index(pair[1])
+
+
+def as_array(name: str, values: object, error: type[InputError] | None = None) -> NDArray[Any]:
+    """`values` as an array of whatever type and shape; no copy of one that is an array already.
+
+    Raises:
+        ShapeError: Rows of different lengths; `error` if given, as in all that follows.
+        DtypeError: A masked array, or what cannot be made an array.
+        LimitError: More rows than can be numbered.
+    """
+    if isinstance(values, np.ma.MaskedArray):
+        raise (error or DtypeError)(f"{name}: got a masked array; pass {name}.filled(...) with a value")
+    try:
+        array = np.asarray(values)
+    except MemoryError:
+        raise
+    except Exception as problem:  # of NumPy, or of whatever object calls itself an array
+        kind = ShapeError if "inhomogeneous" in str(problem) else DtypeError
+        raise (error or kind)(f"{name}: expected an array of numbers, got {shown(values)}; {problem}") from None
+    if array.ndim and len(array) > MAX_ROWS:
+        raise LimitError(f"{name}: {len(array)} rows exceed the limit of {MAX_ROWS}; split the input")
+    return array
+
+
+def numbers(
+    name: str,
+    values: object,
+    dtype: type[np.generic],
+    *shapes: tuple[int | str, ...],
+    error: type[InputError] | None = None,
+) -> NDArray[Any]:
+    """`values` as a C-contiguous, aligned array of `dtype` and of one of `shapes`, copied only where it must be.
+
+    Args:
+        name: What messages call them.
+        values: Anything that NumPy makes an array of.
+        dtype: A float type takes whole numbers too; an integer type those that it can hold; bool nothing else.
+        shapes: Lengths by axis; text stands for any length.
+        error: What to raise instead of the following.
+
+    Raises:
+        ShapeError: Another shape.
+        DtypeError: Text, objects, complex numbers, or real ones where whole ones are expected.
+        InputError: A whole number that `dtype` cannot hold.
+        LimitError: More rows than can be numbered.
+    """
+    array = as_array(name, values, error)
+    wanted = np.dtype(dtype)
+    if array.size == 0 and not isinstance(values, np.ndarray):
+        array = array.astype(wanted)  # lists without a number have no type of their own
+    if array.dtype.kind not in {"f": "fiu", "i": "iu", "u": "iu", "b": "b"}[wanted.kind]:
+        kind = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "bool"}[wanted.kind]
+        raise (error or DtypeError)(f"{name}: expected {kind}, got {array.dtype}; pass {name}.astype({wanted})")
+    if not any(_fits(array.shape, shape) for shape in shapes):
+        expected = " or ".join(f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})" for shape in shapes)
+        raise (error or ShapeError)(f"{name}: expected shape {expected}, got {array.shape}")
+    if wanted.kind in "iu" and array.size:
+        low, high = np.iinfo(dtype).min, np.iinfo(dtype).max  # type: ignore[type-var]
+        if not (array.min() >= low and array.max() <= high):
+            raise (error or InputError)(f"{name}: got {array.min()} to {array.max()}, expected {low} to {high}")
+    with np.errstate(over="ignore"):
+        return np.require(array, wanted, ["C", "A"])
+
+
+def shown(value: object) -> str:
+    """`value` as messages show it: short, whatever it is."""
+    try:
+        text = repr(value) if not isinstance(value, np.ndarray) else f"an array of shape {value.shape}"
+    except Exception:  # a whole number of thousands of digits, or an object that cannot say what it is
+        return f"a value of type {type(value).__name__}"
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+def is_whole(value: object) -> bool:
+    """True for a whole number, NumPy's too; a bool is none."""
+    try:
+        operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        return False
+    return not isinstance(value, bool | np.bool_ | np.ndarray)
+
+
+def _fits(found: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
+    return len(found) == len(shape) and all(
+        isinstance(want, str) or have == want for have, want in zip(found, shape, strict=True)
+    )

@@ -1,0 +1,257 @@
+//! Label diffusion: the series and its winners against plain products z <- A z + b in double precision.
+
+use crate::clouds::random_cloud;
+use crate::{Bytes, Outcome};
+use ldls_core::{Neighbors, PixelLabels, PointGraph, Products, Real, diffuse, likelihoods};
+
+/// Largest error of a likelihood on the graph of a cloud, as a share of the largest there is.
+const TOLERANCE: f64 = 5e-4;
+/// The same on graphs that no cloud has: where values flow one way, a series may leave plain products unseen.
+const TOLERANCE_OF_ANY: f64 = 2e-2;
+/// Largest change of a likelihood by one more product where a diffusion is said to have converged.
+const CONVERGED: f64 = 1e-5;
+/// Share of the largest likelihood of a point up to which two labels may be taken for each other: rounding of sums.
+const ROUNDING: f64 = 1e-9;
+/// Share of the largest seed below which a likelihood is nothing.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// The arrays of a sparse matrix.
+struct Csr {
+    offsets: Vec<usize>,
+    columns: Vec<u32>,
+    weights: Vec<f64>,
+}
+
+/// The diffusion of labels over a random graph.
+///
+/// # Panics
+/// If likelihoods or winners are not those of plain products.
+pub fn diffusion(data: &[u8]) -> Outcome {
+    let mut bytes = Bytes::new(data);
+    let of_cloud = bytes.below(3) > 0;
+    let (graph, tolerance) = if of_cloud {
+        (cloud_graph(&mut bytes), TOLERANCE)
+    } else {
+        (any_graph(&mut bytes), TOLERANCE_OF_ANY)
+    };
+    let n_labels = 1 + [bytes.below(3), bytes.below(9), bytes.below(40)][bytes.below(3)];
+    let (labels, mass) = random_labels(&mut bytes, graph.offsets.len() - 1, n_labels);
+    let iterations = [Some(1 + bytes.below(12)), Some(1 + bytes.below(300)), None][bytes.below(3)];
+    let (a, b) = system::<f32>(&graph, &labels, &mass);
+
+    let (found, convergence) = likelihoods(&a, &b, n_labels, iterations).expect("the system fits");
+    let products = iterations.unwrap_or(convergence.sweeps);
+    let plain = plain_products(&a, &b, n_labels, products);
+    match iterations {
+        Some(_) => assert_near(&found, &plain, tolerance),
+        None if convergence.converged() => {
+            let z: Vec<f64> = found.iter().copied().map(f64::from).collect();
+            let next = plain_product(&a, &b, n_labels, &z);
+            let change = z
+                .iter()
+                .zip(&next)
+                .map(|(x, y)| (x - y).abs())
+                .fold(0.0, f64::max);
+            assert!(
+                change <= 1.1 * CONVERGED,
+                "converged, and one product more changes {change:e}"
+            );
+        }
+        None => assert!(
+            found.iter().all(|value| value.is_finite()),
+            "not converged, and not finite"
+        ),
+    }
+    if let Some(iterations) = iterations {
+        let mut products = Products::new(a.clone(), b.clone(), n_labels, Some(iterations))
+            .expect("the system fits");
+        while !products.is_finished() {
+            products.advance(1 + bytes.below(9));
+        }
+        let plain: Vec<f32> = plain.iter().map(|&value| value as f32).collect();
+        assert_eq!(products.likelihoods(), plain, "products one by one");
+        if of_cloud {
+            check_winners(&graph, (&labels, &mass), (&a, &b), n_labels, iterations);
+        }
+    }
+    Outcome::Accepted
+}
+
+/// Holds the label of each point against plain products over the same graph in double precision.
+fn check_winners(
+    graph: &Csr,
+    (labels, mass): (&Csr, &[f64]),
+    (a, b): (&PointGraph, &PixelLabels),
+    n_labels: usize,
+    iterations: usize,
+) {
+    let exact = system::<f64>(graph, labels, mass);
+    let plain = plain_products(&exact.0, &exact.1, n_labels, iterations);
+    let weights =
+        (0..labels.offsets.len() - 1).flat_map(|i| exact.1.row(i).map(|(_, weight)| weight));
+    let seeds = weights.fold(0.0, f64::max);
+    let found = diffuse(a, b, n_labels, Some(iterations), || Ok(exact)).expect("the system fits");
+    for (i, (row, &label)) in plain.chunks(n_labels).zip(&found.labels).enumerate() {
+        let best = row.iter().copied().fold(0.0, f64::max);
+        let own = row[label as usize];
+        let nothing = best <= NEGLIGIBLE * seeds;
+        assert!(
+            own >= best - ROUNDING * best || nothing,
+            "point {i} has label {label} of {own:e}, {row:?}"
+        );
+        // of equal likelihoods the lowest label, where rounding cannot have told them apart
+        let first = row.iter().position(|&value| value == best).unwrap_or(0);
+        let near = row
+            .iter()
+            .filter(|&&value| value >= best - ROUNDING * best)
+            .count();
+        assert!(
+            nothing || near > 1 || label as usize == first,
+            "point {i} has label {label}, {row:?}"
+        );
+    }
+}
+
+fn assert_near(found: &[f32], plain: &[f64], tolerance: f64) {
+    assert_eq!(found.len(), plain.len());
+    let largest = plain.iter().copied().fold(0.0, f64::max);
+    for (at, (&found, &plain)) in found.iter().zip(plain).enumerate() {
+        let error = (f64::from(found) - plain).abs();
+        assert!(
+            error <= tolerance * largest,
+            "likelihood {at} is {found:e}, by plain products {plain:e}, of at most {largest:e}"
+        );
+    }
+}
+
+fn plain_products<T: Real>(
+    a: &PointGraph<T>,
+    b: &PixelLabels<T>,
+    n_labels: usize,
+    products: usize,
+) -> Vec<f64> {
+    let zeros = vec![0.0; a.len() * n_labels];
+    (0..products).fold(zeros, |z, _| plain_product(a, b, n_labels, &z))
+}
+
+/// A z + b.
+fn plain_product<T: Real>(
+    a: &PointGraph<T>,
+    b: &PixelLabels<T>,
+    n_labels: usize,
+    z: &[f64],
+) -> Vec<f64> {
+    let mut next = vec![0.0; z.len()];
+    for i in 0..a.len() {
+        for (label, weight) in b.row(i) {
+            next[i * n_labels + label] += weight.to_f64();
+        }
+        for (j, weight) in a.row(i) {
+            for label in 0..n_labels {
+                next[i * n_labels + label] += weight.to_f64() * z[j * n_labels + label];
+            }
+        }
+    }
+    next
+}
+
+/// A and b from the weights of edges, rows that sum to 1 together.
+fn system<T: Real>(graph: &Csr, labels: &Csr, mass: &[f64]) -> (PointGraph<T>, PixelLabels<T>) {
+    let of =
+        |values: &[f64]| -> Vec<T> { values.iter().map(|&value| T::from_f64(value)).collect() };
+    let mut a = PointGraph::from_csr(
+        graph.offsets.clone(),
+        graph.columns.clone(),
+        of(&graph.weights),
+    )
+    .expect("it is a square matrix");
+    let mut b = PixelLabels::from_csr(
+        labels.offsets.clone(),
+        labels.columns.clone(),
+        of(&labels.weights),
+        of(mass),
+    )
+    .expect("it is a matrix");
+    a.normalize_rows(&mut b).expect("as many rows");
+    (a, b)
+}
+
+/// The graph of a cloud's nearest neighbours.
+fn cloud_graph(bytes: &mut Bytes<'_>) -> Csr {
+    let mut points = random_cloud(bytes);
+    points.truncate(200);
+    let sigma = 10_f64.powf(bytes.between(-2.0, 2.0));
+    let neighbors = Neighbors::search(&points, 1 + bytes.below(12));
+    let squared = neighbors.squared_distances(&points);
+    let (mut columns, mut weights) = (Vec::new(), Vec::new());
+    for i in 0..points.len() {
+        let row = i * neighbors.k..(i + 1) * neighbors.k;
+        columns.push(i as u32);
+        weights.push(1.0);
+        columns.extend(&neighbors.indices[row.clone()]);
+        weights.extend(squared[row].iter().map(|d| (-d / sigma).exp()));
+    }
+    let offsets = (0..=points.len()).map(|i| i * (neighbors.k + 1)).collect();
+    Csr {
+        offsets,
+        columns,
+        weights,
+    }
+}
+
+/// Edges from anywhere to anywhere, or a ring on which values flow one way.
+fn any_graph(bytes: &mut Bytes<'_>) -> Csr {
+    let n = 1 + bytes.below(120);
+    let ring = bytes.below(3) == 0;
+    let (drift, most) = (bytes.unit(), 1 + bytes.below(6));
+    let mut graph = Csr {
+        offsets: vec![0],
+        columns: Vec::new(),
+        weights: Vec::new(),
+    };
+    for i in 0..n {
+        let mut row: Vec<(u32, f64)> = if ring {
+            vec![((i + 1) % n, 1.0), ((i + n - 1) % n, drift)]
+                .into_iter()
+                .map(|(j, w)| (j as u32, w))
+                .collect()
+        } else {
+            (0..bytes.below(most + 1))
+                .map(|_| (bytes.below(n) as u32, bytes.unit()))
+                .collect()
+        };
+        row.sort_by_key(|&(j, _)| j);
+        row.dedup_by_key(|&mut (j, _)| j);
+        graph.columns.extend(row.iter().map(|&(j, _)| j));
+        graph.weights.extend(row.iter().map(|&(_, weight)| weight));
+        graph.offsets.push(graph.columns.len());
+    }
+    graph
+}
+
+/// Weights of pixel edges by label, and of all of them, for `points` points: none for some.
+fn random_labels(bytes: &mut Bytes<'_>, points: usize, n_labels: usize) -> (Csr, Vec<f64>) {
+    let pixel_weight = [0.001, 0.001, 1.0][bytes.below(3)];
+    let share = bytes.unit();
+    let mut labels = Csr {
+        offsets: vec![0],
+        columns: Vec::new(),
+        weights: Vec::new(),
+    };
+    let mut mass = Vec::new();
+    for _ in 0..points {
+        let (mut largest, mut sum) = (0.0_f64, 0.0);
+        for label in 0..n_labels as u32 {
+            if bytes.unit() < share / (1.0 + f64::from(label)) {
+                let weight = pixel_weight * (1 + bytes.below(25)) as f64;
+                labels.columns.push(label);
+                labels.weights.push(weight);
+                (largest, sum) = (largest.max(weight), sum + weight);
+            }
+        }
+        labels.offsets.push(labels.columns.len());
+        // a pixel under two masks counts once, one that no mask may label counts as well
+        mass.push([largest, sum, sum + pixel_weight * bytes.below(3) as f64][bytes.below(3)]);
+    }
+    (labels, mass)
+}
