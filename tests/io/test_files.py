@@ -1,0 +1,135 @@
+"""The one door through which files come: what it refuses, and what it makes of failures of whatever parses them."""
+
+import errno
+import os
+import socket
+import struct
+import tokenize
+
+import numpy as np
+import pytest
+
+import ldls
+from ldls.io.files import open_file
+
+
+class PanicException(BaseException):
+    """As libraries in Rust raise it: `except Exception` does not catch it."""
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A file of ten bytes."""
+    path = tmp_path / "ten.bin"
+    path.write_bytes(b"0123456789")
+    return path
+
+
+def failing(path, error):
+    with open_file(path, "image"):
+        raise error
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        pytest.param(PanicException("index out of bounds"), id="panic of a library in Rust"),
+        pytest.param(RecursionError("too deep"), id="nesting"),
+        pytest.param(struct.error("unpack requires 4 bytes"), id="struct"),
+        pytest.param(tokenize.TokenError("EOF in multi-line statement"), id="numpy header"),
+        pytest.param(KeyError("TYPE"), id="missing key"),
+        pytest.param(IndexError("list index out of range"), id="index"),
+        pytest.param(ZeroDivisionError("division by zero"), id="division by zero"),
+        pytest.param(AttributeError("no attribute"), id="attribute"),
+        pytest.param(SystemError("unknown opcode"), id="system error"),
+        pytest.param(OverflowError("too large"), id="overflow"),
+        pytest.param(AssertionError("chunk"), id="assertion"),
+        pytest.param(StopIteration(), id="end of an iterator"),
+        pytest.param(np._core._exceptions._UFuncNoLoopError(np.add, (np.dtype("U1"),) * 3), id="UFuncTypeError"),
+        pytest.param(OSError("image file is truncated"), id="OSError of a library"),
+        pytest.param(OSError(errno.EINVAL, "Invalid argument"), id="seek to a place before the file"),
+    ],
+)
+def test_whatever_a_library_raises_is_a_corrupt_file(path, error):
+    with pytest.raises(ldls.CorruptFileError, match=r"ten\.bin: not a whole image \(") as caught:
+        failing(path, error)
+    assert type(error).__name__ in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        pytest.param(OSError(errno.EIO, "Input/output error"), id="disk"),
+        pytest.param(MemoryError(), id="memory"),
+        pytest.param(KeyboardInterrupt(), id="Ctrl-C"),
+        pytest.param(SystemExit(2), id="exit"),
+        pytest.param(ImportError("run: pip install 'ldls[ros]'"), id="missing extra"),
+        pytest.param(UserWarning("made an error by the user's filter"), id="warning"),
+    ],
+)
+def test_what_is_not_the_files_fault_passes(path, error):
+    with pytest.raises(type(error)) as caught:
+        failing(path, error)
+    assert caught.value is error
+
+
+def test_errors_of_the_system_name_the_file(path):
+    with pytest.raises(OSError, match=r"ten\.bin"):
+        failing(path, OSError(errno.EIO, "Input/output error"))
+
+
+@pytest.mark.parametrize("place", ["", "{path}: ", "{path}, line 3: "], ids=["bare", "named", "line named"])
+def test_errors_of_ldls_name_the_file_once(path, place):
+    with pytest.raises(ldls.MaskError) as caught, open_file(path, "file of masks"):
+        failing(path, ldls.MaskError(place.format(path=path) + "no such mask"))
+    assert str(caught.value) == (place or "{path}: ").format(path=path) + "no such mask"
+
+
+def test_more_than_the_limit_is_refused_with_size_and_limit(path):
+    with open_file(path, "calibration", limit=10) as file:
+        assert file.read() == b"0123456789"
+    with (
+        pytest.raises(ldls.LimitError, match=r"ten\.bin: 10 bytes, expected at most 9 .*calibration"),
+        open_file(path, "calibration", limit=9),
+    ):
+        pass
+
+
+def test_a_file_that_grows_ends_where_it_ended(path):
+    with open_file(path, "file") as file, path.open("ab") as writer:
+        writer.write(b"more" * 1000)
+        writer.flush()
+        assert file.read() == b"0123456789"
+        assert file.read() == b""
+
+
+def test_a_file_that_shrinks_ends_where_it_ends(path):
+    with open_file(path, "file") as file:
+        os.truncate(path, 4)
+        assert file.read() == b"0123"
+
+
+def test_lying_lengths_take_no_memory(path):
+    with open_file(path, "file") as file:
+        assert file.read(1 << 60) == b"0123456789"
+
+
+def test_a_socket_is_refused(tmp_path):
+    path = tmp_path / "socket"
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        with (
+            pytest.raises(ldls.FileFormatError, match="got a socket"),
+            open_file(path, "file"),
+        ):
+            pass
+
+
+def test_paths_with_nul_are_refused():
+    with pytest.raises(ldls.UnsafePathError, match="null"), open_file("a\0b", "file"):
+        pass
+
+
+def test_a_missing_file_stays_one(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"missing\.bin"), open_file(tmp_path / "missing.bin", "file"):
+        pass
