@@ -247,7 +247,7 @@ def test_masks_of_the_research_code_get_coco_ids(tmp_path):
     ("arrays", "error", "message"),
     [
         pytest.param({"a": np.zeros(3)}, ldls.UnsupportedFormatError, "found arrays", id="other"),
-        pytest.param({"a": np.array([{}])}, ldls.UnsafeFileError, "object arrays", id="objects"),
+        pytest.param(research_arrays(np.array([[[{}]]]), [1]), ldls.UnsafeFileError, "object arrays", id="objects"),
         pytest.param(research_arrays(random_pixels(1), [81]), ldls.MaskError, "class_ids: 81", id="class 81"),
         pytest.param(research_arrays(random_pixels(2), [1]), ldls.MaskError, "one mask a class", id="unequal"),
     ],

@@ -121,7 +121,7 @@ def _open(path: Path, what: str, limit: int) -> InputFile:
         status = os.fstat(descriptor)
         _check_regular(status.st_mode)
         if status.st_size > limit:
-            raise LimitError(f"{status.st_size:,} bytes, expected at most {limit:,} of a file of this kind ({what})")
+            raise LimitError(f"{status.st_size:,} bytes, expected at most {limit:,} of a {what}; split it")
         return InputFile(path, descriptor, status.st_size)
     except BaseException:
         os.close(descriptor)

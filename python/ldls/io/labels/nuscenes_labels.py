@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import CorruptFileError, InputError, LimitError
-from ldls.io.arrays import read_npz, write_npz
+from ldls.io.arrays import open_npz, write_npz
 from ldls.io.files import open_file, whole_file
 from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
@@ -67,14 +67,14 @@ def read_panoptic(path: str | PathLike[str]) -> Labeling:
         CorruptFileError: It is not a whole `.npz` file with one array `data` of such labels.
         FileNotFoundError: There is no such file.
     """
-    arrays = read_npz(path)
-    labels = arrays.get("data")
-    if labels is None or labels.ndim != 1 or labels.dtype.kind not in "iu":
-        raise CorruptFileError(f"{path}: found arrays {sorted(arrays)}, expected 'data' with a uint16 a point")
-    try:
-        return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=labels % INSTANCES_A_CLASS)
-    except InputError as error:
-        raise CorruptFileError(f"{path}: {error}") from None
+    with open_npz(path) as arrays:
+        labels = arrays.get("data")
+        if labels is None or labels.ndim != 1 or labels.dtype.kind not in "iu":
+            raise CorruptFileError(f"found arrays {arrays.listed()}, expected 'data' with a uint16 a point")
+        try:
+            return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=labels % INSTANCES_A_CLASS)
+        except InputError as error:
+            raise CorruptFileError(str(error)) from None
 
 
 def write_lidarseg(path: Path, result: Segmentation) -> None:
