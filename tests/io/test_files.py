@@ -4,13 +4,15 @@ import errno
 import os
 import socket
 import struct
+import subprocess
+import sys
 import tokenize
 
 import numpy as np
 import pytest
 
 import ldls
-from ldls.io.files import open_file
+from ldls.io.files import UNFINISHED, open_file, sweep, sync_folder, whole_file
 
 
 class PanicException(BaseException):
@@ -133,3 +135,50 @@ def test_paths_with_nul_are_refused():
 def test_a_missing_file_stays_one(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"missing\.bin"), open_file(tmp_path / "missing.bin", "file"):
         pass
+
+
+@pytest.mark.parametrize("length", [254, 255])
+def test_names_as_long_as_names_can_be_are_written(tmp_path, length):
+    path = tmp_path / ("n" * (length - 4) + ".bin")
+    with whole_file(path) as file:
+        file.write(b"content")
+    assert path.read_bytes() == b"content"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_name_that_is_too_long_leaves_nothing(tmp_path):
+    with pytest.raises(OSError, match="nnnn") as caught, whole_file(tmp_path / ("n" * 256)) as file:
+        file.write(b"content")
+    assert caught.value.errno == errno.ENAMETOOLONG
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folders_are_synced_and_swept_where_none_can_be_opened(tmp_path, monkeypatch):
+    """As on Windows, where opening a folder is not permitted."""
+
+    def refuse(path, flags):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    (tmp_path / f".0123{UNFINISHED}").touch()
+    monkeypatch.setattr(os, "open", refuse)
+    sync_folder(tmp_path)
+    assert sweep(tmp_path) == 1
+
+
+def test_folders_are_refused_where_none_can_be_opened(tmp_path, monkeypatch):
+    def refuse(path, flags):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(ldls.FileFormatError, match="got a folder"), open_file(tmp_path, "file"):
+        pass
+
+
+def test_flags_that_a_system_lacks_are_done_without(path):
+    lines = [
+        "import os, sys",
+        "del os.O_NONBLOCK, os.O_NOCTTY",
+        "from ldls.io.files import open_file",
+        "with open_file(sys.argv[1], 'file') as file: assert file.read() == b'0123456789'",
+    ]
+    subprocess.run([sys.executable, "-c", "\n".join(lines), str(path)], check=True)

@@ -19,6 +19,7 @@ UNFINISHED = ".ldls-part"
 """Ending of the names of files that are being written."""
 MAX_BYTES = 4 << 30
 """Largest file that is read where its reader states no limit of its own."""
+MAX_TEXT_BYTES = 1 << 30
 KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -142,14 +143,15 @@ def regular_file(path: str | PathLike[str]) -> Path:
     return path
 
 
-def read_lines(path: str | PathLike[str], what: str = "text file") -> list[str]:
+def read_lines(path: str | PathLike[str], what: str = "text file", *, limit: int = MAX_TEXT_BYTES) -> list[str]:
     """The lines of a text file without their ends; the blank ones at its end are left out.
 
     Raises:
         CorruptFileError: It is not text.
         FileFormatError: It is no regular file.
+        LimitError: It has more bytes than `limit`.
     """
-    with open_file(path, what) as file:
+    with open_file(path, what, limit=limit) as file:
         return file.text().rstrip().splitlines()
 
 
@@ -168,8 +170,9 @@ def names_file(path: str | PathLike[str]) -> Iterator[None]:
 def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails."""
     target = Path(path)
-    # beside the target, for only within one file system is a file renamed at a stroke
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}{UNFINISHED}")
+    # beside the target, for only within one file system is a file renamed at a stroke; without its name, which may be
+    # as long as names can be
+    temporary = target.with_name(f".{secrets.token_hex(8)}{UNFINISHED}")
     try:
         with names_file(target), temporary.open("xb") as file:
             yield file
