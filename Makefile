@@ -51,6 +51,10 @@ pictures: ## Make the pictures of the documentation anew, by the commands beside
 kills: ## Kill 200 runs of `ldls run` and hold what they leave, resumed, against an undisturbed one.
 	python tests/campaigns/kills.py
 
+.PHONY: fuzz-files
+fuzz-files: ## Change a million files for each parser at random and read them: only errors of ldls may come of it.
+	python tests/campaigns/parsers.py
+
 .PHONY: sample
 sample: ## Make the frame of `ldls demo` anew, from its seed.
 	python tests/simulation/make_sample.py
