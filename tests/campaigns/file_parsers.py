@@ -169,7 +169,7 @@ def pcd_compressed(_):
 def packed_pcd(parts):
     """Header and columns, the columns packed as they are after their change."""
     header, columns = parts
-    content = lzf.compress(columns) or b""
+    content = (len(columns) > 4 and lzf.compress(columns)) or b""
     return header + struct.pack("<II", len(content), len(columns)) + content
 
 
