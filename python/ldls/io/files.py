@@ -86,7 +86,7 @@ def open_file(path: str | PathLike[str], what: str, *, limit: int = MAX_BYTES) -
         OSError: It is not there, or the system cannot read it.
     """
     path = Path(path)
-    with within(path), names_file(path), _open(path, what, limit) as file, parsing(what):
+    with within(path), names_file(path), opened(path, what, limit=limit) as file, parsing(what):
         yield file
 
 
@@ -109,7 +109,8 @@ def parsing(what: str) -> Iterator[None]:
         raise CorruptFileError(f"not a whole {what} ({type(error).__name__}: {str(error)[:200]})") from error
 
 
-def _open(path: Path, what: str, limit: int) -> InputFile:
+def opened(path: Path, what: str, *, limit: int) -> InputFile:
+    """The file `path`, for a library that reads it longer than a block lasts; errors as of `open_file`, unnamed."""
     try:
         descriptor = os.open(path, FLAGS)
     except ValueError as error:
