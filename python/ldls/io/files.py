@@ -13,7 +13,15 @@ from os import PathLike
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import IO
 
-from ldls.errors import CorruptFileError, FileFormatError, LdlsError, LimitError, UnsafePathError, within
+from ldls.errors import (
+    CorruptFileError,
+    FileFormatError,
+    LdlsError,
+    LimitError,
+    TruncatedFileError,
+    UnsafePathError,
+    within,
+)
 
 UNFINISHED = ".ldls-part"
 """Ending of the names of files that are being written."""
@@ -50,9 +58,18 @@ class InputFile(io.BufferedReader):
         """The next `size` bytes, or all; never more than there were when the file was opened.
 
         Nothing is allocated for bytes that are not there, and a file that grows comes to an end.
+
+        Raises:
+            TruncatedFileError: The file has become shorter since.
         """
         left = max(self.size - self.tell(), 0)
-        return super().read(left if size is None or size < 0 else min(size, left))
+        wanted = left if size is None or size < 0 else min(size, left)
+        content = super().read(wanted)
+        if len(content) < wanted:
+            raise TruncatedFileError(
+                f"ends at byte {self.tell()}, it had {self.size} when it was opened; read it when nobody writes to it"
+            )
+        return content
 
     def text(self) -> str:
         """What is left of the file as text in UTF-8, with or without a byte order mark.

@@ -7,7 +7,7 @@ import warnings
 import weakref
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from operator import attrgetter
@@ -116,23 +116,35 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
     for file in (*files, *path.glob("metadata.yaml")):
         with open_bag_file(file):  # what is no regular file is refused before a library opens it
             pass
+    bag, fault = _try_indexed(path, files)
+    if bag is not None and not recover:
+        return bag
+    salvaged = salvage(files)
+    if bag is not None and salvaged.damage is None:
+        return bag
+    if fault is not None and salvaged.damage is None and not salvaged.messages:
+        raise fault
+    damage = f"{path}: {salvaged.damage}" if salvaged.damage else str(fault)
+    whole = salvaged.messages
+    last = f"the last at {seconds(whole[-1].received_ns)}" if whole else "so nothing can be saved"
+    message = f"{damage}; {len(whole)} whole messages before it, {last}"
+    if not recover:
+        raise TruncatedFileError(f"{message}; pass recover=True to read them") from fault
+    warnings.warn(message, RecoveredFileWarning, stacklevel=3)
+    if bag is not None:
+        bag.close()
+    return _recovered(path, salvaged, ros2=files[0].suffix != ".bag")
+
+
+def _try_indexed(path: Path, files: Sequence[Path]) -> tuple[Bag | None, FileFormatError | None]:
+    """The bag read through its index, or why it cannot be."""
     try:
         for file in files:
             if file.suffix == ".db3":
                 check_database_size(file)
-        return _indexed(path)
+        return _indexed(path), None
     except FileFormatError as error:
-        salvaged = salvage(files)
-        if salvaged.damage is None and not salvaged.messages:
-            raise
-        damage = f"{path}: {salvaged.damage}" if salvaged.damage else str(error)
-        whole = salvaged.messages
-        last = f"the last at {seconds(whole[-1].received_ns)}" if whole else "so nothing can be saved"
-        message = f"{damage}; {len(whole)} whole messages before it, {last}"
-        if not recover:
-            raise TruncatedFileError(f"{message}; pass recover=True to read them") from error
-        warnings.warn(message, RecoveredFileWarning, stacklevel=3)
-        return _recovered(path, salvaged, ros2=files[0].suffix != ".bag")
+        return None, error
 
 
 class _BagPath(type(Path())):  # type: ignore[misc]
@@ -171,9 +183,19 @@ def _indexed(path: Path) -> Bag:
 
     def read(topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[RawMessage]:
         connections = [c for c in reader.connections if c.topic in topics]
-        if connections:  # the reader takes none for all
-            for connection, received_ns, raw in reader.messages(connections, start_ns, stop_ns):
-                yield RawMessage(connection.topic, received_ns, bytes(raw))
+        if not connections:  # the reader takes none for all
+            return
+        found, expected = 0, sum(int(c.msgcount) for c in connections)
+        for found, (connection, received_ns, raw) in enumerate(  # noqa: B007 - counted for the check below
+            reader.messages(connections, start_ns, stop_ns), start=1
+        ):
+            yield RawMessage(connection.topic, received_ns, bytes(raw))
+        # the reader passes over records of a wrong length without a word
+        if start_ns is None and stop_ns is None and found < expected:
+            raise TruncatedFileError(
+                f"holds {found} messages of {', '.join(topics)}, its index says {expected}; pass recover=True to read "
+                "the whole ones"
+            )
 
     topics = {
         name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))

@@ -137,23 +137,28 @@ class _Scan:
         self.path, self.salvaged = path, salvaged
         self.topics: dict[int, str] = {}
         self.schemas: dict[int, str] = {}
-        self.indexed = False
+        self.closed = False
+        self.damage_in_chunk: str | None = None
 
     def run(self, content: FileBytes) -> str | None:
         """Take in the whole messages; the end of the file in words, None if it is whole."""
         if content[: len(self.magic)] != self.magic:
             return f"does not begin with {self.magic!r}, so it is no {self.name}"
-        return self.take(content, len(self.magic), _Chunk(self.path, 0, len(content)))
+        damage = self.take(content, len(self.magic), _Chunk(self.path, 0, len(content))) or self.damage_in_chunk
+        return damage or (None if self.closed else "has no index, as its recording was not closed")
 
     def take(self, content: Content, start: int, place: _Chunk) -> str | None:
-        """Take in the whole messages from `start` on of `content`, which lies at `place`."""
+        """Take in the whole messages from `start` on of `content`, which lies at `place`; None if it is all whole."""
         raise NotImplementedError
 
     def take_chunk(self, start: int, size: int, left: int, compression: str) -> None:
         """Take in the whole messages of a chunk, of which `left` bytes are in the file."""
         chunk = _Chunk(self.path, start, min(size, left), compression.replace("none", ""))
-        if size <= left or not chunk.compression:  # a part of compressed bytes is good for nothing
-            self.take(chunk.read(), 0, chunk)
+        if size > left and chunk.compression:  # a part of compressed bytes is good for nothing
+            return
+        damage = self.take(chunk.read(), 0, chunk)
+        if self.damage_in_chunk is None and damage is not None:
+            self.damage_in_chunk = f"the chunk at byte {start} {damage}"
 
     def add(self, channel: int, received_ns: int, read: Callable[[], bytes]) -> None:
         """Take in a whole message."""
@@ -178,16 +183,14 @@ class _Rosbag1(_Scan):
             self.take_record(header, content, place, data, size)
             if start > len(content):
                 return f"ends at byte {len(content)} within a record that goes on to {start}"
-        if start != len(content):
-            return f"ends at byte {len(content)} within the record at {start}"
-        return None if self.indexed else "has no index, as its recording was not closed"
+        return None if start == len(content) else f"ends at byte {len(content)} within the record at {start}"
 
     def take_record(self, header: Any, content: Content, place: _Chunk, start: int, size: int) -> None:  # noqa: ANN401
         kind, left = header.get_uint8("op"), len(content) - start
         if kind == 5 and place.start == 0:  # a chunk, which holds no chunks
             self.take_chunk(start, size, left, header.get_string("compression"))
         elif kind == 3:  # the header of the bag
-            self.indexed = header.get_uint64("index_pos") != 0
+            self.closed = header.get_uint64("index_pos") != 0
         elif kind == 7 and size <= left:  # a connection
             topic = self.topics[header.get_uint32("conn")] = header.get_string("topic")
             kind = _fields(content[start - 4 : start + size]).get_string("type")
@@ -211,11 +214,12 @@ class _Mcap(_Scan):
             kind, size = _unpack("<BQ", content, start)
             data, start = start + 9, start + 9 + size
             if kind == 2:  # the footer
+                self.closed = True
                 return None
             self.take_record(kind, content, place, data, size)
             if start > len(content):
                 return f"ends at byte {len(content)} within a record that goes on to {start}"
-        return f"ends at byte {len(content)} without a footer"
+        return None if start == len(content) else f"ends at byte {len(content)} within the record at {start}"
 
     def take_record(self, kind: int, content: Content, place: _Chunk, start: int, size: int) -> None:
         if kind == 6 and place.start == 0:  # a chunk: times, size, checksum, compression, compressed size, records
@@ -281,6 +285,7 @@ class _Database(_Scan):
                     self.add(topic_number, received_ns, partial(self.read, number))
         except require("apsw", "ros").Error as error:
             return f"SQLite finds it damaged ({error})"
+        self.closed = True
         return None
 
     def read(self, number: int) -> bytes:
