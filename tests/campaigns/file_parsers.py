@@ -3,10 +3,12 @@
 import functools
 import io
 import json
+import os
 import random
 import sqlite3
 import struct
 import tempfile
+import traceback
 import warnings
 import zipfile
 import zlib
@@ -31,7 +33,7 @@ from ldls.batch.journal import JOURNAL_NAME, Journal
 from ldls.datasets import nuscenes_tables
 from ldls.datasets.folder_description import read_description
 from ldls.datasets.nuscenes_frame import NuScenesFrameSource
-from ldls.errors import FileFormatError
+from ldls.errors import FileFormatError, LdlsError
 from ldls.io.images import read_image_size
 from ldls.io.labels import read_kitti_objects, read_labeling, write_annotations, write_labeling
 from ldls.io.ros.bags import Bag, open_bag
@@ -91,8 +93,31 @@ class Parser:
         if len(names) == 1:
             contents = [content]
         for name, own in zip(names, contents, strict=False):
+            (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_bytes(own)
         return folder / names[0] if len(names) == 1 else folder
+
+    def outcome(self, folder, content):
+        """What becomes of `content`: "accepted", "refused", "fat", or what wrong error came, and from where."""
+        path = self.place(folder, content)
+        try:
+            self.read(path)
+        except (LdlsError, *self.allowed):
+            return "refused"
+        except MemoryError:
+            return "fat"
+        except BaseException as error:  # panics of libraries are no Exceptions
+            if isinstance(error, (KeyboardInterrupt, SystemExit)):
+                raise
+            return place_of(error)
+        return "accepted"
+
+
+def place_of(error):
+    """Kind of an error and the innermost of our lines that it passed."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if f"{os.sep}ldls{os.sep}" in frame.filename]
+    where = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "outside of ldls"
+    return f"{type(error).__name__} at {where}"
 
 
 class Inputs:

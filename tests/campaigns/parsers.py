@@ -13,7 +13,6 @@ import signal
 import sys
 import tempfile
 import time
-import traceback
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -21,7 +20,6 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from campaigns.file_parsers import PARSERS, Inputs
-from ldls.errors import LdlsError
 
 SLOW_S = 5.0
 HANGS_S = 30.0
@@ -68,37 +66,9 @@ def show(name, seed, number):
     """Read one input in this process; whatever is wrong with it is seen."""
     content = Inputs(name, seed)[number]
     with tempfile.TemporaryDirectory() as folder:
-        path = PARSERS[name].place(prepared(PARSERS[name], Path(folder)), content)
+        path = PARSERS[name].place(Path(folder), content)
         print(f"{path}: {len(content)} bytes: {content[:2000]!r}")
         print(PARSERS[name].read(path))
-
-
-def prepared(parser, folder):
-    for name in parser.files:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
-def outcome(parser, path):
-    """What became of a file: "accepted", "refused", "fat", or where an error of a wrong kind came from."""
-    try:
-        parser.read(path)
-    except (LdlsError, *parser.allowed):
-        return "refused"
-    except MemoryError:
-        return "fat"
-    except BaseException as error:  # panics of libraries are no Exceptions
-        if isinstance(error, (KeyboardInterrupt, SystemExit)):
-            raise
-        return place_of(error)
-    return "accepted"
-
-
-def place_of(error):
-    """Kind of an error and the innermost of our lines that it passed."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if f"{os.sep}ldls{os.sep}" in frame.filename]
-    where = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "outside of ldls"
-    return f"{type(error).__name__} at {where}"
 
 
 class Worker:
@@ -112,7 +82,7 @@ class Worker:
         self.faults, self.sender = processes.Pipe(duplex=False)
         self.found = []
         self.kept = tempfile.TemporaryDirectory(dir=FOLDER)
-        self.folder = prepared(inputs.parser, Path(self.kept.name))
+        self.folder = Path(self.kept.name)
         self.begin()
 
     def begin(self):
@@ -125,11 +95,12 @@ class Worker:
         with Path(os.devnull).open("wb") as nowhere:
             os.dup2(nowhere.fileno(), 2)  # where panics of libraries print
         warnings.simplefilter("ignore")
+        warnings.simplefilter("error", RuntimeWarning)  # NumPy's, of numbers that nobody has looked at
         resource.setrlimit(resource.RLIMIT_AS, (address_space() + SPARE_BYTES, resource.RLIM_INFINITY))
         most = peak_bytes() + FAT_BYTES
         for at in range(self.at.value, len(self.numbers)):
             self.at.value, self.since.value = at, time.monotonic()
-            kind = outcome(self.inputs.parser, self.inputs.parser.place(self.folder, self.inputs[self.numbers[at]]))
+            kind = self.inputs.parser.outcome(self.folder, self.inputs[self.numbers[at]])
             if time.monotonic() - self.since.value > SLOW_S:
                 kind = "slow"
             if peak_bytes() > most:
@@ -152,6 +123,8 @@ class Worker:
         self.process.join()
         if self.process.exitcode == 0:
             return False
+        if self.process.exitcode == 1:
+            sys.exit(f"the driver itself failed: --only {self.numbers[self.at.value]} shows how")
         if self.process.exitcode != AGAIN:
             hangs = self.process.exitcode == -signal.SIGKILL
             fault = f"slow, over {HANGS_S:.0f} s" if hangs else f"crash, exit code {self.process.exitcode}"

@@ -125,3 +125,17 @@ def test_an_image_of_one_colour_packs_well_and_is_read(write):
     path = write(content("PNG", np.zeros((2000, 2000, 3), np.uint8)))
     assert path.stat().st_size * 900 < 2000 * 2000 * 3
     assert ldls.read_image(path).shape == (2000, 2000, 3)
+
+
+def test_a_jpeg_of_more_pixels_than_its_bytes_can_hold_takes_no_memory(tmp_path):
+    path = tmp_path / "image.jpg"
+    Image.new("RGB", (80, 60), (9, 80, 200)).save(path)
+    content = path.read_bytes()
+    at = content.index(b"\xff\xc0") + 5  # height and width of a baseline image
+    path.write_bytes(content[:at] + b"\x20\x00\x20\x00" + content[at + 4 :])
+    with pytest.raises(ldls.TruncatedFileError, match=r"image\.jpg: 8192 x 8192 pixels cannot come of \d+ bytes"):
+        ldls.read_image(path)
+    path.write_bytes(content)
+    assert ldls.read_image(path).shape == (60, 80, 3)
+    Image.new("L", (4000, 3000)).save(path, quality=1, optimize=True, progressive=True)  # packed as well as may be
+    assert ldls.read_image(path).shape == (3000, 4000, 3)

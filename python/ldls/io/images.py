@@ -19,6 +19,8 @@ SIGNATURES = {"PNG": b"\x89PNG\r\n\x1a\n", "JPEG": b"\xff\xd8\xff"}
 """First bytes of each format that is opened: Pillow knows more of them, and starts programs for some."""
 DEFLATE_RATIO = 1032
 """Nothing in a PNG unpacks to more than so many times its size."""
+PIXELS_A_BYTE = 1024
+"""Most pixels that a byte of a JPEG can hold: a block of 64 takes a bit, and often more."""
 
 
 def read_image(path: str | PathLike[str]) -> NDArray[np.uint8]:
@@ -60,14 +62,14 @@ def decode(file: IO[bytes], n_bytes: int) -> NDArray[np.uint8]:
 
 
 def check_pixels(image: Image.Image, n_bytes: int) -> None:
-    """Hold the size of a PNG against the bytes that there are, before memory is taken for its pixels.
+    """Hold the size of an image against the bytes that there are, before memory is taken for its pixels.
 
     Raises:
         TruncatedFileError: So many pixels cannot come of them.
     """
-    bands = len(image.getbands())
-    needed = image.width * image.height * (bands if bands > 1 else 1 / 8)
-    if image.format == "PNG" and needed > DEFLATE_RATIO * n_bytes:
+    pixels, bands = image.width * image.height, len(image.getbands())
+    png_bytes = pixels * (bands if bands > 1 else 1 / 8)
+    if png_bytes > DEFLATE_RATIO * n_bytes if image.format == "PNG" else pixels > PIXELS_A_BYTE * n_bytes:
         raise TruncatedFileError(f"{image.width} x {image.height} pixels cannot come of {n_bytes:,} bytes")
 
 

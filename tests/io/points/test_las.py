@@ -169,7 +169,6 @@ def test_a_panic_of_the_library_is_a_corrupt_file(tmp_path):
     cloud(n_points=12).write(tmp_path / "a.laz")
     content = (tmp_path / "a.laz").read_bytes()
     (tmp_path / "a.laz").write_bytes(content[:560] + b"\xff" * 100 + content[660:])
-    with pytest.raises(ldls.CorruptFileError, match="a.laz: not a whole LAS or LAZ file") as caught:
+    # where the library has learned to raise instead, another file must be found that makes it panic
+    with pytest.raises(ldls.CorruptFileError, match=r"a.laz: not a whole LAS or LAZ file \(PanicException"):
         ldls.read_points(tmp_path / "a.laz")
-    # otherwise the library has learned to raise, and another file must be found that makes it panic
-    assert type(caught.value.__cause__).__name__ == "PanicException"
