@@ -20,6 +20,7 @@ from pathlib import Path
 import laspy
 import lzf
 import numpy as np
+import rosbags.rosbag1
 import rosbags.rosbag2
 import rosbags.serde.utils
 from PIL import Image
@@ -51,7 +52,6 @@ from ldls.io.ros.messages import (
     standard_types,
 )
 from ldls.io.ros.point_cloud2 import decode, encode
-from ldls.io.ros.writer import BagWriter
 from ldls.labeling import Labeling
 from ldls.segmenters.onnx_file import read_onnx
 from mask_samples import of_coco, random_masks
@@ -242,7 +242,7 @@ SEMICOLONS = "name;Z;Y;X\n" + "".join(f'"car {k}";{k};-{k};{k}.5\n' for k in ran
 
 # messages and bags
 
-ROS2 = standard_types(ros2=True)
+ROS1, ROS2 = standard_types(ros2=False), standard_types(ros2=True)
 TOPICS = {"/points": POINTS, "/image": IMAGE, "/compressed": COMPRESSED_IMAGE, "/info": CAMERA_INFO}
 IN_BAGS = ("/points", "/image")
 
@@ -299,29 +299,42 @@ def read_message(topic):
 
 
 def bag_ros1(folder):
-    with BagWriter(folder / "a.bag", "rosbag1") as made:
-        for topic in IN_BAGS:
-            made.add_topic(Topic(topic, TOPICS[topic], 0))
-        for number, topic in enumerate(IN_BAGS * 2):
-            made.write_message(topic, messages(made.types)[topic], 1000 + number)
-    return [[(folder / "a.bag").read_bytes()]]
+    """A bag whose chunks are not packed, and one packed in each way."""
+    seeds = []
+    for packing in (None, *rosbags.rosbag1.Writer.CompressionFormat):
+        path = folder / f"{packing}.bag"
+        made = rosbags.rosbag1.Writer(path)
+        if packing is not None:
+            made.set_compression(packing)
+        fill(made, ROS1, lambda message, topic: serialize(ROS1, message, TOPICS[topic], ros2=False))
+        seeds.append([path.read_bytes()])
+    return seeds
 
 
 def bag_ros2(plugin):
-    def seeds(folder):
-        # without the qualities of service that our writer adds: YAML, which takes ten times as long as the rest
-        storage = rosbags.rosbag2.StoragePlugin[plugin]
-        with rosbags.rosbag2.Writer(folder / "bag", version=8, storage_plugin=storage) as made:
-            topics = {topic: made.add_connection(topic, TOPICS[topic], typestore=ROS2) for topic in IN_BAGS}
-            for number, topic in enumerate(IN_BAGS * 2):
-                content = serialize(ROS2, messages(ROS2)[topic], TOPICS[topic], ros2=True)
-                made.write(topics[topic], 1000 + number, content)
-        (path,) = (each for each in (folder / "bag").iterdir() if each.suffix != ".yaml")
-        if plugin == "SQLITE3":
-            shrink(path)
-        return [[path.read_bytes()]]
+    """A bag whose chunks are not packed and, of MCAP, one with packed ones."""
 
-    return seeds
+    def seeds(folder):
+        storage = rosbags.rosbag2.StoragePlugin[plugin]
+        modes = rosbags.rosbag2.CompressionMode
+        for mode in (modes.NONE, modes.STORAGE) if plugin == "MCAP" else (modes.NONE,):
+            made = rosbags.rosbag2.Writer(folder / mode.name, version=8, storage_plugin=storage)
+            made.set_compression(mode, rosbags.rosbag2.CompressionFormat.ZSTD)
+            fill(made, ROS2, lambda message, topic: serialize(ROS2, message, TOPICS[topic], ros2=True))
+            (path,) = (each for each in (folder / mode.name).iterdir() if each.suffix != ".yaml")
+            if plugin == "SQLITE3":
+                shrink(path)
+            yield [path.read_bytes()]
+
+    return lambda folder: list(seeds(folder))
+
+
+def fill(made, types, serialized):
+    """Write to a bag, without the qualities of service that our writer adds: YAML, which is slow to read."""
+    with made:
+        topics = {topic: made.add_connection(topic, TOPICS[topic], typestore=types) for topic in IN_BAGS}
+        for number, topic in enumerate(IN_BAGS * 2):
+            made.write(topics[topic], 1000 + number, serialized(messages(types)[topic], topic))
 
 
 # the library reads and compiles the types of messages again with every bag; kept, bags are read ten times as fast
