@@ -18,6 +18,6 @@ SLOW = {"bag": 20, "camera": 100}
 @pytest.mark.parametrize("name", PARSERS)
 def test_changed_files_are_read_or_refused(tmp_path, name):
     inputs, found = Inputs(name, 0), {}
-    for number in range(SLOW.get(name.split()[0], 300)):
+    for number in range(SLOW.get(name.split()[0], 200)):
         found.setdefault(PARSERS[name].outcome(tmp_path, inputs[number]), number)
     assert found.keys() == {"accepted", "refused"}, f"{found}: the driver shows each by --seed 0 --only NUMBER"

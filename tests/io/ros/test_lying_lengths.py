@@ -118,6 +118,12 @@ def test_a_database_without_a_page_size_is_refused(bag):
 
 
 @pytest.mark.parametrize("bag", ["rosbag1", "rosbag2", "mcap"], indirect=True)
+def test_a_whole_bag_is_the_same_where_recovery_is_asked_for(bag):
+    path, _, recorded = bag
+    assert messages(path, recover=True) == recorded
+
+
+@pytest.mark.parametrize("bag", ["rosbag1", "rosbag2", "mcap"], indirect=True)
 def test_a_bag_that_shrinks_while_it_is_read_is_refused(bag):
     path, content, _ = bag
     opened = open_bag(path)

@@ -64,7 +64,8 @@ def _check_guess(values: NDArray[np.float32], columns: int) -> None:
     if values.size == 0 or values.size % other:
         return
     fifth = values[4::5]
-    are_rings = bool(((fifth == np.floor(fifth)) & (fifth >= 0) & (fifth < MAX_RINGS)).all())
+    with np.errstate(invalid="ignore"):  # the bits of some numbers that are none make NumPy warn
+        are_rings = bool(((fifth == np.floor(fifth)) & (fifth >= 0) & (fifth < MAX_RINGS)).all())
     if columns == 5 and not are_rings:
         fault = f"the fifth column does not hold ring numbers, and rows of {other} fit the file too"
     elif columns == 4 and are_rings and fifth.any():

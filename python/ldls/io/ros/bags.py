@@ -101,8 +101,8 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
 
     Args:
         path: The bag.
-        recover: If true, a truncated bag, or one whose recording was never closed, yields its whole messages and a
-            warning instead of an error.
+        recover: If true, all of the bag is read to find out whether it is whole; one that is truncated or damaged, or
+            whose recording was never closed, yields its whole messages and a warning instead of an error.
 
     Raises:
         TruncatedFileError: The index at the end of the bag is missing or damaged.
