@@ -153,14 +153,6 @@ def _check_regular(mode: int) -> None:
         raise FileFormatError(f"expected a regular file, got {kind}")
 
 
-def regular_file(path: str | PathLike[str]) -> Path:
-    """`path`, which is a regular file; gives way to `open_file`."""
-    path = Path(path)
-    with within(path):
-        _check_regular(path.stat().st_mode)
-    return path
-
-
 def read_lines(path: str | PathLike[str], what: str = "text file", *, limit: int = MAX_TEXT_BYTES) -> list[str]:
     """The lines of a text file without their ends; the blank ones at its end are left out.
 
