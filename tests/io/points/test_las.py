@@ -152,6 +152,7 @@ def test_a_cut_file_is_named_wherever_it_ends(path, part):
         pytest.param(100, "I", [2**32 - 1], ldls.CorruptFileError, "variable length records", id="many VLRs"),
         pytest.param(131, "d", [0.0], ldls.CorruptFileError, "no scale 0", id="scale 0"),
         pytest.param(139, "d", [np.nan], ldls.CorruptFileError, "scales .*nan", id="scale NaN"),
+        pytest.param(131, "d", [1e308], ldls.CorruptFileError, "scales .*1e.308.*not finite", id="scale 1e308"),
         pytest.param(155, "d", [np.inf], ldls.CorruptFileError, "offsets .*inf", id="offset inf"),
         pytest.param(104, "B", [50], ldls.UnsupportedFormatError, "point format 50", id="point format"),
         pytest.param(25, "B", [9], ldls.UnsupportedFormatError, "LAS 1.9", id="version"),

@@ -76,10 +76,17 @@ def read(path: Path) -> NDArray[np.float64]:
             check_chunks(file, _vlrs(file, header), header.offset, header.record_bytes, header.n_points)
         file.seek(0)
         # chunk by chunk and on one thread: the parallel decoder takes the memory that the file asks for, or aborts
-        with laspy.open(file, laz_backend=laspy.LazBackend.Lazrs, read_evlrs=False, closefd=False) as reader:
+        with (
+            laspy.open(file, laz_backend=laspy.LazBackend.Lazrs, read_evlrs=False, closefd=False) as reader,
+            np.errstate(over="ignore", invalid="ignore"),
+        ):
             points = np.concatenate([_columns(chunk) for chunk in reader.chunk_iterator(CHUNK_POINTS)])
         if len(points) != header.n_points:
             raise TruncatedFileError(f"the header says {header.n_points} points, found {len(points)}")
+        if not np.isfinite(points).all():
+            raise CorruptFileError(
+                f"scales {header.scales} and offsets {header.offsets_m} make coordinates that are not finite"
+            )
         return points
 
 
