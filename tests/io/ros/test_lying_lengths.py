@@ -1,9 +1,11 @@
 """Bags in which a length is not that of its record: no memory is asked for, and the whole messages come out."""
 
 import os
+import sqlite3
 import struct
 import warnings
 from collections import Counter
+from contextlib import closing
 
 import pytest
 
@@ -155,3 +157,20 @@ def test_what_is_no_regular_file_is_no_bag(tmp_path, suffix):
     for name in (f"pipe{suffix}", f"zeros{suffix}", "folder", "described"):
         with pytest.raises(FileFormatError, match=f"{name}.*: expected a regular file, got a"):
             open_bag(tmp_path / name)
+
+
+@pytest.mark.parametrize("bag", ["rosbag2"], indirect=True)
+def test_a_database_with_a_topic_without_a_name_is_refused(bag):
+    path, _, recorded = bag
+    with closing(sqlite3.connect(path)) as database, database:
+        columns = [row[1] for row in database.execute("PRAGMA table_info(topics)")]
+        names = ", ".join("NULL" if name == "name" else name for name in columns)
+        database.execute("CREATE TABLE copy AS SELECT * FROM topics")
+        database.execute("DROP TABLE topics")
+        database.execute(f"CREATE TABLE topics ({', '.join(columns)})")
+        database.execute(f"INSERT INTO topics SELECT {names} FROM copy WHERE id = 1")
+        database.execute("INSERT INTO topics SELECT * FROM copy WHERE id > 1")
+    with pytest.raises(TruncatedFileError, match=f"a.db3: .*; {len(recorded) - 1} whole messages"):
+        messages(path)
+    with pytest.warns(RecoveredFileWarning):
+        assert len(messages(path, recover=True)) == len(recorded) - 1

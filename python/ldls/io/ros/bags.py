@@ -180,6 +180,10 @@ def _indexed(path: Path) -> Bag:
             [_BagPath(path)], default_typestore=standard_types(ros2=path.suffix != ".bag")
         )
         reader.open()
+        topics = {
+            name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
+            for name, info in reader.topics.items()
+        }
 
     def read(topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[RawMessage]:
         connections = [c for c in reader.connections if c.topic in topics]
@@ -197,10 +201,6 @@ def _indexed(path: Path) -> Bag:
                 "the whole ones"
             )
 
-    topics = {
-        name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
-        for name, info in reader.topics.items()
-    }
     return Bag(path, reader.typestore, topics, read, reader.close, ros2=bool(reader.is2))
 
 
