@@ -82,7 +82,9 @@ def test_other_formats_named_png_are_refused_and_start_no_program(write, monkeyp
         raise AssertionError("a program was started")
 
     monkeypatch.setattr(subprocess.Popen, "__init__", start)
-    with pytest.raises(ldls.UnsupportedFormatError, match=r"image\.png: begins with .*, expected a JPEG or PNG image"):
+    with pytest.raises(
+        ldls.UnsupportedFormatError, match=r"image\.png: not a whole image: begins with .*, expected a JPEG or PNG"
+    ):
         read(write(other))
 
 

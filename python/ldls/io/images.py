@@ -79,7 +79,9 @@ def _opened(file: IO[bytes]) -> Iterator[Image.Image]:
     file.seek(0)
     formats = [name for name, signature in SIGNATURES.items() if start.startswith(signature)]
     if start and not formats:
-        raise UnsupportedFormatError(f"begins with {start!r}, expected a JPEG or PNG image; convert it to one")
+        raise UnsupportedFormatError(
+            f"not a whole image: begins with {start!r}, expected a JPEG or PNG; convert it to one"
+        )
     try:
         with Image.open(file, formats=formats) as image:
             yield image
