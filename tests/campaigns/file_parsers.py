@@ -659,7 +659,7 @@ PARSERS: dict[str, Parser] = {
         members(*(lambda path, m=m: ldls.save(m, path) for m in MASKS)),
         ldls.read_masks,
         packed_members,
-        gentle=0.6,
+        gentle=0.9,
     ),
     "masks .npz research": Parser(
         ("a.npz",),

@@ -29,6 +29,8 @@ SPARE_BYTES = 1 << 30
 """Address space of a worker beyond what it has at first: who asks for more gets a MemoryError."""
 AGAIN = 77
 """Exit code of a worker that another one follows."""
+LEAST_ACCEPTED = 0.1
+"""Share of the files that a parser must still read, for its deeper parts to be reached."""
 KEPT = 3
 """Inputs kept of each fault."""
 processes = multiprocessing.get_context("fork")
@@ -176,7 +178,9 @@ def campaign(name, options):
         flush=True,
     )
     keep(inputs, found, options.out)
-    return len(found)
+    if accepted < LEAST_ACCEPTED * n:
+        print(f"    accepts less than {LEAST_ACCEPTED:.0%}: change its files more gently")
+    return len(found) + (accepted < LEAST_ACCEPTED * n)
 
 
 def keep(inputs, found, folder):
