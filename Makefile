@@ -70,6 +70,10 @@ same-bits: ## Label 50 scenes with 1 to 16 threads, 20 times each, and compare e
 soak: ## Label 20,000 frames in one process and tell by how much its memory grows.
 	python tests/campaigns/soak.py
 
+.PHONY: fuzz-files
+fuzz-files: ## Change a million files for each parser at random and read them: only errors of ldls may come of it.
+	python tests/campaigns/parsers.py
+
 .PHONY: sample
 sample: ## Make the frame of `ldls demo` anew, from its seed.
 	python tests/simulation/make_sample.py

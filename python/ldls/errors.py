@@ -165,8 +165,10 @@ def some(names: Sequence[str], most: int = 8) -> str:
 
 @contextmanager
 def within(place: str | PathLike[str]) -> Iterator[None]:
-    """Begin the message of an error of `ldls` that leaves the block with the file or argument that it is about."""
+    """Begin the message of an error of `ldls` that leaves the block, once, with the file or argument it is about."""
     try:
         yield
     except LdlsError as error:
+        if str(error).startswith((f"{place}: ", f"{place}, ")):
+            raise
         raise type(error)(f"{place}: {error}") from None

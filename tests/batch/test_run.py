@@ -162,7 +162,7 @@ def test_a_bag_with_stored_masks(tmp_path, n_cameras):
     opened = open_source(bag, truth=False, image_topics=topics)
     for image in opened[0].images:
         for name in opened.names:
-            layouts.write_text(tmp_path / f"masks/{image.name}/{name}.json", json.dumps(layouts._coco(20)))
+            layouts.write_text(tmp_path / f"masks/{image.name}/{name}.json", json.dumps(layouts.coco(20)))
     settings = batch.RunSettings(masks=str(tmp_path / "masks"))
     assert batch.run(opened, tmp_path / "out", settings).n_done == 3
     assert batch.run(opened, tmp_path / "out", settings).n_earlier == 3
@@ -410,7 +410,7 @@ def test_frames_of_unicode_names(tmp_path):
     source = layouts.plain_folder(tmp_path / "Ünï", frames=names)
     (source / "masks").mkdir()
     for name in names:
-        (source / f"masks/{name}.json").write_text(json.dumps(layouts._coco(20)))
+        (source / f"masks/{name}.json").write_text(json.dumps(layouts.coco(20)))
     assert run(source, tmp_path / "öut").n_done == 3
     assert {path.stem for path in (tmp_path / "öut").glob("*.label")} == set(names)
     assert run(source, tmp_path / "öut").n_earlier == 3

@@ -12,6 +12,7 @@ T = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 P = np.hstack([K, np.zeros((3, 1))])
 START_US = 1_500_000_000_000_000
 CHANNELS = ("CAM_FRONT", "CAM_FRONT_RIGHT", "CAM_BACK_RIGHT", "CAM_BACK", "CAM_BACK_LEFT", "CAM_FRONT_LEFT")
+NUSCENES_CHANNELS = ("LIDAR_TOP", *CHANNELS, "RADAR_FRONT")
 
 
 def cloud(columns=4):
@@ -79,11 +80,11 @@ def kitti_odometry(folder, n_frames=3):
     return sequence
 
 
-def nuscenes(folder, scenes=("scene-0001",), n_frames=2, version="v1.0-mini"):
+def nuscenes(folder, scenes=("scene-0001",), n_frames=2, version="v1.0-mini", channels=NUSCENES_CHANNELS):
     """Each scene drives along global x at 10 m/s; images are 20 ms earlier than their sweep."""
     made = {name: [] for name in ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")}
     made["lidarseg"], made["category"] = [], []
-    for channel in ("LIDAR_TOP", *CHANNELS, "RADAR_FRONT"):
+    for channel in channels:
         is_camera = channel.startswith("CAM")
         # w x y z of the turn from a camera's axes (right, down, forward) to the car's
         turn = [0.5, -0.5, 0.5, -0.5] if is_camera else [1.0, 0, 0, 0]
@@ -100,16 +101,16 @@ def nuscenes(folder, scenes=("scene-0001",), n_frames=2, version="v1.0-mini"):
     for at, scene in enumerate(scenes):
         made["scene"].append({"token": f"token {scene}", "name": scene, "nbr_samples": n_frames})
         for number in range(n_frames):
-            _sample(folder, made, scene, number, START_US + at * 60_000_000 + number * 500_000)
+            _sample(folder, made, scene, number, START_US + at * 60_000_000 + number * 500_000, channels)
     for name, rows in made.items():
         write_text(folder / version / f"{name}.json", json.dumps(rows, indent=0))
     return folder
 
 
-def _sample(folder, made, scene, number, stamp_us):
+def _sample(folder, made, scene, number, stamp_us, channels):
     token = f"{scene} {number}"
     made["sample"].append({"token": token, "scene_token": f"token {scene}", "timestamp": stamp_us})
-    for channel in ("LIDAR_TOP", *CHANNELS, "RADAR_FRONT"):
+    for channel in channels:
         is_camera = channel.startswith("CAM")
         own_us = stamp_us - 20_000 if is_camera else stamp_us
         name = f"samples/{channel}/{scene}__{number}.{'jpg' if is_camera else 'pcd.bin'}"
@@ -180,11 +181,11 @@ def many_frames(folder, n_frames=300, cameras=(2,)):
         for camera in cameras:
             write_image(folder / f"image_{camera}/{name}.png")
             place = f"image_{camera}/{name}" if len(cameras) > 1 else name
-            write_text(folder / f"masks/{place}.json", json.dumps(_coco(left + camera)))
+            write_text(folder / f"masks/{place}.json", json.dumps(coco(left + camera)))
     return folder
 
 
-def _coco(left):
+def coco(left):
     """Two objects as polygons."""
     segments = [[x, 20, x + 20, 20, x + 20, 40, x, 40] for x in (left, left + 22)]
     annotations = [

@@ -256,7 +256,7 @@ def replaced(path, old, new):
                      ldls.UnsafePathError, "leads out of", id="nuscenes with a path that climbs out"),
         pytest.param("nuscenes", replaced("v1.0-mini/calibrated_sensor.json", "0.5", "0.7"), ldls.CalibrationError,
                      "has length 1.4, expected 1", id="nuscenes with a rotation that is none"),
-        pytest.param("folder", with_text("ldls.toml", "points = 3 4"), ldls.CorruptFileError, "not a TOML file",
+        pytest.param("folder", with_text("ldls.toml", "points = 3 4"), ldls.CorruptFileError, "not a whole TOML file",
                      id="folder with broken TOML"),
         pytest.param("folder", replaced("ldls.toml", "images =", "image ="), ldls.ParameterError,
                      "unknown key 'image', .*did you mean images", id="folder with a misspelt key"),

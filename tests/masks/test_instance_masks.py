@@ -155,6 +155,8 @@ RLE = {"size": [HEIGHT, WIDTH], "counts": [HEIGHT * WIDTH]}
         pytest.param(coco_document(RLE | {"counts": [70, 9]}), "runs sum to 79", id="runs too long"),
         pytest.param(coco_document(RLE | {"counts": b""}), "runs sum to 0", id="no counts"),
         pytest.param(coco_document(RLE | {"counts": "PP"}), "byte 2 of counts", id="cut string"),
+        pytest.param(coco_document(RLE | {"counts": "o" * 7 + "0"}), "more than 7 digits", id="number over 7 digits"),
+        pytest.param(coco_document(RLE | {"counts": "000@"}), "negative or over 32 bits", id="negative difference"),
         pytest.param(coco_document(RLE | {"counts": "\u20ac"}), "outside 48 to 111", id="odd bytes"),
         pytest.param(coco_document(RLE | {"counts": [-1, 78]}), "run 0 is -1", id="negative run"),
         pytest.param(coco_document(RLE | {"counts": [1.5]}), "whole numbers", id="fractions"),
@@ -247,7 +249,7 @@ def test_masks_of_the_research_code_get_coco_ids(tmp_path):
     ("arrays", "error", "message"),
     [
         pytest.param({"a": np.zeros(3)}, ldls.UnsupportedFormatError, "found arrays", id="other"),
-        pytest.param({"a": np.array([{}])}, ldls.UnsafeFileError, "object arrays", id="objects"),
+        pytest.param(research_arrays(np.array([[[{}]]]), [1]), ldls.UnsafeFileError, "object arrays", id="objects"),
         pytest.param(research_arrays(random_pixels(1), [81]), ldls.MaskError, "class_ids: 81", id="class 81"),
         pytest.param(research_arrays(random_pixels(2), [1]), ldls.MaskError, "one mask a class", id="unequal"),
     ],

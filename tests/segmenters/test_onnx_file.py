@@ -110,6 +110,7 @@ MODELS = [
     pytest.param(lambda: external_in(in_sparse_initializer), UnsafePathError, "'hidden'", id="sparse tensor"),
     pytest.param(lambda: external("*/_ORT_MEM_ADDR_/*"), CorruptFileError, "not there", id="address in memory"),
     pytest.param(lambda: external("none.bin"), CorruptFileError, "'none.bin', which is not there", id="no weights"),
+    pytest.param(lambda: external("w" * 5000), CorruptFileError, "which is not there", id="name that no file can have"),
     pytest.param(lambda: external("short.bin"), TruncatedFileError, "byte 16, the file after 5", id="short weights"),
     pytest.param(lambda: external("w.bin", offset="9"), TruncatedFileError, "byte 25", id="offset too far"),
     pytest.param(lambda: external("w.bin", length="-1"), CorruptFileError, "'-1'", id="negative length"),

@@ -136,5 +136,5 @@ def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:
     except ValueError:
         seconds = math.nan
     if not name or not math.isfinite(seconds):
-        raise CorruptFileError(f"{path}, line {number}: expected 'frame seconds', got {line!r}")
+        raise CorruptFileError(f"{path}, line {number}: expected 'frame seconds', got {line[:80]!r}")
     return name.strip(), seconds

@@ -11,8 +11,12 @@ from typing import Any
 
 from ldls.camera import Camera, Distortion
 from ldls.errors import CalibrationError, CorruptFileError, ParameterError
+from ldls.io.files import open_file
 
 FILE = "ldls.toml"
+MAX_BYTES = 1 << 16
+MAX_DOTS = 256
+"""Dots on a line: all the numbers of several cameras have fewer."""
 TOP: dict[str, type] = {
     "points": str, "columns": int, "stamps": str, "truth": str, "truth_format": str, "cameras": dict,
 }  # fmt: skip
@@ -108,22 +112,24 @@ def read_description(path: Path) -> FolderDescription:
         CalibrationError: A camera cannot be.
         FileNotFoundError: There is no such file.
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CorruptFileError(f"{path}: not a TOML file ({error})") from None
-    _check(str(path), content, TOP, needed=("points", "cameras"))
-    cameras = {name: _camera(f"{path}, cameras.{name}", each) for name, each in content["cameras"].items()}
-    if not cameras:
-        raise ParameterError(f"{path}: cameras: expected a table [cameras.NAME] or more")
-    return FolderDescription(
-        points=content["points"],
-        columns=content.get("columns"),
-        stamps=content.get("stamps"),
-        truth=content.get("truth"),
-        truth_format=content.get("truth_format"),
-        cameras=cameras,
-    )
+    with open_file(path, "TOML file", limit=MAX_BYTES) as file:
+        text = file.text()
+        # the parser takes the square of the parts of a key in time
+        if max(line.count(".") for line in text.split("\n")) > MAX_DOTS:
+            raise CorruptFileError(f"a line with more than {MAX_DOTS} dots; no key has so many parts")
+        content = tomllib.loads(text)
+        _check(str(path), content, TOP, needed=("points", "cameras"))
+        cameras = {name: _camera(f"{path}, cameras.{name}", each) for name, each in content["cameras"].items()}
+        if not cameras:
+            raise ParameterError("cameras: expected a table [cameras.NAME] or more")
+        return FolderDescription(
+            points=content["points"],
+            columns=content.get("columns"),
+            stamps=content.get("stamps"),
+            truth=content.get("truth"),
+            truth_format=content.get("truth_format"),
+            cameras=cameras,
+        )
 
 
 def template() -> str:

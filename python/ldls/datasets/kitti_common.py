@@ -47,9 +47,9 @@ def read_stamps(
             raise SourceError(f"{path}: has {len(lines)} stamps, expected one for each frame up to {names[-1]}")
         try:
             stamps.append(seconds(lines[int(name)]))
-        except ValueError:
+        except (ValueError, OverflowError):
             line = lines[int(name)]
             raise CorruptFileError(
-                f"{path}, line {int(name) + 1}: expected a time such as {example}, got {line!r}"
+                f"{path}, line {int(name) + 1}: expected a time such as {example}, got {line[:80]!r}"
             ) from None
     return tuple(stamps)

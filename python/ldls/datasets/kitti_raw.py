@@ -102,4 +102,9 @@ def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:
 
 def _seconds(line: str) -> float | None:
     """Seconds since 1970; None for a blank line, which KITTI has for what was not taken."""
-    return int(np.datetime64(line.strip(), "ns").astype(np.int64)) / 1e9 if line.strip() else None
+    if not line.strip():
+        return None
+    stamp = np.datetime64(line.strip(), "ns")
+    if np.isnat(stamp):
+        raise ValueError("not a time")
+    return int(stamp.astype(np.int64)) / 1e9

@@ -8,8 +8,7 @@ It has the `timestamp` in seconds; `lidar` with `file` and `columns`; `cameras` 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -22,13 +21,14 @@ from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets.file_source import image_from_file
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.errors import CorruptFileError, LdlsError
+from ldls.errors import within
 from ldls.io import read_points
-from ldls.io.files import below
+from ldls.io.files import below, open_file, parsing
 from ldls.io.images import read_image_size
 from ldls.labeling import BACKGROUND, Labeling
 
 FILE = "frame.json"
+MAX_BYTES = 1 << 24
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ class NuScenesFrameSource:
         self._file = described_in(path)
         self.path = self._file.parent
         self._truth = truth
-        frame = _parse(self._file)
-        with _broken(self._file):
+        with open_file(self._file, "key frame", limit=MAX_BYTES) as file:
+            frame = json.loads(file.text())
             self._points = self._path(frame["lidar"]["file"])
             self._columns = len(frame["lidar"]["columns"])
             self._boxes: list[dict[str, Any]] = frame["boxes_3d"]
@@ -100,7 +100,7 @@ class NuScenesFrameSource:
     def __getitem__(self, index: int) -> Frame:
         name, stamp = self.names[index], self.stamps[index]
         points = read_points(self._points, columns=self._columns)
-        with _broken(self._file):
+        with within(self._file), parsing("key frame"):
             truth = label_by_upright_boxes(self._boxes, points) if self._truth else None
         return Frame(name=name, points=points, stamp=stamp, images=self._images, truth=truth)
 
@@ -127,9 +127,8 @@ def read_boxes_2d(path: str | PathLike[str]) -> dict[str, tuple[Box2d, ...]]:
         CorruptFileError: It is not such a file.
         FileNotFoundError: There is no such file.
     """
-    file = described_in(path)
-    frame = _parse(file)
-    with _broken(file):
+    with open_file(described_in(path), "key frame", limit=MAX_BYTES) as file:
+        frame = json.loads(file.text())
         return {name: tuple(_box_2d(box) for box in each["boxes_2d"]) for name, each in frame["cameras"].items()}
 
 
@@ -177,24 +176,3 @@ def _upright(box: Mapping[str, Any]) -> tuple[str, NDArray[np.float64]]:
 def _box_2d(box: Mapping[str, Any]) -> Box2d:
     left, top, right, bottom = map(float, box["box"])
     return Box2d(str(box["category"]), (left, top, right, bottom))
-
-
-def _parse(file: Path) -> dict[str, Any]:
-    with _broken(file):
-        frame = json.loads(file.read_text(encoding="utf-8-sig"))
-        if not isinstance(frame, dict):
-            raise TypeError("expected an object")
-        return frame
-
-
-@contextmanager
-def _broken(file: Path) -> Iterator[None]:
-    """Says of errors within that the file is broken."""
-    try:
-        yield
-    except LdlsError:
-        raise
-    except KeyError as error:
-        raise CorruptFileError(f"{file}: lacks {error}; expected a key frame as docs/datasets.md describes") from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise CorruptFileError(f"{file}: not a key frame ({error})") from None

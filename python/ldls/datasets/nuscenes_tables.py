@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,13 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion
 from ldls.datasets.file_source import choose
-from ldls.errors import CalibrationError, CorruptFileError, SourceError, some
+from ldls.errors import CalibrationError, CorruptFileError, SourceError, some, within
+from ldls.io.files import parsing
 from ldls.io.json_rows import read_json_rows
 
+Number = int | float
+Side = int | None
+HUGE = 2**63
 TABLES = ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")
 
 
@@ -83,11 +88,11 @@ def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
         SourceError: There is no such scene.
         CorruptFileError: A table is broken.
     """
-    names = {row["token"]: row["name"] for row in _rows(tables, "scene", ("token", "name"))}
+    names = {row["token"]: row["name"] for row in _rows(tables, "scene", {"token": str, "name": str})}
     if scene is not None:
         choose(tables, "scene", sorted(names.values()), scene)
     samples: dict[str, list[tuple[int, str]]] = defaultdict(list)
-    for row in _rows(tables, "sample", ("token", "scene_token", "timestamp")):
+    for row in _rows(tables, "sample", {"token": str, "scene_token": str, "timestamp": Number}):
         name = names.get(row["scene_token"])
         if name is not None and scene in (None, name):
             samples[name].append((row["timestamp"], row["token"]))
@@ -102,15 +107,16 @@ def read_sensors(tables: Path, channels: tuple[str, ...]) -> dict[str, Calibrate
         CalibrationError: A pose is none.
         CorruptFileError: A table is broken.
     """
-    named = {row["token"]: row["channel"] for row in _rows(tables, "sensor", ("token", "channel"))}
-    keys = ("token", "sensor_token", "translation", "rotation", "camera_intrinsic")
+    named = {row["token"]: row["channel"] for row in _rows(tables, "sensor", {"token": str, "channel": str})}
+    columns = {"token": str, "sensor_token": str, "translation": list, "rotation": list, "camera_intrinsic": list}
+    path = tables / "calibrated_sensor.json"
     return {
         row["token"]: CalibratedSensor(
             named[row["sensor_token"]],
-            _transform(f"{tables / 'calibrated_sensor.json'}, {row['token']}", row),
-            np.array(row["camera_intrinsic"], np.float64),
+            _transform(f"{path}, {row['token']}", row),
+            _numbers(f"{path}, {row['token']}", row["camera_intrinsic"]),
         )
-        for row in _rows(tables, "calibrated_sensor", keys)
+        for row in _rows(tables, "calibrated_sensor", columns)
         if named.get(row["sensor_token"]) in channels
     }
 
@@ -126,9 +132,11 @@ def read_readings(
     readings: dict[str, dict[str, Reading]] = {token: {} for token in samples}
     sizes: dict[tuple[int, int], tuple[int, int]] = {}
     own = {token: token for token in sensors}
-    keys = ("token", "sample_token", "is_key_frame", "calibrated_sensor_token", "ego_pose_token", "filename",
-            "timestamp", "height", "width")  # fmt: skip
-    for row in _rows(tables, "sample_data", keys):
+    columns: dict[str, type | UnionType] = {
+        "token": str, "sample_token": str, "is_key_frame": Number, "calibrated_sensor_token": str,
+        "ego_pose_token": str, "filename": str, "timestamp": Number, "height": Side, "width": Side,
+    }  # fmt: skip
+    for row in _rows(tables, "sample_data", columns):
         sensor = own.get(row["calibrated_sensor_token"])
         if not row["is_key_frame"] or sensor is None or row["sample_token"] not in readings:
             continue
@@ -151,7 +159,7 @@ def read_poses(tables: Path, tokens: set[str]) -> dict[str, NDArray[np.float64]]
         CalibrationError: One is no pose.
         CorruptFileError: The table is broken, or lacks one.
     """
-    rows = _rows(tables, "ego_pose", ("token", "translation", "rotation"))
+    rows = _rows(tables, "ego_pose", {"token": str, "translation": list, "rotation": list})
     path = tables / "ego_pose.json"
     poses = {row["token"]: _transform(f"{path}, {row['token']}", row) for row in rows if row["token"] in tokens}
     if len(poses) < len(tokens):
@@ -167,25 +175,34 @@ def read_truth_files(tables: Path, name: str, tokens: set[str]) -> dict[str, str
     """
     if not (tables / f"{name}.json").is_file():
         return {}
-    rows = _rows(tables, name, ("sample_data_token", "filename"))
+    rows = _rows(tables, name, {"sample_data_token": str, "filename": str})
     return {row["sample_data_token"]: row["filename"] for row in rows if row["sample_data_token"] in tokens}
 
 
 def _transform(place: str, row: Mapping[str, Any]) -> NDArray[np.float64]:
-    translation = np.asarray(row["translation"], np.float64)
+    translation = _numbers(place, row["translation"])
     if translation.shape != (3,) or not np.isfinite(translation).all():
         raise CalibrationError(f"{place}: translation {row['translation']}, expected three finite numbers")
-    quaternion = np.asarray(row["rotation"], np.float64)
+    quaternion = _numbers(place, row["rotation"])
     if quaternion.shape != (4,):
         raise CalibrationError(f"{place}: rotation {row['rotation']}, expected a quaternion w x y z")
     return from_parts(from_quaternion(place, quaternion), translation)
 
 
-def _rows(tables: Path, name: str, keys: tuple[str, ...]) -> Iterator[dict[str, Any]]:
-    """The rows of a table, each with all of `keys`."""
+def _numbers(place: str, values: list[Any]) -> NDArray[np.float64]:
+    with within(place), parsing("row"):
+        return np.array(values, np.float64)
+
+
+def _rows(tables: Path, name: str, columns: Mapping[str, type | UnionType]) -> Iterator[dict[str, Any]]:
+    """The rows of a table, each with all of `columns`, of their types."""
     path = tables / f"{name}.json"
     for number, row in enumerate(read_json_rows(path), start=1):
-        if not row.keys() >= set(keys):
-            missing = ", ".join(key for key in keys if key not in row)
+        missing = ", ".join(key for key in columns if key not in row)
+        if missing:
             raise CorruptFileError(f"{path}, row {number}: lacks {missing}")
+        for key, kind in columns.items():
+            value = row[key]
+            if not isinstance(value, kind) or (isinstance(value, Number) and not abs(value) < HUGE):
+                raise CorruptFileError(f"{path}, row {number}: {key} is {str(value)[:80]!r}, expected {kind}")
         yield row

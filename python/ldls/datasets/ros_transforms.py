@@ -16,6 +16,7 @@ from ldls.io.files import read_lines
 from ldls.io.ros.messages import Message, nanoseconds
 
 Matrix = NDArray[np.float64]
+MAX_BYTES = 1 << 16
 GivenTransform = ArrayLike | str | PathLike[str]
 
 
@@ -143,11 +144,15 @@ def given_transforms(
 
 
 def _read_transform(path: Path) -> Matrix:
-    words = [word for line in read_lines(path) for word in line.partition("#")[0].replace(",", " ").split()]
+    words = [
+        word
+        for line in read_lines(path, "transform", limit=MAX_BYTES)
+        for word in line.partition("#")[0].replace(",", " ").split()
+    ]
     try:
         numbers = np.array(words, np.float64)
     except ValueError:
-        raise CalibrationError(f"{path}: expected numbers only, got {words[:5]}") from None
+        raise CalibrationError(f"{path}: expected numbers only, got {[word[:20] for word in words[:5]]}") from None
     if numbers.size not in (12, 16):
         raise CalibrationError(f"{path}: expected the 12 or 16 numbers of a transform, got {numbers.size}")
     transform = np.eye(4)

@@ -1,20 +1,33 @@
-"""Files read and written with care: regular ones only, whole or not there, and below the folder they are named in."""
+"""Files read and written with care: through one door, whole or not there, and below the folder they are named in."""
 
 from __future__ import annotations
 
+import errno
+import io
 import os
 import secrets
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import IO
 
-from ldls.errors import CorruptFileError, FileFormatError, UnsafePathError
+from ldls.errors import (
+    CorruptFileError,
+    FileFormatError,
+    LdlsError,
+    LimitError,
+    TruncatedFileError,
+    UnsafePathError,
+    within,
+)
 
 UNFINISHED = ".ldls-part"
 """Ending of the names of files that are being written."""
+MAX_BYTES = 4 << 30
+"""Largest file that is read where its reader states no limit of its own."""
+MAX_TEXT_BYTES = 1 << 30
 KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -22,35 +35,134 @@ KINDS = (
     (stat.S_ISBLK, "a device"),
     (stat.S_ISSOCK, "a socket"),
 )
+# a pipe without a writer is opened at once, to be refused; no terminal becomes the process's own
+FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_NOCTTY", "O_BINARY"))
+LIES = (None, errno.EINVAL, errno.EOVERFLOW)
+"""Numbers of errors of the system that come of places that a file names and does not have, or of libraries alone."""
 
 
-def regular_file(path: str | PathLike[str]) -> Path:
-    """`path`, which is a regular file.
+class InputFile(io.BufferedReader):
+    """A regular file open for reading; `open_file` opens it.
+
+    Attributes:
+        path: Where it lies, for libraries that insist on opening it themselves.
+        size: Bytes that it had when it was opened.
+    """
+
+    def __init__(self, path: Path, descriptor: int, size: int) -> None:
+        """The file behind an open descriptor."""
+        super().__init__(io.FileIO(descriptor, "rb"))
+        self.path, self.size = path, size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """The next `size` bytes, or all; never more than there were when the file was opened.
+
+        Nothing is allocated for bytes that are not there, and a file that grows comes to an end.
+
+        Raises:
+            TruncatedFileError: The file has become shorter since.
+        """
+        left = max(self.size - self.tell(), 0)
+        wanted = left if size is None or size < 0 else min(size, left)
+        content = super().read(wanted)
+        if len(content) < wanted:
+            raise TruncatedFileError(
+                f"ends at byte {self.tell()}, it had {self.size} when it was opened; read it when nobody writes to it"
+            )
+        return content
+
+    def text(self) -> str:
+        """What is left of the file as text in UTF-8, with or without a byte order mark.
+
+        Raises:
+            CorruptFileError: It is not text.
+        """
+        try:
+            return self.read().decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise CorruptFileError(f"not a text file ({error.reason} at byte {error.start})") from None
+
+
+@contextmanager
+def open_file(path: str | PathLike[str], what: str, *, limit: int = MAX_BYTES) -> Iterator[InputFile]:
+    """The file `path`, opened to be read and parsed in the block: the one door through which files come in.
+
+    Errors of `ldls` that leave the block begin with the path; whatever else fails in it makes a `CorruptFileError`,
+    as `parsing` says.
+
+    Args:
+        path: The file.
+        what: What it should be, for messages, as "image".
+        limit: Most bytes that such a file may have.
 
     Raises:
-        FileFormatError: It is a folder, a pipe or a device.
-        FileNotFoundError: There is no such file.
+        FileFormatError: It is a folder, a pipe, a socket or a device.
+        LimitError: It has more bytes than `limit`.
+        CorruptFileError: What the block calls cannot read it.
+        UnsafePathError: It is no path that the system knows, as one with a NUL.
+        OSError: It is not there, or the system cannot read it.
     """
     path = Path(path)
-    mode = path.stat().st_mode
+    with within(path), names_file(path), opened(path, what, limit=limit) as file, parsing(what):
+        yield file
+
+
+@contextmanager
+def parsing(what: str) -> Iterator[None]:
+    """Make a `CorruptFileError` of any failure within, panics included: whatever parsers raise has nothing in common.
+
+    Errors of `ldls`, of the system, lack of memory, libraries that are not there, warnings and all that ends a program
+    pass as they are.
+    """
+    try:
+        yield
+    except (LdlsError, MemoryError, ImportError, Warning):
+        raise
+    except BaseException as error:
+        # PanicException of Rust libraries is no Exception, and each of them has its own
+        foreign = isinstance(error, Exception) or type(error).__name__ == "PanicException"
+        if not foreign or (isinstance(error, OSError) and error.errno not in LIES):
+            raise
+        raise CorruptFileError(f"not a whole {what} ({type(error).__name__}: {str(error)[:200]})") from error
+
+
+def opened(path: Path, what: str, *, limit: int) -> InputFile:
+    """The file `path`, for a library that reads it longer than a block lasts; errors as of `open_file`, unnamed."""
+    try:
+        descriptor = os.open(path, FLAGS)
+    except ValueError as error:
+        raise UnsafePathError(f"no path of a file ({error})") from None
+    except OSError:
+        with suppress(OSError):
+            _check_regular(path.stat().st_mode)  # no socket is opened, and on Windows no folder
+        raise
+    try:
+        status = os.fstat(descriptor)
+        _check_regular(status.st_mode)
+        if status.st_size > limit:
+            raise LimitError(f"{status.st_size:,} bytes, expected at most {limit:,} of a {what}; split it")
+        return InputFile(path, descriptor, status.st_size)
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def _check_regular(mode: int) -> None:
     if not stat.S_ISREG(mode):
         kind = next((name for is_kind, name in KINDS if is_kind(mode)), "something else")
-        raise FileFormatError(f"{path}: expected a regular file, got {kind}")
-    return path
+        raise FileFormatError(f"expected a regular file, got {kind}")
 
 
-def read_lines(path: Path) -> list[str]:
+def read_lines(path: str | PathLike[str], what: str = "text file", *, limit: int = MAX_TEXT_BYTES) -> list[str]:
     """The lines of a text file without their ends; the blank ones at its end are left out.
 
     Raises:
         CorruptFileError: It is not text.
-        FileFormatError: It is a folder, a pipe or a device.
+        FileFormatError: It is no regular file.
+        LimitError: It has more bytes than `limit`.
     """
-    try:
-        text = regular_file(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise CorruptFileError(f"{path}: not a text file ({error.reason} at byte {error.start})") from None
-    return text.rstrip().splitlines()
+    with open_file(path, what, limit=limit) as file:
+        return file.text().rstrip().splitlines()
 
 
 @contextmanager
@@ -68,8 +180,9 @@ def names_file(path: str | PathLike[str]) -> Iterator[None]:
 def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails."""
     target = Path(path)
-    # beside the target, for only within one file system is a file renamed at a stroke
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}{UNFINISHED}")
+    # beside the target, for only within one file system is a file renamed at a stroke; without its name, which may be
+    # as long as names can be
+    temporary = target.with_name(f".{secrets.token_hex(8)}{UNFINISHED}")
     try:
         with names_file(target), temporary.open("xb") as file:
             yield file

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 from collections.abc import Iterator
 from os import PathLike
-from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from ldls.errors import CorruptFileError, TruncatedFileError
+from ldls.io.files import open_file
 
+MAX_BYTES = 1 << 36
 CHUNK_CHARACTERS = 1 << 20
 LONGEST_OBJECT = 1 << 24
 """Characters after which what has not ended is no object."""
@@ -26,20 +28,20 @@ def read_json_rows(path: str | PathLike[str]) -> Iterator[dict[str, Any]]:
         CorruptFileError: The file is no JSON list of objects; the message says after how many of them.
         FileNotFoundError: There is no such file.
     """
-    path = Path(path)
     count = 0
-    try:
-        for count, row in enumerate(_rows(path), start=1):  # noqa: B007 - the handlers below tell it
-            yield row
-    except EOFError:
-        raise TruncatedFileError(f"{path}: the list ends after {count:,} whole objects without a ']'") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise CorruptFileError(f"{path}: not a JSON list of objects after the first {count:,} ({error})") from None
+    with open_file(path, "JSON list", limit=MAX_BYTES) as file:
+        try:
+            for count, row in enumerate(_rows(file), start=1):  # noqa: B007 - the handlers below tell it
+                yield row
+        except EOFError:
+            raise TruncatedFileError(f"the list ends after {count:,} whole objects without a ']'") from None
+        except (ValueError, RecursionError) as error:
+            raise CorruptFileError(f"not a JSON list of objects after the first {count:,} ({error})") from None
 
 
-def _rows(path: Path) -> Iterator[dict[str, Any]]:
+def _rows(content: IO[bytes]) -> Iterator[dict[str, Any]]:
     decode = json.JSONDecoder().raw_decode
-    with path.open(encoding="utf-8-sig") as file:
+    with io.TextIOWrapper(content, encoding="utf-8-sig") as file:
         text = file.read(CHUNK_CHARACTERS)
         start = START.match(text)
         if start is None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera, Distortion
 from ldls.cloud import as_points
-from ldls.errors import CorruptFileError, InputError, LdlsError, UnsupportedFormatError
-from ldls.io.arrays import read_npz, write_npz
+from ldls.errors import CorruptFileError, InputError, UnsupportedFormatError
+from ldls.io.arrays import open_npz, write_npz
 from ldls.io.masks.npz import mask_arrays, masks_of
 from ldls.params import Params
 from ldls.segmentation import Instance, Report, Segmentation, SegmentedObject
@@ -66,17 +66,17 @@ def read(path: str | PathLike[str]) -> Segmentation:
         CorruptFileError: It is not a whole `.npz` file, or its arrays do not fit one another.
         FileNotFoundError: There is no such file.
     """
-    arrays = read_npz(path)
-    if not {"labels", "diffused_labels", "object_name"} <= arrays.keys():
-        raise UnsupportedFormatError(f"{path}: found arrays {sorted(arrays)}, expected those of ldls.save")
-    if "points" not in arrays:
-        raise UnsupportedFormatError(f"{path}: holds no points, as earlier versions wrote it; segment the frame again")
-    try:
-        result = _result(arrays)
-        _check(result)
-    except (LdlsError, KeyError, ValueError, TypeError, IndexError) as error:
-        raise CorruptFileError(f"{path}: not a whole result ({error})") from None
-    return result
+    with open_npz(path, "result") as arrays:
+        if not {"labels", "diffused_labels", "object_name"} <= arrays.keys():
+            raise UnsupportedFormatError(f"found arrays {arrays.listed()}, expected those of ldls.save")
+        if "points" not in arrays:
+            raise UnsupportedFormatError("holds no points, as earlier versions wrote it; segment the frame again")
+        try:
+            result = _result(arrays)
+            _check(result)
+        except InputError as error:
+            raise CorruptFileError(f"not a whole result ({error})") from None
+        return result
 
 
 def _views(result: Segmentation) -> dict[str, NDArray[Any]]:
@@ -115,7 +115,7 @@ def _result(arrays: Arrays) -> Segmentation:
         instances=_instances(arrays, views),
         views=views,
         report=Report(**report | {"empty_masks": tuple(report["empty_masks"])}),
-        timings=json.loads(str(arrays["timings"])),
+        timings=dict(json.loads(str(arrays["timings"]))),
         points=as_points(arrays["points"]),
         # results from before a parameter was there knew the paper's method only
         params=replace(Params.paper(), **json.loads(str(arrays["params"]))),
@@ -138,19 +138,19 @@ def _instances(arrays: Arrays, views: tuple[SeenView, ...]) -> tuple[Instance, .
 def _read_views(arrays: Arrays) -> tuple[SeenView, ...]:
     names = arrays["view_names"].tolist()
     if len(names) != 1:
-        return tuple(_read_view(arrays, f"view{i}_", name) for i, name in enumerate(names))
-    every_mask = {"labels": np.arange(1, len(arrays["object_name"]) + 1, dtype=np.int32)}
-    return (_read_view({**arrays, **every_mask}, "", names[0]),)
+        return tuple(_read_view(arrays, f"view{i}_", each, arrays[f"view{i}_labels"]) for i, each in enumerate(names))
+    every_mask = np.arange(1, len(arrays["object_name"]) + 1, dtype=np.int32)
+    return (_read_view(arrays, "", names[0], every_mask),)
 
 
-def _read_view(arrays: Arrays, prefix: str, name: str) -> SeenView:
+def _read_view(arrays: Arrays, prefix: str, name: str, labels: NDArray[np.int32]) -> SeenView:
     start = prefix + MASKS
-    masks = {name.removeprefix(start): array for name, array in arrays.items() if name.startswith(start)}
+    masks = {key.removeprefix(start): arrays[key] for key in arrays if key.startswith(start)}
     return SeenView(
         view=View(masks_of(masks), _camera(json.loads(str(arrays[f"{prefix}camera"]))), name),
         in_view=arrays[f"{prefix}in_view"],
         pixels=arrays[f"{prefix}pixels"],
-        labels=arrays[f"{prefix}labels"],
+        labels=labels,
     )
 
 

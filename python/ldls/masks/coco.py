@@ -40,7 +40,7 @@ def arguments(
     annotations, images, own_names = _parts(content)
     names = own_names or names or COCO_NAMES
     image_id = _choose_image(annotations, images, image_id)
-    chosen = [a for a in annotations if image_id is None or a.get("image_id", image_id) == image_id]
+    chosen = [a for a in annotations if image_id is None or a.get("image_id") in (None, image_id)]
     size = _size_of(images, image_id, chosen, image_size)
     labels = [f"annotation {a.get('id', i)}" for i, a in enumerate(chosen)]
     scores = _scores(labels, chosen)
@@ -105,9 +105,15 @@ def _choose_image(
     image_id: int | str | None,
 ) -> int | str | None:
     for i, annotation in enumerate(annotations):
-        if type(annotation.get("image_id")) not in (int, str, type(None)):
-            raise CorruptFileError(f"annotation {i}: image_id is {annotation['image_id']!r}, expected int or str")
-    known = list(images) or sorted({a["image_id"] for a in annotations if "image_id" in a}, key=str)
+        own = annotation.get("image_id")
+        if type(own) not in (int, str, type(None)):
+            raise CorruptFileError(f"annotation {i}: image_id is {own!r}, expected int or str")
+        if images and own is not None and own not in images:
+            raise MaskError(
+                f"annotation {annotation.get('id', i)}: image_id is {own!r}, which no image has; "
+                f"found {list(images)[:10]}; mend the id, or leave the annotation out"
+            )
+    known = list(images) or sorted({a["image_id"] for a in annotations if a.get("image_id") is not None}, key=str)
     if image_id is not None and known and image_id not in known:
         raise MaskError(f"no image with id {image_id!r}; found {known[:10]}")
     if image_id is None and len(known) > 1:

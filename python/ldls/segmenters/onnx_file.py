@@ -7,6 +7,8 @@ out of the model's folder or out of what onnxruntime brings along.
 from __future__ import annotations
 
 import math
+import os
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from os import PathLike
@@ -21,6 +23,7 @@ from ldls.errors import (
     UnsafePathError,
     UnsupportedFormatError,
 )
+from ldls.io.files import open_file
 
 MAX_BYTES = 2 << 30
 """Largest model file; protobuf, of which ONNX is made, ends there. Larger weights lie in files of their own."""
@@ -61,38 +64,34 @@ def read_onnx(path: str | PathLike[str]) -> OnnxFile:
         ImportError: `ldls[onnx]` is not installed.
     """
     path = Path(path)
-    content = _read(path)
-    model = _parse(path, content)
-    _check_operators(path, model)
-    external = [tensor for tensor in _tensors(model) if tensor.data_location == tensor.EXTERNAL]
-    for tensor in external:
-        _check_external(path, tensor)
-    return OnnxFile(path, model, content, bool(external))
+    with open_file(path, "ONNX model", limit=sys.maxsize) as file:
+        if file.size > MAX_BYTES:
+            raise LimitError(f"{file.size} bytes, expected at most {MAX_BYTES}; save the weights as external data")
+        content = file.read()
+        model = _parse(content)
+        _check_operators(model)
+        external = [tensor for tensor in _tensors(model) if tensor.data_location == tensor.EXTERNAL]
+        for tensor in external:
+            _check_external(path, tensor)
+        return OnnxFile(path, model, content, bool(external))
 
 
-def _read(path: Path) -> bytes:
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise LimitError(f"{path}: {size} bytes, expected at most {MAX_BYTES}; save the weights as external data")
-    return path.read_bytes()
-
-
-def _parse(path: Path, content: bytes) -> Any:  # noqa: ANN401
+def _parse(content: bytes) -> Any:  # noqa: ANN401
     onnx = require("onnx", "onnx")
     message = require("google.protobuf.message", "onnx")
     if content.startswith(LFS_POINTER):
-        raise CorruptFileError(f"{path}: a Git LFS pointer, not the model itself; run: git lfs pull")
-    _check_fields(path, content)
+        raise CorruptFileError("a Git LFS pointer, not the model itself; run: git lfs pull")
+    _check_fields(content)
     try:
         model = onnx.load_model_from_string(content)
     except (message.DecodeError, ValueError) as error:
-        raise CorruptFileError(f"{path}: not an ONNX model ({error})") from None
+        raise CorruptFileError(f"not an ONNX model ({error})") from None
     if not model.graph.node:
-        raise CorruptFileError(f"{path}: not an ONNX model, or one without a graph")
+        raise CorruptFileError("not an ONNX model, or one without a graph")
     return model
 
 
-def _check_fields(path: Path, content: bytes) -> None:
+def _check_fields(content: bytes) -> None:
     """Walks the outermost fields: these alone tell a file that was cut off from one that is something else."""
     at = 0
     try:
@@ -101,11 +100,11 @@ def _check_fields(path: Path, content: bytes) -> None:
             tag, at = _varint(content, at)
             at = _field_end(content, at, tag & 7)
             if tag >> 3 == 0 or at < 0:
-                raise CorruptFileError(f"{path}: not an ONNX model (byte {start} begins no protobuf field)")
+                raise CorruptFileError(f"not an ONNX model (byte {start} begins no protobuf field)")
     except IndexError:
         at = len(content) + 1
     if at > len(content) or not content:
-        raise TruncatedFileError(f"{path}: ends after {len(content)} bytes, expected at least {at}; download it again")
+        raise TruncatedFileError(f"ends after {len(content)} bytes, expected at least {at}; download it again")
 
 
 def _field_end(content: bytes, at: int, wire_type: int) -> int:
@@ -134,13 +133,13 @@ def _varint(content: bytes, at: int) -> tuple[int, int]:
     return value, at
 
 
-def _check_operators(path: Path, model: Any) -> None:  # noqa: ANN401
+def _check_operators(model: Any) -> None:  # noqa: ANN401
     own = {(function.domain, function.name) for function in model.functions}
     for node in _nodes(model):
         operator = (node.domain, node.op_type)
         if operator not in own and (node.domain not in DOMAINS or operator in OPERATORS_WITH_FILES):
             raise UnsupportedFormatError(
-                f"{path}: operator {node.domain}::{node.op_type} needs a library or file of its own, expected "
+                f"operator {node.domain}::{node.op_type} needs a library or file of its own, expected "
                 "operators of ONNX and onnxruntime; export the model without it"
             )
 
@@ -202,12 +201,11 @@ def _dense(sparse_tensors: Iterable[Any]) -> Iterator[Any]:
 def _check_external(path: Path, tensor: Any) -> None:  # noqa: ANN401
     entries = {entry.key: entry.value for entry in tensor.external_data}
     weights = _contained(path, tensor.name, entries.get("location", ""))
-    offset = _whole_number(path, tensor.name, entries.get("offset", "0"))
-    length = _whole_number(path, tensor.name, entries.get("length", str(_bytes_needed(tensor))))
-    if not weights.is_file():
+    offset = _whole_number(tensor.name, entries.get("offset", "0"))
+    length = _whole_number(tensor.name, entries.get("length", str(_bytes_needed(tensor))))
+    if not os.path.isfile(weights):  # noqa: PTH113 - unlike Path.is_file, it takes any name
         raise CorruptFileError(
-            f"{path}: tensor {tensor.name!r} lies in {weights.name!r}, which is not there; "
-            "keep the files of a model together"
+            f"tensor {tensor.name!r} lies in {weights.name!r}, which is not there; keep the files of a model together"
         )
     size = weights.stat().st_size
     if offset + length > size:
@@ -227,14 +225,14 @@ def _contained(path: Path, name: str, location: str) -> Path:
         if weights.is_relative_to(folder):
             return weights
     raise UnsafePathError(
-        f"{path}: tensor {name!r} lies at {location!r}, expected a file in the model's folder; "
+        f"tensor {name!r} lies at {location!r}, expected a file in the model's folder; "
         "put it there and save the model again"
     )
 
 
-def _whole_number(path: Path, name: str, text: str) -> int:
+def _whole_number(name: str, text: str) -> int:
     if not (text.isascii() and text.isdigit()):
-        raise CorruptFileError(f"{path}: tensor {name!r} has offset or length {text!r}, expected a whole number")
+        raise CorruptFileError(f"tensor {name!r} has offset or length {text!r}, expected a whole number")
     return int(text)
 
 

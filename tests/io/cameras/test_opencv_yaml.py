@@ -108,7 +108,7 @@ def test_models_of_distortion(write, entries, options, model):
         pytest.param("%YAML:1.0\n---\nK: {a: b: c}", "line 3: not YAML", id="malformed, line"),
         pytest.param("1 2 3", "expected keys with values, got str", id="no keys"),
         pytest.param("", "expected keys with values, got NoneType", id="empty"),
-        pytest.param("[" * 5000, "not a calibration in YAML", id="deep"),
+        pytest.param("[" * 5000, "line 1: not YAML .more than 32 levels", id="deep"),
         pytest.param("{[1]: 2}", "line 1: not YAML", id="key that is a list"),
         pytest.param("a: &a [*a]", "not YAML", id="list in itself"),
         pytest.param("K: !!python/object/apply:os.system [ls]", "could not determine a constructor", id="code"),
@@ -150,10 +150,10 @@ def test_files_that_are_no_yaml(tmp_path, monkeypatch):
     with pytest.raises(ldls.UnsupportedFormatError, match="got XML, expected YAML"):
         ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ldls.CalibrationError, match="not a text file"):
+    with pytest.raises(ldls.CorruptFileError, match=r"camera\.xml: not a text file"):
         ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
-    path.write_bytes(b"#" * (1 << 22) + b"\n")
-    with pytest.raises(ldls.LimitError, match="4194305 bytes"):
+    path.write_bytes(b"#" * (1 << 18) + b"\n")
+    with pytest.raises(ldls.LimitError, match="262,145 bytes, expected at most 262,144"):
         ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     with pytest.raises(ldls.FileFormatError, match="got a folder"):
         ldls.read_camera(tmp_path, format="opencv", T_camera_lidar=np.eye(4))
@@ -176,3 +176,18 @@ def test_files_that_are_no_yaml(tmp_path, monkeypatch):
 def test_transforms_that_are_none(write, transform, message):
     with pytest.raises(ldls.CalibrationError, match=message):
         ldls.read_camera(write(ROS), format="opencv", T_camera_lidar=transform)
+
+
+def test_aliases_of_aliases_are_refused(write):
+    lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 8)]
+    with pytest.raises(ldls.CalibrationError, match="line 2: not YAML .aliases are not read; write the value out"):
+        ldls.read_camera(write("\n".join([*lines, "K: *a7"])), T_camera_lidar=np.eye(4))
+
+
+@pytest.mark.parametrize("tag", ["", "!!int ", "!!float "], ids=["plain", "int", "float"])
+def test_digits_with_colons_are_no_number_to_the_base_60(write, tag):
+    # as a number this would take the square of its length in time
+    long = ":".join(["1"] * 100_000)
+    with pytest.raises(ldls.CalibrationError, match=r"camera\.yaml: camera_matrix: expected numbers .*1:1"):
+        ldls.read_camera(write(f"K: {tag}{long}"), format="opencv", T_camera_lidar=np.eye(4))

@@ -223,3 +223,24 @@ def test_a_missing_file_stays_one(format, tmp_path, small_scene):
     points, _, camera = small_scene
     with pytest.raises(FileNotFoundError):
         read_labeling(tmp_path / "none", format=format, points=points, camera=camera)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(np.array(["a"]), id="text"),
+        pytest.param(np.array([1 + 2j]), id="complex numbers"),
+        pytest.param(np.array(["2020-01-01"], "M8[D]"), id="dates"),
+        pytest.param(np.array([1.5]), id="fractions"),
+        pytest.param(np.array([[1001]]), id="a table"),
+        pytest.param(np.array(1001), id="no axis"),
+        pytest.param(np.array([-1001]), id="negative"),
+        pytest.param(np.array([2**63], np.uint64), id="64 bits"),
+        pytest.param(np.zeros(2, [("a", "<f4")]), id="fields"),
+        pytest.param(np.array([True]), id="flags"),
+    ],
+)
+def test_panoptic_arrays_of_other_kinds_are_corrupt(tmp_path, data):
+    np.savez(tmp_path / "a_panoptic.npz", data=data)
+    with pytest.raises(CorruptFileError, match=r"a_panoptic\.npz: "):
+        read_panoptic(tmp_path / "a_panoptic.npz")

@@ -130,7 +130,7 @@ def test_faults_of_documents_are_named(parts, error, message):
 def test_json_that_cannot_be_parsed_is_corrupt(tmp_path, text):
     path = tmp_path / "masks.json"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(ldls.CorruptFileError, match=r"masks\.json: not valid JSON"):
+    with pytest.raises(ldls.CorruptFileError, match=r"masks\.json: not a (whole JSON|text) file"):
         ldls.read_masks(path)
 
 
@@ -138,7 +138,9 @@ def test_a_file_of_two_gigabytes_is_refused(tmp_path):
     path = tmp_path / "masks.json"
     with path.open("wb") as file:
         file.truncate(2 << 30)
-    with pytest.raises(ldls.LimitError, match=r"masks\.json: over 1073741824 bytes; split it by image"):
+    with pytest.raises(
+        ldls.LimitError, match=r"masks\.json: 2,147,483,648 bytes, expected at most 1,073,741,824 .*; split it"
+    ):
         ldls.read_masks(path)
 
 
@@ -153,3 +155,18 @@ def test_polygons_of_an_image_of_another_size_are_refused(tmp_path):
     assert len(ldls.read_masks(tmp_path / "masks.json", image_size=(20, 30))) == 1
     with pytest.raises(ldls.MaskError, match=r"masks of \(20, 30\).*the image is \(30, 20\); swapped"):
         ldls.read_masks(tmp_path / "masks.json", image_size=(30, 20))
+
+
+@pytest.mark.parametrize("lost", [2, "1"], ids=["another number", "text for a number"])
+@pytest.mark.parametrize("image_id", [None, 1], ids=["only image", "chosen image"])
+def test_annotations_whose_image_id_no_image_has_are_refused(lost, image_id):
+    annotation = document()["annotations"][0]
+    lost_one = document(annotations=[annotation, annotation | {"id": 7, "image_id": lost}])
+    with pytest.raises(ldls.MaskError, match=rf"annotation 7: image_id is {lost!r}, which no image has; found \[1\]"):
+        ldls.InstanceMasks.from_coco(lost_one, image_id=image_id)
+
+
+@pytest.mark.parametrize("given", [{}, {"image_id": None}], ids=["missing", "null"])
+def test_annotations_without_image_id_belong_to_the_only_image(given):
+    annotation = {"id": 1, "category_id": 1, "segmentation": RLE} | given
+    assert len(ldls.InstanceMasks.from_coco(document(annotations=[annotation]))) == 1

@@ -127,3 +127,9 @@ def test_missing_files_and_folders(tmp_path):
         ldls.read_points(tmp_path / "none.bin")
     with pytest.raises(ldls.FileFormatError, match="expected a regular file"):
         ldls.read_points(tmp_path)
+
+
+def test_bits_that_are_no_number_make_no_warning(tmp_path):
+    values = np.full(20, 0x7FA00000, "<u4")  # a signalling NaN
+    (tmp_path / "sweep.bin").write_bytes(values.tobytes())
+    assert np.isnan(ldls.read_points(tmp_path / "sweep.bin")).all()

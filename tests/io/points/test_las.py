@@ -152,6 +152,7 @@ def test_a_cut_file_is_named_wherever_it_ends(path, part):
         pytest.param(100, "I", [2**32 - 1], ldls.CorruptFileError, "variable length records", id="many VLRs"),
         pytest.param(131, "d", [0.0], ldls.CorruptFileError, "no scale 0", id="scale 0"),
         pytest.param(139, "d", [np.nan], ldls.CorruptFileError, "scales .*nan", id="scale NaN"),
+        pytest.param(131, "d", [1e308], ldls.CorruptFileError, "scales .*1e.308.*not finite", id="scale 1e308"),
         pytest.param(155, "d", [np.inf], ldls.CorruptFileError, "offsets .*inf", id="offset inf"),
         pytest.param(104, "B", [50], ldls.UnsupportedFormatError, "point format 50", id="point format"),
         pytest.param(25, "B", [9], ldls.UnsupportedFormatError, "LAS 1.9", id="version"),
@@ -163,3 +164,12 @@ def test_faults_of_a_header_are_named(path, at, layout, values, error, message):
     change(path, at, layout, *values)
     with pytest.raises(error, match=f"{path.name}.*{message}"):
         ldls.read_points(path)
+
+
+def test_a_panic_of_the_library_is_a_corrupt_file(tmp_path):
+    cloud(n_points=12).write(tmp_path / "a.laz")
+    content = (tmp_path / "a.laz").read_bytes()
+    (tmp_path / "a.laz").write_bytes(content[:560] + b"\xff" * 100 + content[660:])
+    # where the library has learned to raise instead, another file must be found that makes it panic
+    with pytest.raises(ldls.CorruptFileError, match=r"a.laz: not a whole LAS or LAZ file \(PanicException"):
+        ldls.read_points(tmp_path / "a.laz")

@@ -151,3 +151,15 @@ def test_a_cloud_without_points(tmp_path):
 def test_faults_of_pcd_are_named(tmp_path, content, error, message):
     with pytest.raises(error, match=f"a.pcd.*({message})"):
         ldls.read_points(write(tmp_path, content))
+
+
+def test_a_header_without_types_is_refused(tmp_path):
+    with pytest.raises(ldls.CorruptFileError, match="a.pcd: 4 FIELDS, 0 of TYPE; expected as many"):
+        ldls.read_points(write(tmp_path, header(TYPE=None) + ROWS.tobytes()))
+
+
+@pytest.mark.parametrize("value", ["1.5", "-1", "256", "nan", "1e30"])
+def test_numbers_that_a_field_of_whole_numbers_cannot_hold_are_named(tmp_path, value):
+    content = header(WIDTH="2", POINTS="2", DATA="ascii", SIZE="4 4 4 1", TYPE="F F F U")
+    with pytest.raises(ldls.CorruptFileError, match="intensity of point 1 is .*, expected whole numbers 0 to 255"):
+        ldls.read_points(write(tmp_path, content + f"1 2 3 255\n1 2 3 {value}\n".encode()))

@@ -10,7 +10,10 @@ ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
     ("text", "expected"),
     [
         pytest.param("1.5,-2,3e-3\n4,5,6\n", ROWS, id="commas"),
-        pytest.param("1.5;-2;3e-3\n4;5;6", ROWS, id="semicolons, no last line end"),
+        pytest.param("1.5;-2;3e-3\n4;5;6\n", ROWS, id="semicolons"),
+        pytest.param("1.5;-2;3e-3\r4;5;6\r", ROWS, id="line ends of old"),
+        pytest.param("x;y;z;name\n1.5;-2;3e-3;car\n4;5;6;bu", ROWS, id="no last line end behind what is not read"),
+        pytest.param("1.5 -2 3e-3\n4 5 6 ", ROWS, id="a blank at the end, no line end"),
         pytest.param("1.5\t-2\t3e-3\n4\t5\t6\n", ROWS, id="tabs"),
         pytest.param("  1.5   -2 3e-3\n4 5  6 \n\n", ROWS, id="blanks"),
         pytest.param("1.5, -2, 3e-3\n4, 5, 6\n", ROWS, id="commas and blanks"),

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.errors import CalibrationError, ParameterError, within
+from ldls.io.files import open_file
 
+MAX_BYTES = 1 << 20
 OBJECT_ARCHIVE = "data_object_calib"
 RAW_ARCHIVE = "the calibration of that day"
 SIZES = {"P0": 12, "P1": 12, "P2": 12, "P3": 12, "R0_rect": 9, "Tr_velo_to_cam": 12, "Tr": 12}
@@ -109,12 +111,10 @@ def _read_matrices(path: Path, sizes: Mapping[str, int], spellings: Mapping[str,
     Raises:
         CalibrationError: A key is doubled, or a line does not hold the numbers it should.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise CalibrationError(f"{path}: not a text file ({error.reason} at {error.start})") from None
+    with open_file(path, "calibration", limit=MAX_BYTES) as file:
+        lines = file.text().splitlines()
     matrices: Matrices = {}
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(lines, start=1):
         words = line.partition("#")[0].split()
         key = spellings.get(words[0].rstrip(":"), words[0].rstrip(":")) if words else ""
         if key not in sizes:

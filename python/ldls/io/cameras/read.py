@@ -17,7 +17,7 @@ from ldls.checks import checked
 from ldls.errors import CalibrationError, ParameterError, UnsupportedFormatError
 from ldls.io.cameras import kalibr, kitti, opencv
 from ldls.io.cameras.yaml_file import read_yaml
-from ldls.io.files import regular_file
+from ldls.io.files import open_file
 from ldls.io.options import check_options
 
 READERS: dict[str, Callable[..., Camera]] = {
@@ -95,7 +95,7 @@ def read_camera(
 def _is_kitti(path: Path) -> bool:
     if path.is_dir():
         return True
-    with regular_file(path).open("rb") as file:
+    with open_file(path, "calibration", limit=kitti.MAX_BYTES) as file:
         lines = file.read(HEAD_BYTES).decode("utf-8-sig", "replace").splitlines()
     return path.suffix.lower() == ".txt" or any(line.startswith(KITTI_KEYS) for line in lines)
 

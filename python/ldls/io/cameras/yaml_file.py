@@ -8,11 +8,14 @@ from typing import Any
 
 from ldls._optional import require
 from ldls.camera.fields import Fields
-from ldls.errors import CalibrationError, LimitError, UnsupportedFormatError
-from ldls.io.files import regular_file
+from ldls.errors import CalibrationError, UnsupportedFormatError
+from ldls.io.files import open_file
 
-MAX_BYTES = 1 << 22
+MAX_BYTES = 1 << 18
+MAX_DEPTH = 32
+"""Levels of nesting: calibrations have six."""
 OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
+NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 MAPPING = "tag:yaml.org,2002:map"
 
 
@@ -28,24 +31,17 @@ def read_yaml(path: str | PathLike[str]) -> Fields:
         ImportError: The extra `yaml` is not installed.
     """
     yaml = require("yaml", "yaml")
-    path = regular_file(path)
-    if path.stat().st_size > MAX_BYTES:
-        raise LimitError(f"{path}: {path.stat().st_size} bytes, expected a calibration of at most {MAX_BYTES}")
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise CalibrationError(f"{path}: not a text file ({error.reason} at byte {error.start})") from None
-    if text.lstrip().startswith("<"):
-        raise UnsupportedFormatError(f"{path}: got XML, expected YAML; save the calibration as .yml or .yaml")
-    try:
-        entries = yaml.load(_without_opencv_directive(text), _loader(yaml))
-    except yaml.YAMLError as error:
-        raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({getattr(error, 'problem', error)})") from None
-    except (RecursionError, ValueError) as error:
-        raise CalibrationError(f"{path}: not a calibration in YAML ({error})") from None
-    if not isinstance(entries, Mapping):
-        raise CalibrationError(f"{path}: expected keys with values, got {type(entries).__name__}")
-    return Fields(str(path), entries)
+    with open_file(path, "calibration in YAML", limit=MAX_BYTES) as file:
+        text = file.text()
+        if text.lstrip().startswith("<"):
+            raise UnsupportedFormatError("got XML, expected YAML; save the calibration as .yml or .yaml")
+        try:
+            entries = yaml.load(_without_opencv_directive(text), _loader(yaml))
+        except yaml.YAMLError as error:
+            raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({getattr(error, 'problem', error)})") from None
+        if not isinstance(entries, Mapping):
+            raise CalibrationError(f"expected keys with values, got {type(entries).__name__}")
+        return Fields(str(path), entries)
 
 
 def _without_opencv_directive(text: str) -> str:
@@ -54,7 +50,7 @@ def _without_opencv_directive(text: str) -> str:
 
 
 def _loader(yaml: Any) -> Any:  # noqa: ANN401
-    """The safe loader, which also knows OpenCV's matrices and refuses a key that stands there twice."""
+    """The bounded loader, which also knows OpenCV's matrices and refuses a key that stands there twice."""
 
     def mapping(loader: Any, node: Any) -> dict[object, object]:  # noqa: ANN401
         seen: set[str] = set()
@@ -69,9 +65,38 @@ def _loader(yaml: Any) -> Any:  # noqa: ANN401
         entries: dict[object, object] = loader.construct_mapping(node, deep=True)
         return entries
 
-    loader: Any = type("CalibrationLoader", (yaml.SafeLoader,), {})
+    loader: Any = type("CalibrationLoader", (_bounded_loader(yaml),), {})
     for tag in (MAPPING, OPENCV_MATRIX):
         loader.add_constructor(tag, mapping)
+    return loader
+
+
+def _bounded_loader(yaml: Any) -> Any:  # noqa: ANN401
+    """The safe loader without what lets content grow beyond its text.
+
+    There are no aliases, and digits with colons are text, as in YAML 1.2, not numbers to the base 60.
+    """
+
+    def compose_node(loader: Any, parent: Any, index: Any) -> Any:  # noqa: ANN401
+        event = loader.peek_event()
+        if isinstance(event, yaml.AliasEvent):
+            problem = "aliases are not read; write the value out"
+            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+        if loader.depth == MAX_DEPTH:
+            problem = f"more than {MAX_DEPTH} levels of nesting"
+            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+        loader.depth += 1
+        node = yaml.SafeLoader.compose_node(loader, parent, index)
+        loader.depth -= 1
+        return node
+
+    def number(loader: Any, node: Any) -> object:  # noqa: ANN401
+        text = loader.construct_scalar(node)
+        return text if ":" in text else yaml.SafeLoader.yaml_constructors[node.tag](loader, node)
+
+    loader: Any = type("BoundedLoader", (yaml.SafeLoader,), {"compose_node": compose_node, "depth": 0})
+    for tag in NUMBERS:
+        loader.add_constructor(tag, number)
     return loader
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import CorruptFileError, InputError, UnsupportedFormatError
-from ldls.io.arrays import read_npz, write_npz
+from ldls.io.arrays import open_npz, write_npz
 from ldls.labeling import Labeling
 
 
@@ -23,17 +24,17 @@ def read_labeling_npz(path: str | PathLike[str]) -> Labeling:
         CorruptFileError: It is not a whole `.npz` file, or its arrays do not fit one another.
         FileNotFoundError: There is no such file.
     """
-    arrays = read_npz(path)
-    try:
-        if {"labels", "object_name"} <= arrays.keys():
-            return Labeling.from_instance_labels(arrays["labels"], arrays["object_name"])
-        if {"classes", "names"} <= arrays.keys():
-            return _by_array(arrays)
-    except (InputError, IndexError) as error:
-        raise CorruptFileError(f"{path}: {error}") from None
-    raise UnsupportedFormatError(
-        f"{path}: found arrays {sorted(arrays)}, expected labels and object_name (ldls), or classes and names"
-    )
+    with open_npz(path) as arrays:
+        try:
+            if {"labels", "object_name"} <= arrays.keys():
+                return Labeling.from_instance_labels(arrays["labels"], arrays["object_name"].tolist())
+            if {"classes", "names"} <= arrays.keys():
+                return _by_array(arrays)
+        except InputError as error:
+            raise CorruptFileError(str(error)) from None
+        raise UnsupportedFormatError(
+            f"found arrays {arrays.listed()}, expected labels and object_name (ldls), or classes and names"
+        )
 
 
 def read_confidence_npz(path: str | PathLike[str]) -> NDArray[np.floating] | None:
@@ -43,10 +44,11 @@ def read_confidence_npz(path: str | PathLike[str]) -> NDArray[np.floating] | Non
         CorruptFileError: It is not a whole `.npz` file, or these are no numbers.
         FileNotFoundError: There is no such file.
     """
-    confidence = read_npz(path).get("confidence")
-    if confidence is not None and confidence.dtype.kind != "f":
-        raise CorruptFileError(f"{path}: confidence is {confidence.dtype}, expected floating point")
-    return confidence
+    with open_npz(path) as arrays:
+        confidence = arrays.get("confidence")
+        if confidence is not None and confidence.dtype.kind != "f":
+            raise CorruptFileError(f"confidence is {confidence.dtype}, expected floating point")
+        return confidence
 
 
 def write_labeling(path: str | PathLike[str], labeling: Labeling) -> None:
@@ -55,7 +57,7 @@ def write_labeling(path: str | PathLike[str], labeling: Labeling) -> None:
     write_npz(path, arrays | {"names": np.array(labeling.names, np.str_)})
 
 
-def _by_array(arrays: dict[str, NDArray[Any]]) -> Labeling:
+def _by_array(arrays: Mapping[str, NDArray[Any]]) -> Labeling:
     none = np.zeros(arrays["classes"].shape, np.int32)
     return Labeling(
         arrays["classes"],

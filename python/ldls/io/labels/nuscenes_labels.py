@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import CorruptFileError, InputError, LimitError
-from ldls.io.arrays import read_npz, write_npz
-from ldls.io.files import whole_file
+from ldls.io.arrays import open_npz, write_npz
+from ldls.io.files import open_file, whole_file
 from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
 
@@ -53,11 +53,11 @@ def read_lidarseg(path: str | PathLike[str]) -> Labeling:
         CorruptFileError: A point has a class above 31; the message names it.
         FileNotFoundError: There is no such file.
     """
-    codes = np.frombuffer(Path(path).read_bytes(), np.uint8)
-    try:
-        return Labeling.from_codes(codes, NUSCENES)
-    except InputError as error:
-        raise CorruptFileError(f"{path}: {error}; is it a point cloud?") from None
+    with open_file(path, "file of labels") as file:
+        try:
+            return Labeling.from_codes(np.frombuffer(file.read(), np.uint8), NUSCENES)
+        except InputError as error:
+            raise CorruptFileError(f"{error}; is it a point cloud?") from None
 
 
 def read_panoptic(path: str | PathLike[str]) -> Labeling:
@@ -67,14 +67,14 @@ def read_panoptic(path: str | PathLike[str]) -> Labeling:
         CorruptFileError: It is not a whole `.npz` file with one array `data` of such labels.
         FileNotFoundError: There is no such file.
     """
-    arrays = read_npz(path)
-    labels = arrays.get("data")
-    if labels is None or labels.ndim != 1 or labels.dtype.kind not in "iu":
-        raise CorruptFileError(f"{path}: found arrays {sorted(arrays)}, expected 'data' with a uint16 a point")
-    try:
-        return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=labels % INSTANCES_A_CLASS)
-    except InputError as error:
-        raise CorruptFileError(f"{path}: {error}") from None
+    with open_npz(path) as arrays:
+        labels = arrays.get("data")
+        if labels is None or labels.ndim != 1 or labels.dtype.kind not in "iu":
+            raise CorruptFileError(f"found arrays {arrays.listed()}, expected 'data' with a uint16 a point")
+        try:
+            return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=labels % INSTANCES_A_CLASS)
+        except InputError as error:
+            raise CorruptFileError(str(error)) from None
 
 
 def write_lidarseg(path: Path, result: Segmentation) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
-from ldls.io.files import whole_file
+from ldls.io.files import open_file, whole_file
 from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
 
@@ -37,15 +37,14 @@ def read_semantic_kitti(path: str | PathLike[str]) -> Labeling:
         CorruptFileError: A label has a class that SemanticKITTI does not; the message names the point.
         FileNotFoundError: There is no such file.
     """
-    path = Path(path)
-    content = path.read_bytes()
-    if len(content) % LABEL_BYTES:
-        raise TruncatedFileError(f"{path}: {len(content)} bytes is not a multiple of 4 (uint32 a point)")
-    values = np.frombuffer(content, "<u4")
-    try:
-        return Labeling.from_codes(values & 0xFFFF, SEMANTIC_KITTI, instances=values >> 16)
-    except InputError as error:
-        raise CorruptFileError(f"{path}: {error}") from None
+    with open_file(path, "file of labels") as file:
+        if file.size % LABEL_BYTES:
+            raise TruncatedFileError(f"{file.size} bytes is not a multiple of 4 (uint32 a point)")
+        values = np.frombuffer(file.read(), "<u4")
+        try:
+            return Labeling.from_codes(values & 0xFFFF, SEMANTIC_KITTI, instances=values >> 16)
+        except InputError as error:
+            raise CorruptFileError(str(error)) from None
 
 
 def write(path: Path, result: Segmentation) -> None:

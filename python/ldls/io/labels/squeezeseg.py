@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,6 @@ def read_squeezeseg(path: str | PathLike[str]) -> Labeling:
         UnsafeFileError: It holds Python objects.
         FileNotFoundError: There is no such file.
     """
-    path = Path(path)
     image = _load(path)
     labels = image.reshape(-1) if image.ndim == 2 else image[:, :, LABEL].reshape(-1)
     counts = np.ones(labels.shape, bool) if image.ndim == 2 else image[:, :, RANGE].reshape(-1) > 0
@@ -51,11 +49,11 @@ def read_squeezeseg_ranges(path: str | PathLike[str]) -> NDArray[np.float64] | N
     Raises:
         FileFormatError: It is not a whole file of such an array.
     """
-    image = _load(Path(path))
+    image = _load(path)
     return None if image.ndim == 2 else image[:, :, RANGE].reshape(-1).astype(np.float64)
 
 
-def _load(path: Path) -> NDArray[Any]:
+def _load(path: str | PathLike[str]) -> NDArray[Any]:
     array = read_npy(path)
     if array.shape not in ((*IMAGE, N_CHANNELS), IMAGE):
         raise CorruptFileError(f"{path}: expected 64 x 512 x 6, or 64 x 512 labels, got {array.shape}")

@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 
-from ldls.errors import CorruptFileError, LimitError, within
-from ldls.io.files import regular_file, whole_file
+from ldls.io.files import open_file, whole_file
 from ldls.masks import InstanceMasks, coco
 
 MAX_FILE_BYTES = 1 << 30
@@ -35,8 +33,8 @@ def read(
         CorruptFileError: The file is not JSON, or not COCO's.
         LimitError: The file is too large.
     """
-    content = _load(regular_file(path))
-    with within(path):
+    with open_file(path, "JSON file", limit=MAX_FILE_BYTES) as file:
+        content = json.loads(file.text(), parse_constant=_refuse_constant)
         return InstanceMasks(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
 
 
@@ -61,15 +59,6 @@ def write(
     content = own if results else masks.to_coco(image_id=image_id, file_name=file_name)
     with whole_file(path) as file:
         file.write(json.dumps(content, separators=(",", ":")).encode())
-
-
-def _load(path: Path) -> object:
-    if path.stat().st_size > MAX_FILE_BYTES:
-        raise LimitError(f"{path}: over {MAX_FILE_BYTES} bytes; split it by image")
-    try:
-        return json.loads(path.read_bytes(), parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        raise CorruptFileError(f"{path}: not valid JSON ({error})") from None
 
 
 def _refuse_constant(name: str) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,16 +17,9 @@ from PIL import Image
 from PIL.PngImagePlugin import PngImageFile, PngInfo
 
 import ldls._ldls as _ldls
-from ldls.errors import (
-    CorruptFileError,
-    FileFormatError,
-    LdlsError,
-    LimitError,
-    ParameterError,
-    UnsupportedFormatError,
-    within,
-)
-from ldls.io.files import regular_file, whole_file
+from ldls.errors import CorruptFileError, LimitError, ParameterError, UnsupportedFormatError
+from ldls.io.files import InputFile, open_file, parsing, whole_file
+from ldls.io.images import MAX_BYTES, check_pixels
 from ldls.masks import InstanceMasks, instance_image
 
 CHUNK = "ldls:instances"
@@ -63,22 +55,16 @@ def read(
         CorruptFileError: It is no PNG, or not a whole one.
         ParameterError: Categories, scores or a divisor for a file that has its own.
     """
-    path = regular_file(path)
-    values, texts = _open(path)
     given = {"categories": categories, "scores": scores, "names": names, "class_divisor": class_divisor}
-    if CHUNK not in texts:
-        with within(path):
+    with open_file(path, "PNG image", limit=MAX_BYTES) as file:
+        values, texts = _open(file)
+        if CHUNK not in texts:
             return InstanceMasks(**instance_image.arguments(values, **given))  # type: ignore[arg-type]
-    idle = [name for name, value in given.items() if value is not None]
-    if idle:
-        raise ParameterError(f"{idle[0]}: {path} holds its own; leave it out")
-    try:
-        with within(path):
+        idle = [name for name, value in given.items() if value is not None]
+        if idle:
+            raise ParameterError(f"{idle[0]}: the file holds its own; leave it out")
+        with parsing(f"text chunk {CHUNK}"):
             return _from_chunk(values, json.loads(texts[CHUNK]))
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        if isinstance(error, LdlsError):
-            raise
-        raise CorruptFileError(f"{path}: text chunk {CHUNK} cannot be used ({error})") from None
 
 
 def write(path: str | PathLike[str], masks: InstanceMasks) -> None:
@@ -100,30 +86,25 @@ def write(path: str | PathLike[str], masks: InstanceMasks) -> None:
         image.save(file, "PNG", pnginfo=info)
 
 
-def _open(path: Path) -> tuple[NDArray[Any], Mapping[str, str]]:
+def _open(file: InputFile) -> tuple[NDArray[Any], Mapping[str, str]]:
     """(H, W) values and the text chunks."""
-    try:
-        # opened as PNG and nothing else, and without Image.open, which warns of large images
-        with PngImageFile(path) as image:
-            _check_kind(path, image)
-            image.verify()  # the sums of all chunks, which loading does not look at
-        with PngImageFile(path) as image:
-            image.load()
-            return np.asarray(image), image.text
-    except (FileNotFoundError, PermissionError):
-        raise
-    except (OSError, SyntaxError, ValueError, EOFError) as error:
-        if isinstance(error, FileFormatError):
-            raise
-        raise CorruptFileError(f"{path}: not a whole PNG image ({error})") from None
+    # opened as PNG and nothing else, and without Image.open, which warns of large images
+    with PngImageFile(file) as image:
+        _check_kind(image)
+        check_pixels(image, file.size)
+        image.verify()  # the sums of all chunks, which loading does not look at
+    file.seek(0)
+    with PngImageFile(file) as image:
+        image.load()
+        return np.asarray(image), image.text
 
 
-def _check_kind(path: Path, image: PngImageFile) -> None:
+def _check_kind(image: PngImageFile) -> None:
     if image.width * image.height > MAX_PIXELS:
-        raise LimitError(f"{path}: {image.width} x {image.height} pixels, expected at most {MAX_PIXELS}")
+        raise LimitError(f"{image.width} x {image.height} pixels, expected at most {MAX_PIXELS}")
     if image.mode not in MODES:
         raise UnsupportedFormatError(
-            f"{path}: {image.mode} pixels, expected one number a pixel, grey of 8 or 16 bits or a palette; "
+            f"{image.mode} pixels, expected one number a pixel, grey of 8 or 16 bits or a palette; "
             "colours do not tell which instance a pixel belongs to"
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from typing import Any, Literal
 
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
-from ldls.errors import LdlsError, MaskError, ParameterError, UnsupportedFormatError, within
-from ldls.io.arrays import read_npz, write_npz
+from ldls.errors import MaskError, ParameterError, UnsupportedFormatError
+from ldls.io.arrays import open_npz, write_npz
 from ldls.masks import InstanceMasks
 from ldls.masks.pixels import checked_size, encode
 
@@ -27,19 +28,13 @@ def read(path: str | PathLike[str]) -> InstanceMasks:
         MaskError: They do not fit one another.
         FileFormatError: It is not a whole `.npz` file, or holds Python objects.
     """
-    arrays = read_npz(path)
-    with within(path):
-        try:
-            if arrays.keys() >= OWN_ARRAYS:
-                return masks_of(arrays)
-            if arrays.keys() >= {"masks", "class_ids", "scores"}:
-                return _of_research_code(arrays)
-        except (IndexError, ValueError, TypeError) as error:
-            if isinstance(error, LdlsError):
-                raise
-            raise MaskError(str(error)) from None
+    with open_npz(path) as arrays:
+        if arrays.keys() >= OWN_ARRAYS:
+            return masks_of(arrays)
+        if arrays.keys() >= {"masks", "class_ids", "scores"}:
+            return _of_research_code(arrays)
         raise UnsupportedFormatError(
-            f"found arrays {sorted(arrays)}, expected those of ldls.save, "
+            f"found arrays {arrays.listed()}, expected those of ldls.save, "
             "or masks, class_ids and scores of the LDLS research code"
         )
 
@@ -76,7 +71,7 @@ def mask_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
     }
 
 
-def masks_of(arrays: dict[str, NDArray[Any]]) -> InstanceMasks:
+def masks_of(arrays: Mapping[str, NDArray[Any]]) -> InstanceMasks:
     """The masks of arrays that `mask_arrays` made.
 
     Raises:
@@ -94,13 +89,18 @@ def masks_of(arrays: dict[str, NDArray[Any]]) -> InstanceMasks:
     if ends.size and (counts.min() < 0 or ends[-1] != runs.size):
         raise MaskError(f"run_counts sum to {ends[-1]}, runs holds {runs.size}")
     split = np.split(runs, ends[:-1]) if ends.size else []
-    names = zip(arrays["category_ids"].tolist(), arrays["category_names"].tolist(), strict=True)
+    ids, words = arrays["category_ids"], arrays["category_names"]
+    if ids.dtype.kind not in "iu" or ids.ndim != 1 or words.shape != ids.shape:
+        raise MaskError(
+            f"category_ids and category_names: expected (C,) whole numbers and a name for each, "
+            f"got {ids.shape} {ids.dtype} and {words.shape}"
+        )
     return InstanceMasks(
         [_ldls.Rle.from_runs(height, width, np.ascontiguousarray(runs)) for runs in split],
         (height, width),
         categories=arrays["categories"],
         scores=arrays["scores"],
-        names={int(category): str(name) for category, name in names},
+        names={category: str(name) for category, name in zip(ids.tolist(), words.tolist(), strict=True)},
     )
 
 
@@ -126,7 +126,7 @@ def _research_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
     }
 
 
-def _of_research_code(arrays: dict[str, NDArray[Any]]) -> InstanceMasks:
+def _of_research_code(arrays: Mapping[str, NDArray[Any]]) -> InstanceMasks:
     masks, classes = arrays["masks"], arrays["class_ids"]
     if masks.ndim != 3 or classes.shape != masks.shape[2:]:
         raise MaskError(f"masks: expected (height, width, {classes.size}), got {masks.shape}; one mask a class id")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ldls.cloud import MAX_COLUMNS
 from ldls.errors import FileFormatError, ParameterError, RecoveredFileWarning, TruncatedFileError
+from ldls.io.files import open_file
 
 FLOAT_BYTES = 4
 MAX_RINGS = 256
@@ -33,24 +34,28 @@ def read(path: Path, *, columns: int | None = None, recover: bool = False) -> ND
         columns = 5 if path.name.endswith(".pcd.bin") else 4
     if not 3 <= columns <= MAX_COLUMNS:
         raise ParameterError(f"columns: got {columns}, expected 3 to {MAX_COLUMNS}")
-    content = path.read_bytes()
+    with open_file(path, "file of float32 rows") as file:
+        return _rows(path, file.read(), columns, guessed=guessed, recover=recover)
+
+
+def _rows(path: Path, content: bytes, columns: int, *, guessed: bool, recover: bool) -> NDArray[np.float32]:
     row_bytes = FLOAT_BYTES * columns
     whole = len(content) // row_bytes * row_bytes
     if whole != len(content):
         message = (
-            f"{path.name}: {len(content)} bytes is not a multiple of {row_bytes} ({columns} float32 a point); "
+            f"{len(content)} bytes is not a multiple of {row_bytes} ({columns} float32 a point); "
             f"last whole point ends at {whole}"
         )
         if not recover:
             raise TruncatedFileError(f"{message}; pass columns= or recover=True to read the whole points")
-        warnings.warn(message, RecoveredFileWarning, stacklevel=3)
+        warnings.warn(f"{path}: {message}", RecoveredFileWarning, stacklevel=4)
     values = np.frombuffer(content, "<f4", count=whole // FLOAT_BYTES)
     if guessed:
-        _check_guess(path, values, columns)
+        _check_guess(values, columns)
     return values.reshape(-1, columns).astype(np.float32, copy=False)
 
 
-def _check_guess(path: Path, values: NDArray[np.float32], columns: int) -> None:
+def _check_guess(values: NDArray[np.float32], columns: int) -> None:
     """Refuse a guess that the fifth column contradicts, where the file divides into rows of four and of five.
 
     Of five columns the last is nuScenes' ring number; all zeros are no evidence for five, nor against it.
@@ -59,7 +64,8 @@ def _check_guess(path: Path, values: NDArray[np.float32], columns: int) -> None:
     if values.size == 0 or values.size % other:
         return
     fifth = values[4::5]
-    are_rings = bool(((fifth == np.floor(fifth)) & (fifth >= 0) & (fifth < MAX_RINGS)).all())
+    with np.errstate(invalid="ignore"):  # the bits of some numbers that are none make NumPy warn
+        are_rings = bool(((fifth == np.floor(fifth)) & (fifth >= 0) & (fifth < MAX_RINGS)).all())
     if columns == 5 and not are_rings:
         fault = f"the fifth column does not hold ring numbers, and rows of {other} fit the file too"
     elif columns == 4 and are_rings and fifth.any():
@@ -67,6 +73,5 @@ def _check_guess(path: Path, values: NDArray[np.float32], columns: int) -> None:
     else:
         return
     raise FileFormatError(
-        f"{path.name}: guessed {columns} floats a point, but {fault}; pass columns={other} "
-        f"(or columns={columns} to insist)"
+        f"guessed {columns} floats a point, but {fault}; pass columns={other} (or columns={columns} to insist)"
     )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.errors import CorruptFileError, LimitError, NonFiniteError, TruncatedFileError, UnsupportedFormatError
-from ldls.io.files import whole_file
+from ldls.io.files import InputFile, open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, colors, instances
 from ldls.io.points.laz_chunks import check_chunks
 from ldls.segmentation import Segmentation
@@ -66,49 +66,51 @@ def read(path: Path) -> NDArray[np.float64]:
         ImportError: The extra `las` is not installed.
     """
     laspy = require("laspy", "las")
-    header = _read_header(path)
-    _check(path, header, path.stat().st_size)
-    if header.n_points == 0:
-        return np.zeros((0, 4))
-    if header.is_compressed:
-        require("lazrs", "las")
-        check_chunks(path, _vlrs(path, header), header.offset, header.record_bytes, header.n_points)
-    try:
+    with open_file(path, "LAS or LAZ file") as file:
+        header = _read_header(file)
+        _check(header, file.size)
+        if header.n_points == 0:
+            return np.zeros((0, 4))
+        if header.is_compressed:
+            require("lazrs", "las")
+            check_chunks(file, _vlrs(file, header), header.offset, header.record_bytes, header.n_points)
+        file.seek(0)
         # chunk by chunk and on one thread: the parallel decoder takes the memory that the file asks for, or aborts
-        with laspy.open(path, laz_backend=laspy.LazBackend.Lazrs, read_evlrs=False) as reader:
+        with (
+            laspy.open(file, laz_backend=laspy.LazBackend.Lazrs, read_evlrs=False, closefd=False) as reader,
+            np.errstate(over="ignore", invalid="ignore"),
+        ):
             points = np.concatenate([_columns(chunk) for chunk in reader.chunk_iterator(CHUNK_POINTS)])
-    except (MemoryError, OSError):
-        raise
-    except Exception as error:  # whatever the parsers of headers and of LAZ raise has nothing in common
-        raise CorruptFileError(f"{path}: not a whole LAS or LAZ file ({type(error).__name__}: {error})") from None
-    if len(points) != header.n_points:
-        raise TruncatedFileError(f"{path}: the header says {header.n_points} points, found {len(points)}")
-    return points
+        if len(points) != header.n_points:
+            raise TruncatedFileError(f"the header says {header.n_points} points, found {len(points)}")
+        if not np.isfinite(points).all():
+            raise CorruptFileError(
+                f"scales {header.scales} and offsets {header.offsets_m} make coordinates that are not finite"
+            )
+        return points
 
 
 def _columns(chunk: Any) -> NDArray[np.float64]:  # noqa: ANN401
     return np.stack([np.asarray(values, np.float64) for values in (chunk.x, chunk.y, chunk.z, chunk.intensity)], axis=1)
 
 
-def _vlrs(path: Path, header: Header) -> bytes:
-    with path.open("rb") as file:
-        file.seek(header.header_bytes)
-        return file.read(header.offset - header.header_bytes)
+def _vlrs(file: InputFile, header: Header) -> bytes:
+    file.seek(header.header_bytes)
+    return file.read(header.offset - header.header_bytes)
 
 
-def _read_header(path: Path) -> Header:
-    with path.open("rb") as file:
-        start = file.read(max(HEADER_BYTES.values()))
+def _read_header(file: InputFile) -> Header:
+    start = file.read(max(HEADER_BYTES.values()))
     if start[:4] != SIGNATURE:
         fault = TruncatedFileError if len(start) < len(SIGNATURE) else CorruptFileError
-        raise fault(f"{path}: expected {SIGNATURE!r} in the first bytes, got {start[:4]!r}")
+        raise fault(f"expected {SIGNATURE!r} in the first bytes, got {start[:4]!r}")
     if len(start) < min(HEADER_BYTES.values()):
-        raise TruncatedFileError(f"{path}: the header ends after {len(start)} bytes, expected 227 or more")
+        raise TruncatedFileError(f"the header ends after {len(start)} bytes, expected 227 or more")
     major, minor = start[24], start[25]
     if major != 1 or minor not in HEADER_BYTES:
-        raise UnsupportedFormatError(f"{path}: LAS {major}.{minor}, expected 1.0 to 1.5")
+        raise UnsupportedFormatError(f"LAS {major}.{minor}, expected 1.0 to 1.5")
     if len(start) < HEADER_BYTES[minor]:
-        raise TruncatedFileError(f"{path}: the header ends after {len(start)} bytes, expected {HEADER_BYTES[minor]}")
+        raise TruncatedFileError(f"the header ends after {len(start)} bytes, expected {HEADER_BYTES[minor]}")
     header_bytes, offset, n_vlrs, point_format, record_bytes, n_points = struct.unpack_from("<HIIBHI", start, 94)
     if minor >= 4:
         (n_points,) = struct.unpack_from("<Q", start, 247)
@@ -125,31 +127,29 @@ def _read_header(path: Path) -> Header:
     )
 
 
-def _check(path: Path, header: Header, file_bytes: int) -> None:
+def _check(header: Header, file_bytes: int) -> None:
     if header.point_format >= len(POINT_BYTES):
-        raise UnsupportedFormatError(
-            f"{path}: point format {header.point_format}, expected 0 to {len(POINT_BYTES) - 1}"
-        )
+        raise UnsupportedFormatError(f"point format {header.point_format}, expected 0 to {len(POINT_BYTES) - 1}")
     if header.record_bytes < POINT_BYTES[header.point_format]:
         raise CorruptFileError(
-            f"{path}: record length {header.record_bytes}, point format {header.point_format} needs "
+            f"record length {header.record_bytes}, point format {header.point_format} needs "
             f"{POINT_BYTES[header.point_format]} bytes"
         )
     if not header.header_bytes <= header.offset <= file_bytes:
         raise TruncatedFileError(
-            f"{path}: points begin at byte {header.offset}, expected {header.header_bytes} (after the header) to "
+            f"points begin at byte {header.offset}, expected {header.header_bytes} (after the header) to "
             f"{file_bytes} (where the file ends)"
         )
     if header.n_vlrs * VLR_BYTES > header.offset - header.header_bytes:
-        raise CorruptFileError(f"{path}: {header.n_vlrs} variable length records do not fit before the points")
+        raise CorruptFileError(f"{header.n_vlrs} variable length records do not fit before the points")
     if not (np.isfinite(header.scales).all() and all(header.scales) and np.isfinite(header.offsets_m).all()):
         raise CorruptFileError(
-            f"{path}: scales {header.scales} and offsets {header.offsets_m}; expected finite ones, no scale 0"
+            f"scales {header.scales} and offsets {header.offsets_m}; expected finite ones, no scale 0"
         )
     present = file_bytes - header.offset
     if not header.is_compressed and header.n_points * header.record_bytes > present:
         raise TruncatedFileError(
-            f"{path}: {header.n_points} points of {header.record_bytes} bytes need "
+            f"{header.n_points} points of {header.record_bytes} bytes need "
             f"{header.n_points * header.record_bytes} bytes from byte {header.offset} on, the file has {present}; "
             f"last whole point is {present // header.record_bytes}"
         )

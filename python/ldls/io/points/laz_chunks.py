@@ -6,9 +6,9 @@ Source: LASzip's item types and layered chunks, https://github.com/LASzip/LASzip
 from __future__ import annotations
 
 import struct
-from pathlib import Path
 
 from ldls.errors import CorruptFileError, TruncatedFileError
+from ldls.io.files import InputFile
 
 VLR_HEADER = struct.Struct("<H16sHH32s")
 LASZIP = b"laszip encoded"
@@ -27,13 +27,13 @@ LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
 """Layers of each item of formats 6 to 10; extra bytes have one a byte."""
 
 
-def check_chunks(path: Path, vlrs: bytes, offset: int, record_bytes: int, n_points: int) -> None:
+def check_chunks(file: InputFile, vlrs: bytes, offset: int, record_bytes: int, n_points: int) -> None:
     """Hold the chunks of a LAZ file against its size and its number of points.
 
     Only layered chunks, those of point formats 6 to 10, have sizes in them.
 
     Args:
-        path: The file.
+        file: The file.
         vlrs: Its bytes between header and points.
         offset: Where its points begin.
         record_bytes: Size of a point, unpacked.
@@ -44,21 +44,21 @@ def check_chunks(path: Path, vlrs: bytes, offset: int, record_bytes: int, n_poin
         CorruptFileError: The chunks have another number of points, or end elsewhere than their table begins, or there
             is no record of LASzip.
     """
-    laszip = _laszip_record(path, vlrs)
-    items = _items(path, laszip, record_bytes)
-    table = _table_offset(path, offset, record_bytes)
+    laszip = _laszip_record(vlrs)
+    items = _items(laszip, record_bytes)
+    table = _table_offset(file, offset, record_bytes)
     if struct.unpack_from("<H", laszip) != (LAYERED,):
         return
     n_layers = sum(LAYERS.get(kind, size) for kind, size in items)
     head = struct.Struct(f"<{record_bytes}x{1 + n_layers}I")
-    counted, end = _walk(path, head, offset + TABLE_POINTER.size, n_points)
+    counted, end = _walk(file, head, offset + TABLE_POINTER.size, n_points)
     if counted != n_points:
-        raise CorruptFileError(f"{path}: the header says {n_points} points, the chunks {counted}")
+        raise CorruptFileError(f"the header says {n_points} points, the chunks {counted}")
     if end != table:
-        raise CorruptFileError(f"{path}: the chunks end at byte {end}, their table begins at {table}")
+        raise CorruptFileError(f"the chunks end at byte {end}, their table begins at {table}")
 
 
-def _items(path: Path, laszip: bytes, record_bytes: int) -> list[tuple[int, int]]:
+def _items(laszip: bytes, record_bytes: int) -> list[tuple[int, int]]:
     """Kind and size of each item of a point."""
     (n_items,) = struct.unpack_from("<H", laszip, ITEMS_AT)
     content = laszip[ITEMS_AT + 2 :][: 6 * n_items]
@@ -66,57 +66,54 @@ def _items(path: Path, laszip: bytes, record_bytes: int) -> list[tuple[int, int]
     right = all(kind in EXTRA_BYTES or ITEM_BYTES.get(kind) == size for kind, size in items)
     if not right or sum(size for _, size in items) != record_bytes:
         raise CorruptFileError(
-            f"{path}: LASzip's items are {items} (kind, bytes), expected known ones of {record_bytes} bytes together"
+            f"LASzip's items are {items} (kind, bytes), expected known ones of {record_bytes} bytes together"
         )
     return items
 
 
-def _walk(path: Path, head: struct.Struct, start: int, n_points: int) -> tuple[int, int]:
+def _walk(file: InputFile, head: struct.Struct, start: int, n_points: int) -> tuple[int, int]:
     """Return the number of points that the chunks hold, up to `n_points`, and where they end.
 
     A chunk is one whole point, a count, the size of each layer, and the layers.
     """
-    counted, file_bytes = 0, path.stat().st_size
-    with path.open("rb") as file:
-        while counted < n_points:
-            file.seek(start)
-            content = file.read(head.size)
-            count, *layer_bytes = head.unpack(content) if len(content) == head.size else (0,)
-            start += head.size + sum(layer_bytes)
-            if count == 0 or start > file_bytes:
-                raise TruncatedFileError(
-                    f"{path}: a chunk of {count} points ends at byte {start}, the file at {file_bytes}; "
-                    f"{n_points - counted} points are missing"
-                )
-            counted += count
+    counted = 0
+    while counted < n_points:
+        file.seek(start)
+        content = file.read(head.size)
+        count, *layer_bytes = head.unpack(content) if len(content) == head.size else (0,)
+        start += head.size + sum(layer_bytes)
+        if count == 0 or start > file.size:
+            raise TruncatedFileError(
+                f"a chunk of {count} points ends at byte {start}, the file at {file.size}; "
+                f"{n_points - counted} points are missing"
+            )
+        counted += count
     return counted, start
 
 
-def _table_offset(path: Path, offset: int, record_bytes: int) -> int:
+def _table_offset(file: InputFile, offset: int, record_bytes: int) -> int:
     """Return the offset of the table of chunks, which stands before the points or, in streams, at the end."""
-    file_bytes = path.stat().st_size
-    table = _unpack(path, TABLE_POINTER, offset)
+    table = _unpack(file, TABLE_POINTER, offset)
     if table == NOT_HERE:
-        table = _unpack(path, TABLE_POINTER, file_bytes - TABLE_POINTER.size)
-    if not offset + TABLE_POINTER.size <= table <= file_bytes - TABLE_HEAD.size:
-        raise TruncatedFileError(f"{path}: the table of chunks begins at byte {table}, the file ends at {file_bytes}")
-    n_chunks = _unpack(path, TABLE_HEAD, table)
+        table = _unpack(file, TABLE_POINTER, file.size - TABLE_POINTER.size)
+    if not offset + TABLE_POINTER.size <= table <= file.size - TABLE_HEAD.size:
+        raise TruncatedFileError(f"the table of chunks begins at byte {table}, the file ends at {file.size}")
+    n_chunks = _unpack(file, TABLE_HEAD, table)
     if n_chunks * record_bytes > table - offset:
-        raise CorruptFileError(f"{path}: {n_chunks} chunks do not fit in {table - offset} bytes of points")
+        raise CorruptFileError(f"{n_chunks} chunks do not fit in {table - offset} bytes of points")
     return table
 
 
-def _unpack(path: Path, layout: struct.Struct, at: int) -> int:
-    with path.open("rb") as file:
-        file.seek(at)
-        content = file.read(layout.size)
+def _unpack(file: InputFile, layout: struct.Struct, at: int) -> int:
+    file.seek(at)
+    content = file.read(layout.size)
     if len(content) != layout.size:
-        raise TruncatedFileError(f"{path}: ends at byte {at + len(content)}, in the place of its chunks")
+        raise TruncatedFileError(f"ends at byte {at + len(content)}, in the place of its chunks")
     number: int = layout.unpack(content)[0]
     return number
 
 
-def _laszip_record(path: Path, vlrs: bytes) -> bytes:
+def _laszip_record(vlrs: bytes) -> bytes:
     start = 0
     while start + VLR_HEADER.size <= len(vlrs):
         _, user, _, size, _ = VLR_HEADER.unpack_from(vlrs, start)
@@ -124,4 +121,4 @@ def _laszip_record(path: Path, vlrs: bytes) -> bytes:
         if user.rstrip(b"\0") == LASZIP and start + size <= len(vlrs) and size >= ITEMS_AT + 2:
             return vlrs[start : start + size]
         start += size
-    raise CorruptFileError(f"{path}: compressed points without a record of LASzip before them")
+    raise CorruptFileError("compressed points without a record of LASzip before them")

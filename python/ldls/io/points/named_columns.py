@@ -44,7 +44,10 @@ class NamedColumns:
     def stack(self, columns: Sequence[NDArray[np.number]]) -> Points:
         """(N, 3 or 4) points from the columns found: float32 where that holds the coordinates exactly, else float64."""
         exact = np.result_type(np.float32, *(column.dtype for column in columns[:3]))
-        points: Points = np.stack([column.astype(exact) for column in columns], axis=1)
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # an intensity in doubles may be too large for single precision
+            points: Points = np.stack([column.astype(exact) for column in columns], axis=1)
         return points
 
 

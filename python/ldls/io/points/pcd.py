@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
-from ldls.io.files import whole_file
+from ldls.io.files import open_file, whole_file
 from ldls.io.labelled_points import colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
-from ldls.io.points.text_rows import Row, read_rows, split_header, text_rows, whole_number
+from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
 from ldls.segmentation import Segmentation
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
@@ -66,35 +66,38 @@ def read(path: Path) -> Points:
     Points of a cloud with rows stay in the order of the file; those that are NaN stay, too.
 
     Raises:
-        TruncatedFileError: The file ends before the points that the header says.
+        TruncatedFileError: The file ends before the points that the header says, or, in ascii, with its last number,
+            without a line end: that number may be cut short.
         CorruptFileError: The header contradicts itself or the bytes; the message names the field.
         UnsupportedFormatError: The encoding is unknown.
         ImportError: binary_compressed needs the extra `pcd`.
     """
-    lines, body = split_header(path, path.read_bytes(), "DATA")
-    header = _parse(path, lines)
-    columns = NamedColumns.find(f"{path}: FIELDS", [field.name for field in header.fields])
-    for field in (header.fields[position] for position in columns.positions):
-        if field.count != 1:
-            raise CorruptFileError(f"{path}: COUNT of {field.name} is {field.count}, expected 1")
-    if header.encoding == "ascii":
-        return _read_ascii(path, header, columns, text_rows(path, body, len(lines)))
-    if header.encoding == "binary":
-        return _read_binary(path, header, columns, body)
-    return _read_compressed(path, header, columns, body)
+    with open_file(path, "PCD file") as file:
+        lines, body = split_header(file.read(), "DATA")
+        header = _parse(lines)
+        columns = NamedColumns.find("FIELDS", [field.name for field in header.fields])
+        for field in (header.fields[position] for position in columns.positions):
+            if field.count != 1:
+                raise CorruptFileError(f"COUNT of {field.name} is {field.count}, expected 1")
+        if header.encoding == "ascii":
+            return _read_ascii(header, columns, as_text(body), len(lines))
+        if header.encoding == "binary":
+            return _read_binary(header, columns, body)
+        return _read_compressed(header, columns, body)
 
 
-def _read_ascii(path: Path, header: Header, columns: NamedColumns, rows: list[Row]) -> Points:
-    _check_amount(path, header, "lines", header.n_points, len(rows), slack=0)
+def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines: int) -> Points:
+    rows = text_rows(text, n_header_lines)
+    _check_amount(header, "lines", header.n_points, len(rows), slack=0)
     first_cells = np.cumsum([0, *(field.count for field in header.fields)])
-    cells = read_rows(path, rows, [int(first_cells[position]) for position in columns.positions])
-    kinds = [header.fields[position].kind for position in columns.positions]
-    return columns.stack([column.astype(kind) for column, kind in zip(cells.T, kinds, strict=True)])
+    cells = read_rows(rows, [int(first_cells[position]) for position in columns.positions])
+    fields = [header.fields[position] for position in columns.positions]
+    return columns.stack([of_kind(f.name, column, f.kind) for f, column in zip(fields, cells.T, strict=True)])
 
 
-def _read_binary(path: Path, header: Header, columns: NamedColumns, body: bytes) -> Points:
+def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
     size = header.point_bytes
-    _check_amount(path, header, "bytes", header.n_points * size, len(body), slack=size - 1)
+    _check_amount(header, "bytes", header.n_points * size, len(body), slack=size - 1)
     starts = np.cumsum([0, *(field.n_bytes for field in header.fields)])
     point = np.dtype(
         {
@@ -108,9 +111,9 @@ def _read_binary(path: Path, header: Header, columns: NamedColumns, body: bytes)
     return columns.stack([points[f"f{position}"] for position in columns.positions])
 
 
-def _read_compressed(path: Path, header: Header, columns: NamedColumns, body: bytes) -> Points:
+def _read_compressed(header: Header, columns: NamedColumns, body: bytes) -> Points:
     """Fields lie one behind the other, each of all points, packed by LZF as one."""
-    unpacked = _unpack(path, header, body)
+    unpacked = _unpack(header, body)
     starts = np.cumsum([0, *(field.n_bytes * header.n_points for field in header.fields)])
 
     def column(position: int) -> NDArray[np.number]:
@@ -119,90 +122,88 @@ def _read_compressed(path: Path, header: Header, columns: NamedColumns, body: by
     return columns.stack([column(position) for position in columns.positions])
 
 
-def _unpack(path: Path, header: Header, body: bytes) -> bytes:
+def _unpack(header: Header, body: bytes) -> bytes:
     expected = header.n_points * header.point_bytes
     if expected == 0:
         return b""
     if len(body) < 8:
-        raise TruncatedFileError(f"{path}: {len(body)} bytes after DATA, expected two sizes of 4 bytes each")
+        raise TruncatedFileError(f"{len(body)} bytes after DATA, expected two sizes of 4 bytes each")
     packed_size, size = struct.unpack_from("<II", body)
     if size != expected:
         raise CorruptFileError(
-            f"{path}: unpacked size {size}, expected {expected}: POINTS {header.n_points} of {header.point_bytes} bytes"
+            f"unpacked size {size}, expected {expected}: POINTS {header.n_points} of {header.point_bytes} bytes"
         )
     if packed_size > len(body) - 8:
-        raise TruncatedFileError(f"{path}: packed size {packed_size}, the file has {len(body) - 8} bytes left")
+        raise TruncatedFileError(f"packed size {packed_size}, the file has {len(body) - 8} bytes left")
     if size > packed_size * LZF_RATIO:
-        raise CorruptFileError(f"{path}: {packed_size} packed bytes cannot hold {size}")
+        raise CorruptFileError(f"{packed_size} packed bytes cannot hold {size}")
     lzf = require("lzf", "pcd")
     try:
         unpacked: bytes | None = lzf.decompress(body[8 : 8 + packed_size], size)
     except ValueError as error:
-        raise CorruptFileError(f"{path}: {error}, expected LZF") from None
+        raise CorruptFileError(f"{error}, expected LZF") from None
     if unpacked is None or len(unpacked) != size:
         unpacked_bytes = "more" if unpacked is None else str(len(unpacked))
-        raise CorruptFileError(f"{path}: unpacks to {unpacked_bytes} bytes, the file says {size}")
+        raise CorruptFileError(f"unpacks to {unpacked_bytes} bytes, the file says {size}")
     return unpacked
 
 
-def _check_amount(path: Path, header: Header, unit: str, needed: int, amount: int, slack: int) -> None:
-    said = f"{path}: POINTS {header.n_points} need {needed} {unit} after DATA {header.encoding}, the file has {amount}"
+def _check_amount(header: Header, unit: str, needed: int, amount: int, slack: int) -> None:
+    said = f"POINTS {header.n_points} need {needed} {unit} after DATA {header.encoding}, the file has {amount}"
     if amount < needed:
         raise TruncatedFileError(said)
     if amount > needed + slack:
         raise CorruptFileError(f"{said}; mend the header")
 
 
-def _parse(path: Path, lines: list[Row]) -> Header:
+def _parse(lines: list[Row]) -> Header:
     entries: dict[str, list[str]] = {}
     for number, line in lines:
         words = line.partition("#")[0].split()
         if words and words[0] in entries:
-            raise CorruptFileError(f"{path}, line {number}: {words[0]} stands there twice")
+            raise CorruptFileError(f"line {number}: {words[0]} stands there twice")
         entries |= {words[0]: words[1:]} if words else {}
-    n_points = _n_points(path, entries)
+    n_points = _n_points(entries)
     encoding = " ".join(entries["DATA"])
     if encoding not in ENCODINGS:
-        raise UnsupportedFormatError(f"{path}: DATA {encoding[:40]!r}, expected one of {', '.join(ENCODINGS)}")
-    header = Header(_fields(path, entries), n_points, encoding)
+        raise UnsupportedFormatError(f"DATA {encoding[:40]!r}, expected one of {', '.join(ENCODINGS)}")
+    header = Header(_fields(entries), n_points, encoding)
     if header.point_bytes > MAX_POINT_BYTES:
         raise CorruptFileError(
-            f"{path}: SIZE and COUNT make {header.point_bytes} bytes a point, expected at most {MAX_POINT_BYTES}"
+            f"SIZE and COUNT make {header.point_bytes} bytes a point, expected at most {MAX_POINT_BYTES}"
         )
     return header
 
 
-def _n_points(path: Path, entries: dict[str, list[str]]) -> int:
-    numbers = {key: _one_number(path, key, words) for key, words in entries.items() if key in COUNTS}
+def _n_points(entries: dict[str, list[str]]) -> int:
+    numbers = {key: _one_number(key, words) for key, words in entries.items() if key in COUNTS}
     if not numbers.keys() & {"POINTS", "WIDTH"}:
-        raise CorruptFileError(f"{path}: neither POINTS nor WIDTH in the header; found {' '.join(entries)}")
+        raise CorruptFileError(f"neither POINTS nor WIDTH in the header; found {' '.join(entries)}")
     if "WIDTH" not in numbers:
         return numbers["POINTS"]
     width, height = numbers["WIDTH"], numbers.get("HEIGHT", 1)
     points = numbers.get("POINTS", width * height)
     if points != width * height:
-        raise CorruptFileError(f"{path}: POINTS {points}, WIDTH {width} x HEIGHT {height} is {width * height}")
+        raise CorruptFileError(f"POINTS {points}, WIDTH {width} x HEIGHT {height} is {width * height}")
     return points
 
 
-def _one_number(path: Path, key: str, words: list[str]) -> int:
-    return whole_number(f"{path}: {key}", " ".join(words))
+def _one_number(key: str, words: list[str]) -> int:
+    return whole_number(key, " ".join(words))
 
 
-def _fields(path: Path, entries: dict[str, list[str]]) -> list[Field]:
+def _fields(entries: dict[str, list[str]]) -> list[Field]:
     names = entries.get("FIELDS", [])
-    entries = {"COUNT": ["1"] * len(names)} | entries
+    entries = {"SIZE": [], "TYPE": [], "COUNT": ["1"] * len(names)} | entries
     for key in ("SIZE", "TYPE", "COUNT"):
-        if len(entries.get(key, [])) != len(names):
-            raise CorruptFileError(
-                f"{path}: {len(names)} FIELDS, {len(entries.get(key, []))} of {key}; expected as many"
-            )
+        if len(entries[key]) != len(names):
+            raise CorruptFileError(f"{len(names)} FIELDS, {len(entries[key])} of {key}; expected as many")
     rows = zip(names, entries["TYPE"], entries["SIZE"], entries["COUNT"], strict=True)
-    return [_field(path, *row) for row in rows]
+    return [_field(*row) for row in rows]
 
 
-def _field(path: Path, name: str, kind: str, size: str, count: str) -> Field:
-    place = f"{path}: field {name}"
+def _field(name: str, kind: str, size: str, count: str) -> Field:
+    place = f"field {name}"
     key = (kind, whole_number(f"{place}: SIZE", size))
     if key not in TYPES:
         known = ", ".join(f"{letter} {n}" for letter, n in TYPES)

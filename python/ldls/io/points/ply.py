@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
-from ldls.io.files import whole_file
+from ldls.io.files import open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
-from ldls.io.points.text_rows import Row, read_rows, split_header, text_rows, whole_number
+from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
 from ldls.segmentation import Segmentation
 
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
@@ -56,55 +56,63 @@ def read(path: Path) -> Points:
     """(N, 3 or 4) points: x y z and, where there is one, intensity of the vertices; float32 unless doubles.
 
     Raises:
-        TruncatedFileError: The file ends before the vertices that the header says.
+        TruncatedFileError: The file ends before the vertices that the header says, or, in ascii, with the last number
+            of them, without a line end: that number may be cut short.
         CorruptFileError: The header contradicts itself, or a number is none; the message names the line.
         UnsupportedFormatError: The vertices, or an element before them, have a list property.
     """
-    lines, body = split_header(path, path.read_bytes(), "end_header")
-    header = _parse(path, lines)
+    with open_file(path, "PLY file") as file:
+        return _read(file.read())
+
+
+def _read(content: bytes) -> Points:
+    lines, body = split_header(content, "end_header")
+    header = _parse(lines)
     for element in (*header.before, header.vertex):
         if element.list_properties:
             raise UnsupportedFormatError(
-                f"{path}: property list {element.list_properties[0]!r} of element {element.name}; expected numbers "
+                f"property list {element.list_properties[0]!r} of element {element.name}; expected numbers "
                 "alone in the vertices and whatever stands before them; write it again without"
             )
-    columns = NamedColumns.find(f"{path}: element vertex", header.vertex.properties)
+    columns = NamedColumns.find("element vertex", header.vertex.properties)
     if header.encoding == "ascii":
-        return _read_ascii(path, header, columns, text_rows(path, body, len(lines)))
-    return _read_binary(path, header, columns, body)
+        return _read_ascii(header, columns, as_text(body), len(lines))
+    return _read_binary(header, columns, body)
 
 
-def _read_binary(path: Path, header: Header, columns: NamedColumns, body: bytes) -> Points:
+def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
     order = BYTE_ORDERS[header.encoding]
     start = sum(element.count * element.dtype(order).itemsize for element in header.before)
     kind, count = header.vertex.dtype(order), header.vertex.count
     needed = start + count * kind.itemsize
     if needed > len(body):
         raise TruncatedFileError(
-            f"{path}: element vertex {count} needs {needed} bytes after the header, the file has {len(body)}; "
+            f"element vertex {count} needs {needed} bytes after the header, the file has {len(body)}; "
             f"last whole vertex is {max(0, len(body) - start) // kind.itemsize}"
         )
     vertices = np.frombuffer(body, kind, count, start)
     return columns.stack([vertices[f"f{position}"] for position in columns.positions])
 
 
-def _read_ascii(path: Path, header: Header, columns: NamedColumns, rows: list[Row]) -> Points:
-    start, count = sum(element.count for element in header.before), header.vertex.count
+def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines: int) -> Points:
+    rows = text_rows(text, n_header_lines)
+    vertex = header.vertex
+    start, count = sum(element.count for element in header.before), vertex.count
     if start + count > len(rows):
         raise TruncatedFileError(
-            f"{path}: element vertex {count} needs as many lines, the file ends after {max(0, len(rows) - start)}"
+            f"element vertex {count} needs as many lines, the file ends after {max(0, len(rows) - start)}"
         )
-    cells = read_rows(path, rows[start : start + count], columns.positions)
-    kinds = [np.dtype(header.vertex.types[position]) for position in columns.positions]
-    return columns.stack([column.astype(kind) for column, kind in zip(cells.T, kinds, strict=True)])
+    cells = read_rows(rows[start : start + count], columns.positions)
+    names, kinds = ([each[position] for position in columns.positions] for each in (vertex.properties, vertex.types))
+    return columns.stack([of_kind(*each) for each in zip(names, cells.T, map(np.dtype, kinds), strict=True)])
 
 
-def _parse(path: Path, lines: list[Row]) -> Header:
+def _parse(lines: list[Row]) -> Header:
     if lines[0][1] != "ply":
-        raise CorruptFileError(f"{path}: expected 'ply' in the first line, got {lines[0][1][:40]!r}")
+        raise CorruptFileError(f"expected 'ply' in the first line, got {lines[0][1][:40]!r}")
     encoding, elements = "", []
     for number, line in lines[1:]:
-        place, words = f"{path}, line {number}", line.split()
+        place, words = f"line {number}", line.split()
         match words:
             case ["format", encoding, "1.0"] if encoding in BYTE_ORDERS:
                 pass
@@ -117,10 +125,10 @@ def _parse(path: Path, lines: list[Row]) -> Header:
             case _:
                 raise CorruptFileError(f"{place}: expected a format, an element or a property, got {line[:80]!r}")
     if not encoding:
-        raise CorruptFileError(f"{path}: the header names no format, expected one of {', '.join(BYTE_ORDERS)}")
+        raise CorruptFileError(f"the header names no format, expected one of {', '.join(BYTE_ORDERS)}")
     at = [i for i, element in enumerate(elements) if element.name == "vertex"]
     if len(at) != 1:
-        raise CorruptFileError(f"{path}: expected one element vertex, found {len(at)}")
+        raise CorruptFileError(f"expected one element vertex, found {len(at)}")
     return Header(encoding, elements[: at[0]], elements[at[0]])
 
 

@@ -10,7 +10,7 @@ from ldls.checks import checked
 from ldls.cloud import Points, as_points
 from ldls.errors import ParameterError, UnsupportedFormatError, within
 from ldls.io.arrays import read_npy
-from ldls.io.files import regular_file
+from ldls.io.files import open_file
 from ldls.io.points import float_rows, las, pcd, ply, text
 
 
@@ -55,11 +55,11 @@ def read_points(path: str | PathLike[str], *, columns: int | None = None, recove
         ImportError: The format needs an extra that is not installed; the message names it.
         FileNotFoundError: There is no such file.
     """
-    path = regular_file(path)
+    path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in READERS:
-        known = ", ".join(READERS)
-        raise UnsupportedFormatError(f"{path}: cannot read {path.suffix!r} files, expected {known}")
+        with open_file(path, "cloud"):
+            raise UnsupportedFormatError(f"cannot read {path.suffix!r} files, expected {', '.join(READERS)}")
     if suffix == ".bin":
         return READERS[suffix](path, columns=columns, recover=recover)
     if columns is not None or recover:

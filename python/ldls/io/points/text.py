@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ldls.cloud import MAX_COLUMNS
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
-from ldls.io.files import read_lines
+from ldls.io.files import open_file
 from ldls.io.points.named_columns import NamedColumns, plain_name
-from ldls.io.points.text_rows import Row, read_rows
+from ldls.io.points.text_rows import Row, read_rows, text_rows
 
 COMMENTS = ("#", "//")
 DELIMITERS = (";", "\t", ",")
@@ -25,22 +25,25 @@ def read(path: Path) -> NDArray[np.float64]:
     columns are taken as they stand, x y z first. Other lines that begin with # or // are comments.
 
     Raises:
-        TruncatedFileError: The file is empty, or its last line has too few cells.
+        TruncatedFileError: The file is empty, its last line has too few cells, or it ends with its last number, without
+            a line end: that number may be cut short.
         CorruptFileError: Another line has too few cells, or a cell is no number; the message names it.
         UnsupportedFormatError: There are more columns than clouds have.
     """
-    lines = read_lines(path)
-    rows = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
+    with open_file(path, "text file of points") as file:
+        return _parse(file.text())
+
+
+def _parse(text: str) -> NDArray[np.float64]:
+    rows = text_rows(text)
     if not rows:
-        raise TruncatedFileError(f"{path}: empty, expected a line x y z for each point")
+        raise TruncatedFileError("empty, expected a line x y z for each point")
     names = _names(rows[0][1])
-    if names is not None:
-        rows = rows[1:]
-    rows = [row for row in rows if not row[1].lstrip().startswith(COMMENTS)]
-    if names is not None:
-        delimiter = _delimiter(rows[0][1]) if rows else None
-        return read_rows(path, rows, NamedColumns.find(f"{path}, line 1", names).positions, delimiter)
-    return _read_nameless(path, rows)
+    rows = [row for row in rows[names is not None :] if not row[1].lstrip().startswith(COMMENTS)]
+    if names is None:
+        return _parse_nameless(rows)
+    delimiter = _delimiter(rows[0][1]) if rows else None
+    return read_rows(rows, NamedColumns.find("line 1", names).positions, delimiter)
 
 
 def _names(line: str) -> list[str] | None:
@@ -49,17 +52,17 @@ def _names(line: str) -> list[str] | None:
     return names if {"x", "y", "z"} <= {plain_name(name) for name in names} else None
 
 
-def _read_nameless(path: Path, rows: list[Row]) -> NDArray[np.float64]:
+def _parse_nameless(rows: list[Row]) -> NDArray[np.float64]:
     if not rows:
-        raise TruncatedFileError(f"{path}: only comments, expected a line x y z for each point")
+        raise TruncatedFileError("only comments, expected a line x y z for each point")
     number, first = rows[0]
     delimiter = _delimiter(first)
     n_columns = len(first.split(delimiter))
     if n_columns < 3:
-        raise CorruptFileError(f"{path}, line {number}: expected x y z or their names, got {first[:80]!r}")
+        raise CorruptFileError(f"line {number}: expected x y z or their names, got {first.strip()[:80]!r}")
     if n_columns > MAX_COLUMNS:
-        raise UnsupportedFormatError(f"{path}, line {number}: {n_columns} columns, expected at most {MAX_COLUMNS}")
-    return read_rows(path, rows, range(n_columns), delimiter)
+        raise UnsupportedFormatError(f"line {number}: {n_columns} columns, expected at most {MAX_COLUMNS}")
+    return read_rows(rows, range(n_columns), delimiter)
 
 
 def _delimiter(line: str) -> str | None:

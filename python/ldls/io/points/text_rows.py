@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +10,12 @@ from numpy.typing import NDArray
 from ldls.errors import CorruptFileError, TruncatedFileError
 
 Row = tuple[int, str]
-"""Number of a line in its file, from 1, and the line."""
+"""Number of a line in its file, from 1, and the line; with its end, which the last one may lack."""
 MAX_HEADER_BYTES = 1 << 16
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
-def split_header(path: Path, content: bytes, last: str) -> tuple[list[Row], bytes]:
+def split_header(content: bytes, last: str) -> tuple[list[Row], bytes]:
     """The numbered lines of the header up to the one that begins with the word `last`, and the bytes after it.
 
     Raises:
@@ -24,7 +23,7 @@ def split_header(path: Path, content: bytes, last: str) -> tuple[list[Row], byte
         CorruptFileError: No line begins with `last`.
     """
     if not content:
-        raise TruncatedFileError(f"{path}: empty, expected a header")
+        raise TruncatedFileError("empty, expected a header")
     start = len(BYTE_ORDER_MARK) if content.startswith(BYTE_ORDER_MARK) else 0
     lines: list[Row] = []
     while start < min(len(content), MAX_HEADER_BYTES):
@@ -35,20 +34,25 @@ def split_header(path: Path, content: bytes, last: str) -> tuple[list[Row], byte
         start = end + 1
         if line.split()[:1] == [last]:
             return lines, content[start:]
-    raise CorruptFileError(f"{path}: no line {last!r} in the first {MAX_HEADER_BYTES} bytes; is its header whole?")
+    raise CorruptFileError(f"no line {last!r} in the first {MAX_HEADER_BYTES} bytes; is its header whole?")
 
 
-def text_rows(path: Path, body: bytes, n_header_lines: int) -> list[Row]:
-    """The numbered lines of `body` that are not blank.
+def as_text(body: bytes) -> str:
+    """What stands behind a header.
 
     Raises:
         CorruptFileError: It is not text.
     """
     try:
-        lines = body.decode("utf-8").splitlines()
+        return body.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise CorruptFileError(f"{path}: not text ({error.reason} at byte {error.start} after the header)") from None
-    return [(number, line) for number, line in enumerate(lines, start=n_header_lines + 1) if line.strip()]
+        raise CorruptFileError(f"not text ({error.reason} at byte {error.start} after the header)") from None
+
+
+def text_rows(text: str, n_header_lines: int = 0) -> list[Row]:
+    """The numbered lines of `text`, which stands behind a header, that are not blank."""
+    lines = enumerate(text.splitlines(keepends=True), start=n_header_lines + 1)
+    return [(number, line) for number, line in lines if line.strip()]
 
 
 def whole_number(place: str, word: str) -> int:
@@ -63,46 +67,67 @@ def whole_number(place: str, word: str) -> int:
     return int(word)
 
 
-def read_rows(
-    path: Path,
-    rows: Sequence[Row],
-    positions: Sequence[int],
-    delimiter: str | None = None,
-) -> NDArray[np.float64]:
+def read_rows(rows: Sequence[Row], positions: Sequence[int], delimiter: str | None = None) -> NDArray[np.float64]:
     """(N, len(positions)) float64: the cells at `positions`, from 0, of every row.
 
     Args:
-        path: The file, for messages.
-        rows: Lines that hold cells.
+        rows: Lines that hold cells. What follows the last cell that is wanted of the last line, be it a blank or the
+            line's end, says that it is whole: 12.3 at the very end of a file may be what is left of 12.345.
         positions: Columns wanted.
         delimiter: What stands between cells; None for any blanks.
 
     Raises:
-        TruncatedFileError: The last row has too few cells.
+        TruncatedFileError: The last row has too few cells, or nothing follows its last one.
         CorruptFileError: Another row has too few cells, or a cell is no number; the message names the line.
     """
     if not rows:
         return np.zeros((0, len(positions)))
     lines = [line for _, line in rows]
     try:
-        return np.loadtxt(
+        numbers = np.loadtxt(
             lines, np.float64, comments=None, delimiter=delimiter, usecols=list(positions), ndmin=2, quotechar='"'
         )
     except ValueError as error:
-        _refuse_wrong_cell(path, rows, positions, delimiter)
-        raise CorruptFileError(f"{path}: not rows of numbers ({error})") from None
+        _refuse_wrong_cell(rows, positions, delimiter)
+        raise CorruptFileError(f"not rows of numbers ({error})") from None
+    number, last = rows[-1]
+    cells = last.split(delimiter)
+    if not last[-1].isspace() and max(positions) == len(cells) - 1:
+        raise TruncatedFileError(
+            f"line {number}: the file ends with {cells[-1][:40]!r}, of which digits may be missing; add a line end if "
+            "the file is whole"
+        )
+    return numbers
 
 
-def _refuse_wrong_cell(path: Path, rows: Sequence[Row], positions: Sequence[int], delimiter: str | None) -> None:
+def of_kind(name: str, column: NDArray[np.float64], kind: np.dtype[np.number]) -> NDArray[np.number]:
+    """The numbers of a column of text in the type that the header gives it.
+
+    Raises:
+        CorruptFileError: The type is one of whole numbers, and one of them is none or too large for it.
+    """
+    if kind.kind == "f":
+        with np.errstate(over="ignore"):  # too large a number is an infinite one, as for any reader
+            return column.astype(kind)
+    limits = np.iinfo(kind.str)
+    fits = (column >= limits.min) & (column <= limits.max) & (column == np.trunc(column))
+    if not fits.all():
+        at = int(np.argmin(fits))
+        raise CorruptFileError(
+            f"{name} of point {at} is {column[at]}, expected whole numbers {limits.min} to {limits.max}"
+        )
+    return column.astype(kind)
+
+
+def _refuse_wrong_cell(rows: Sequence[Row], positions: Sequence[int], delimiter: str | None) -> None:
     wanted = max(positions) + 1
     for number, line in rows:
         cells = line.split(delimiter)
-        place = f"{path}, line {number}"
         if len(cells) < wanted:
             error = TruncatedFileError if number == rows[-1][0] else CorruptFileError
-            raise error(f"{place}: expected at least {wanted} cells, got {len(cells)}: {line[:80]!r}")
+            raise error(f"line {number}: expected at least {wanted} cells, got {len(cells)}: {line.strip()[:80]!r}")
         for position in positions:
-            _check_number(place, position, cells[position])
+            _check_number(f"line {number}", position, cells[position])
 
 
 def _check_number(place: str, position: int, cell: str) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import struct
 import threading
 import warnings
 import weakref
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from operator import attrgetter
@@ -22,15 +21,13 @@ from ldls.errors import (
     RecoveredFileWarning,
     TruncatedFileError,
     UnsupportedFormatError,
+    within,
 )
+from ldls.io.files import opened, parsing
 from ldls.io.ros.messages import Message, RawMessage, Topic, Types, seconds, standard_types
-from ldls.io.ros.salvage import Salvage, check_database_size, salvage
+from ldls.io.ros.salvage import NO_LIMIT, Salvage, check_database_size, open_bag_file, salvage
 
 SUFFIXES = (".bag", ".db3", ".mcap")
-BROKEN = (
-    AssertionError, EOFError, IndexError, KeyError, OverflowError, RuntimeError, TypeError, ValueError, struct.error,
-)  # fmt: skip
-"""Errors of readers of storage files over bytes that make no sense."""
 Read = Callable[[Collection[str], int | None, int | None], Iterator[RawMessage]]
 """Reads the messages of some topics that were received from one time on and before another, in that order."""
 
@@ -91,10 +88,8 @@ class Bag:
             CorruptFileError: The bytes are none of the topic's type.
         """
         kind = self.topics[topic].type
-        try:
+        with within(f"{self.path}: {topic}"), parsing(kind):
             return self.types.deserialize_cdr(raw, kind) if self.ros2 else self.types.deserialize_ros1(raw, kind)
-        except (require("rosbags.serde", "ros").SerdeError, *BROKEN) as error:
-            raise CorruptFileError(f"{self.path}: {topic}: not a whole {kind} ({error})") from None
 
     def close(self) -> None:
         """Close the files."""
@@ -106,8 +101,8 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
 
     Args:
         path: The bag.
-        recover: If true, a truncated bag, or one whose recording was never closed, yields its whole messages and a
-            warning instead of an error.
+        recover: If true, all of the bag is read to find out whether it is whole; one that is truncated or damaged, or
+            whose recording was never closed, yields its whole messages and a warning instead of an error.
 
     Raises:
         TruncatedFileError: The index at the end of the bag is missing or damaged.
@@ -117,55 +112,95 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
         ImportError: The extra `ros` is not installed.
     """
     require("rosbags.highlevel", "ros")
-    if not path.exists():
-        raise FileNotFoundError(f"{path}: no such bag")
-    if path.is_file() and path.suffix not in SUFFIXES:
-        raise UnsupportedFormatError(f"{path}: expected a {', '.join(SUFFIXES)} file or a folder with metadata.yaml")
     files = storage_files(path)
+    for file in (*files, *path.glob("metadata.yaml")):
+        with open_bag_file(file):  # what is no regular file is refused before a library opens it
+            pass
+    bag, fault = _try_indexed(path, files)
+    if bag is not None and not recover:
+        return bag
+    salvaged = salvage(files)
+    if bag is not None and salvaged.damage is None:
+        return bag
+    if fault is not None and salvaged.damage is None and not salvaged.messages:
+        raise fault
+    damage = f"{path}: {salvaged.damage}" if salvaged.damage else str(fault)
+    whole = salvaged.messages
+    last = f"the last at {seconds(whole[-1].received_ns)}" if whole else "so nothing can be saved"
+    message = f"{damage}; {len(whole)} whole messages before it, {last}"
+    if not recover:
+        raise TruncatedFileError(f"{message}; pass recover=True to read them") from fault
+    warnings.warn(message, RecoveredFileWarning, stacklevel=3)
+    if bag is not None:
+        bag.close()
+    return _recovered(path, salvaged, ros2=files[0].suffix != ".bag")
+
+
+def _try_indexed(path: Path, files: Sequence[Path]) -> tuple[Bag | None, FileFormatError | None]:
+    """The bag read through its index, or why it cannot be."""
     try:
         for file in files:
             if file.suffix == ".db3":
                 check_database_size(file)
-        return _indexed(path)
+        return _indexed(path), None
     except FileFormatError as error:
-        salvaged = salvage(files)
-        if salvaged.damage is None and not salvaged.messages:
-            raise
-        damage = f"{path}: {salvaged.damage}" if salvaged.damage else str(error)
-        whole = salvaged.messages
-        last = f"the last at {seconds(whole[-1].received_ns)}" if whole else "so nothing can be saved"
-        message = f"{damage}; {len(whole)} whole messages before it, {last}"
-        if not recover:
-            raise TruncatedFileError(f"{message}; pass recover=True to read them") from error
-        warnings.warn(message, RecoveredFileWarning, stacklevel=3)
-        return _recovered(path, salvaged, ros2=files[0].suffix != ".bag")
+        return None, error
+
+
+class _BagPath(type(Path())):  # type: ignore[misc]
+    """A path whose files the library reads through the one door: lengths that lie ask for no memory."""
+
+    def open(self, mode: str = "r", *options: Any, **named: Any) -> Any:  # noqa: ANN401
+        if mode != "rb":
+            return super().open(mode, *options, **named)
+        return opened(self, "bag", limit=NO_LIMIT)
 
 
 def storage_files(path: Path) -> list[Path]:
-    """The storage files of a bag, in the order of their names; none where they are compressed."""
-    if path.is_file():
-        return [path]
-    return sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
+    """The storage files of a bag, in the order of their names; none where they are compressed.
+
+    Raises:
+        UnsupportedFormatError: It is a file, and its suffix none of a bag's.
+        FileNotFoundError: There is no such bag.
+    """
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: no such bag")
+    if path.is_dir():
+        return sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
+    with open_bag_file(path):
+        if path.suffix not in SUFFIXES:
+            raise UnsupportedFormatError(f"expected a {', '.join(SUFFIXES)} file or a folder with metadata.yaml")
+    return [path]
 
 
 def _indexed(path: Path) -> Bag:
     """A whole bag, read through its index."""
     with _plain_errors(path):
         reader = require("rosbags.highlevel", "ros").AnyReader(
-            [path], default_typestore=standard_types(ros2=path.suffix != ".bag")
+            [_BagPath(path)], default_typestore=standard_types(ros2=path.suffix != ".bag")
         )
         reader.open()
+        topics = {
+            name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
+            for name, info in reader.topics.items()
+        }
 
     def read(topics: Collection[str], start_ns: int | None, stop_ns: int | None) -> Iterator[RawMessage]:
         connections = [c for c in reader.connections if c.topic in topics]
-        if connections:  # the reader takes none for all
-            for connection, received_ns, raw in reader.messages(connections, start_ns, stop_ns):
-                yield RawMessage(connection.topic, received_ns, bytes(raw))
+        if not connections:  # the reader takes none for all
+            return
+        found, expected = 0, sum(int(c.msgcount) for c in connections)
+        for found, (connection, received_ns, raw) in enumerate(  # noqa: B007 - counted for the check below
+            reader.messages(connections, start_ns, stop_ns), start=1
+        ):
+            yield RawMessage(connection.topic, received_ns, bytes(raw))
+        # the reader passes over records of a wrong length without a word
+        if start_ns is None and stop_ns is None and found < expected:
+            raise TruncatedFileError(
+                f"holds {found} messages of {', '.join(topics)}, its index says {expected}; pass recover=True to read "
+                "the whole ones"
+            )
 
-    topics = {
-        name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
-        for name, info in reader.topics.items()
-    }
     return Bag(path, reader.typestore, topics, read, reader.close, ros2=bool(reader.is2))
 
 
@@ -197,18 +232,8 @@ def _recovered(path: Path, salvaged: Salvage, *, ros2: bool) -> Bag:
 @contextmanager
 def _plain_errors(path: Path) -> Iterator[None]:
     """One kind of error for damaged bags, whatever their reader raises."""
-    readers = require("rosbags.highlevel", "ros")
-    storages = (require("rosbags.rosbag1", "ros").ReaderError, require("rosbags.rosbag2", "ros").ReaderError)
-    typesys = require("rosbags.typesys", "ros").TypesysError
-    others = (require("apsw", "ros").Error, require("rosbags.rosbag2.reader", "ros").zstd.ZstdError)
-    try:
-        yield
-    except FileNotFoundError as error:
-        raise CorruptFileError(f"{path}: no metadata.yaml; was the recording closed? ({error})") from None
-    except OSError as error:
-        # bz2 says so of data that it cannot decompress, without the number that a disk's errors have
-        if error.errno is not None:
-            raise
-        raise CorruptFileError(f"{path}: cannot be read as a bag ({error})") from None
-    except (readers.AnyReaderError, *storages, typesys, *others, *BROKEN) as error:
-        raise CorruptFileError(f"{path}: cannot be read as a bag ({error or type(error).__name__})") from None
+    with within(path), parsing("bag"):
+        try:
+            yield
+        except FileNotFoundError as error:
+            raise CorruptFileError(f"no metadata.yaml; was the recording closed? ({error})") from None

@@ -6,9 +6,9 @@ import io
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 
-from ldls.errors import CorruptFileError, LimitError, UnsupportedFormatError
+from ldls.errors import CorruptFileError, UnsupportedFormatError, within
+from ldls.io.images import decode
 from ldls.io.ros.messages import Message
 
 Pixels = NDArray[np.uint8]
@@ -91,12 +91,6 @@ def decode_compressed(message: Message) -> Pixels:
     """
     if "compressedDepth" in message.format:
         raise UnsupportedFormatError(f"image: {message.format!r} holds depths, expected colours or grey")
-    try:
-        with Image.open(io.BytesIO(bytes(message.data))) as image:
-            return np.asarray(image.convert("RGB"))
-    except UnidentifiedImageError:
-        raise UnsupportedFormatError(f"image: format {message.format!r}, expected a JPEG or PNG") from None
-    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
-        raise LimitError(f"image: {error}") from None
-    except (OSError, SyntaxError, ValueError) as error:
-        raise CorruptFileError(f"image: not a whole {message.format!r} image ({error})") from None
+    content = bytes(message.data)
+    with within(f"image: {message.format[:40]!r}"):
+        return decode(io.BytesIO(content), len(content))

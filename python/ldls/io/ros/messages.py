@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from ldls._optional import require
@@ -103,6 +104,7 @@ def read_header(raw: bytes | memoryview, *, ros2: bool) -> Header:
     return Header(sec * NANOSECONDS + nanosec, frame_id)
 
 
+@cache
 def standard_types(*, ros2: bool) -> Types:
     """The typestore of `rosbags` with the messages that come with ROS.
 

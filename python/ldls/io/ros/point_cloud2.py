@@ -16,6 +16,7 @@ from ldls.io.ros.messages import POINTS, Header, Message, Types, make, make_head
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """sensor_msgs/PointField: the number of each type."""
 POSITION = ("x", "y", "z")
+MAX_POINT_BYTES = 1 << 16
 READ_FIELDS = (*POSITION, "intensity")
 """Columns of `PointCloud.points`, in this order."""
 
@@ -95,23 +96,24 @@ def _layout(message: Message) -> np.dtype[np.void]:
     names = [field.name for field in message.fields]
     if len(set(names)) != len(names):
         raise CorruptFileError(f"points: fields {', '.join(names)}, expected each name once")
-    formats = [_format(field, order) for field in message.fields]
-    for field, kind in zip(message.fields, formats, strict=True):
-        if field.offset + np.dtype(kind).itemsize > message.point_step:
-            raise CorruptFileError(
-                f"points: field {field.name!r} at byte {field.offset} reaches beyond the point of "
-                f"{message.point_step} bytes"
-            )
+    if message.point_step > MAX_POINT_BYTES:
+        raise CorruptFileError(f"points: {message.point_step} bytes a point, expected at most {MAX_POINT_BYTES}")
+    formats = [_format(field, order, message.point_step) for field in message.fields]
     offsets = [field.offset for field in message.fields]
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": message.point_step})
 
 
-def _format(field: Message, order: str) -> str | tuple[str, tuple[int]]:
+def _format(field: Message, order: str, point_bytes: int) -> str | tuple[str, tuple[int]]:
     if field.datatype not in DATATYPES:
         raise UnsupportedFormatError(f"points: field {field.name!r} has type {field.datatype}, expected 1 to 8")
     kind = order + DATATYPES[field.datatype]
     # some writers count 0 where they mean 1
-    return kind if field.count <= 1 else (kind, (field.count,))
+    count = max(field.count, 1)
+    if field.offset + count * np.dtype(kind).itemsize > point_bytes:
+        raise CorruptFileError(
+            f"points: field {field.name!r} at byte {field.offset} reaches beyond the point of {point_bytes} bytes"
+        )
+    return kind if count == 1 else (kind, (count,))
 
 
 def encode(types: Types, columns: Mapping[str, NDArray[Any]], header: Header) -> Message:

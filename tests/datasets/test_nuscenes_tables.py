@@ -1,0 +1,68 @@
+"""Tables of nuScenes with values of the wrong type: an error that names the table, the row and the value."""
+
+import json
+
+import pytest
+
+import ldls
+from datasets import layouts
+from ldls.datasets import open_source
+from ldls.errors import LeftOutWarning
+
+WRONG = {
+    "null": None,
+    "a list": [[]],
+    "an object": {},
+    "text": "x",
+    "a number of 400 digits": int("9" * 400),
+    "not a number": float("nan"),
+    "text in a list": ["x"] * 4,
+    "numbers of 400 digits": [int("9" * 400)] * 3,
+    "five numbers": [0.5] * 5,
+}
+VALUES = [
+    *((table, "token") for table in ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")),
+    *(("sample_data", key) for key in ("sample_token", "calibrated_sensor_token", "ego_pose_token", "filename")),
+    *(("sample_data", key) for key in ("timestamp", "height", "width", "is_key_frame")),
+    *(("calibrated_sensor", key) for key in ("sensor_token", "translation", "rotation", "camera_intrinsic")),
+    *(("ego_pose", key) for key in ("translation", "rotation")),
+    *(("lidarseg", key) for key in ("sample_data_token", "filename")),
+    *(("sample", key) for key in ("scene_token", "timestamp")), ("scene", "name"), ("sensor", "channel"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return layouts.nuscenes(tmp_path_factory.mktemp("nuscenes"))
+
+
+@pytest.mark.parametrize(("table", "key"), VALUES)
+def test_values_of_the_wrong_type_are_named(folder, table, key):
+    path = folder / f"v1.0-mini/{table}.json"
+    intact = path.read_text()
+    refused = 0
+    try:
+        for value in WRONG.values():
+            rows = json.loads(intact)
+            rows[0][key] = value
+            path.write_text(json.dumps(rows))
+            try:
+                open_source(folder, kind="nuscenes")[0]
+            except (ldls.LdlsError, LeftOutWarning):
+                refused += 1
+            except FileNotFoundError as error:
+                assert (key, value) == ("filename", "x"), error
+                refused += 1
+    finally:
+        path.write_text(intact)
+    assert refused >= 3
+
+
+def test_the_row_and_its_value_are_named(tmp_path):
+    folder = layouts.nuscenes(tmp_path)
+    path = folder / "v1.0-mini/sample.json"
+    rows = json.loads(path.read_text())
+    rows[1]["timestamp"] = "noon"
+    path.write_text(json.dumps(rows))
+    with pytest.raises(ldls.CorruptFileError, match=r"sample\.json, row 2: timestamp is 'noon', expected int | float"):
+        open_source(folder, kind="nuscenes")
