@@ -16,6 +16,7 @@ from ldls.errors import (
     DuplicateWarning,
     InputError,
     NonFiniteError,
+    NothingInView,
     NoUsablePoints,
     ParameterError,
     PrecisionWarning,
@@ -166,8 +167,7 @@ def _segment(
         keep_origin,
     )
     instances = tuple(_instance(label, parts, views) for label, parts in enumerate(arrays.objects, start=1))
-    _warn(cloud, arrays.report)
-    return Segmentation(
+    result = Segmentation(
         labels=arrays.labels,
         diffused_labels=arrays.diffused_labels,
         confidence=arrays.confidence,
@@ -179,6 +179,28 @@ def _segment(
         points=cloud,
         params=params,
     )
+    _warn(result, arrays.report)
+    return result
+
+
+def nothing_in_view(result: Segmentation) -> str | None:
+    """Why nothing of a cloud is labelled, if no point is in view, or none of them on a mask; None otherwise.
+
+    The text has no numbers, so that those of many frames are few.
+    """
+    report = result.report
+    usable = report.n_points - report.n_nonfinite - report.n_origin
+    if usable == 0 or result.labels.max() > 0:
+        return None
+    if report.n_in_view == 0 and report.n_behind == usable:
+        found, cause = "every point lies behind the camera", "is T_camera_lidar that of this lidar, or its inverse"
+    elif report.n_in_view == 0:
+        found, cause = "no point falls inside the image", "are calibration and image size those of this camera"
+    elif len(report.empty_masks) < len(result.instances) and not (result.direct_labels > 0).any():
+        found, cause = "no point in view falls on a mask", "are the masks those of this frame"
+    else:
+        return None
+    return f"points: {found}; nothing is labelled; {cause}, and are x, y, z in order and in metres?"
 
 
 def _instance(label: int, parts: Sequence[tuple[int, int]], views: tuple[View, ...]) -> Instance:
@@ -224,7 +246,8 @@ def _check_nonfinite(cloud: Points, nonfinite: str) -> None:
         )
 
 
-def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
+def _warn(result: Segmentation, report: Mapping[str, Any]) -> None:
+    cloud = result.points
     if len(cloud) and report["n_nonfinite"] == len(cloud):
         _warning(f"points: 0 of {len(cloud)} rows are finite; nothing is labelled", NoUsablePoints)
         return
@@ -240,6 +263,9 @@ def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
     if report["only_islands"]:
         message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
         _warning(message, DuplicateWarning)
+    doubt = nothing_in_view(result)
+    if doubt is not None:
+        _warning(doubt, NothingInView)
 
 
 def _warning(message: str, category: type[Warning]) -> None:

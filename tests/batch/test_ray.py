@@ -12,7 +12,7 @@ from batch import runs
 from ldls import batch
 from ldls.batch.engines import EngineOptions
 from ldls.batch.frame_work import FrameWork
-from ldls.batch.lock import LOCK_NAME
+from ldls.batch.lock import HOLDER_NAME
 from ldls.batch.ray_worker import RayWorker
 from ldls.datasets import open_source
 from ldls.errors import BatchError, ParameterError
@@ -160,14 +160,14 @@ def test_without_ray_the_extra_is_named(few, tmp_path, monkeypatch):
 )
 def test_a_worker_that_cannot_take_part_says_so(few, tmp_path, seen, version, named):
     if seen is not None:
-        (tmp_path / LOCK_NAME).write_text(seen)
+        (tmp_path / HOLDER_NAME).write_text(seen)
     work = FrameWork(open_source(few), stored(few), tmp_path)
     with pytest.raises(BatchError, match=named):
         RayWorker().open(work, version, "this run", wait_s=0)
 
 
 def test_a_worker_does_frames(few, tmp_path):
-    (tmp_path / LOCK_NAME).write_text("this run")
+    (tmp_path / HOLDER_NAME).write_text("this run")
     worker = RayWorker()
     worker.open(FrameWork(open_source(few), stored(few), tmp_path), ldls.__version__, "this run")
     assert worker.do(3, "000003").record["frame"] == "000003"

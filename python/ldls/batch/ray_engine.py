@@ -20,7 +20,7 @@ from typing import Any
 import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.batch.frame_work import FrameWork, Outcome
-from ldls.batch.lock import LOCK_NAME
+from ldls.batch.lock import HOLDER_NAME
 from ldls.batch.ray_worker import RayWorker
 from ldls.errors import BatchError
 
@@ -128,7 +128,7 @@ class _Pool:
             self._work = ray.put(work)
         except (TypeError, pickle.PicklingError) as error:
             raise BatchError(f"source: cannot be sent to other processes: {error}") from error
-        self._holder = (work.out / LOCK_NAME).read_text(encoding="utf-8")
+        self._holder = (work.out / HOLDER_NAME).read_text(encoding="utf-8")
         self._tasks: dict[Any, tuple[Any, tuple[int, str]]] = {}
         self._alive: set[Any] = set()
         self._stillbirths = 0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import ldls._ldls as _ldls
 from ldls.batch.frame_work import FrameWork, Outcome, Work
-from ldls.batch.lock import LOCK_NAME
+from ldls.batch.lock import HOLDER_NAME
 from ldls.errors import BatchError
 
 WAIT_S = 60.0
@@ -23,7 +23,7 @@ class RayWorker:
         Args:
             work: What is done with a frame; it was opened anew on its way here.
             version: Version of ldls of the run.
-            holder: What the run wrote into the lock of its folder.
+            holder: What the run says of itself in its folder.
             wait_s: How long to wait for that to be seen here.
 
         Raises:
@@ -47,7 +47,7 @@ def _sees(folder: Path, holder: str, wait_s: float) -> bool:
     patience = time.monotonic() + wait_s
     while True:
         try:
-            if (folder / LOCK_NAME).read_text(encoding="utf-8") == holder:
+            if (folder / HOLDER_NAME).read_text(encoding="utf-8") == holder:
                 return True
         except OSError:
             pass

@@ -90,10 +90,10 @@ fn on_pool<T: Send>(
 /// and container quota.
 #[pyfunction]
 pub fn default_threads(py: Python<'_>) -> PyResult<usize> {
-    let Ok(text) = std::env::var("LDLS_NUM_THREADS") else {
+    let Some(text) = std::env::var_os("LDLS_NUM_THREADS") else {
         return Ok(std::thread::available_parallelism().map_or(1, usize::from));
     };
-    if let Ok(threads @ 1..=MAX_THREADS) = text.trim().parse() {
+    if let Some(Ok(threads @ 1..=MAX_THREADS)) = text.to_str().map(|text| text.trim().parse()) {
         return Ok(threads);
     }
     let message =

@@ -119,10 +119,12 @@ pub fn segment(
     })
 }
 
-/// Refuses parameters outside their range.
+/// Refuses parameters outside their range; where no threads are given, the environment is asked when work begins.
 #[pyfunction]
 pub fn check_params(py: Python<'_>, params: ParamsAttributes) -> PyResult<()> {
-    checked_threads(py, params.threads)?;
+    if params.threads.is_some() {
+        checked_threads(py, params.threads)?;
+    }
     run_at_once(py, || params.params().check())
 }
 
