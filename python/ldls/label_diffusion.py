@@ -31,6 +31,8 @@ COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
 WIDEST_CLOUD_M = 10_000.0
 """Extent beyond which the unit is probably not the metre."""
+EXPECTED_ON_MASKS = 20.0
+"""Points that masks of this area would have on them by chance, from which on none at all is no chance."""
 SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
@@ -190,17 +192,23 @@ def nothing_in_view(result: Segmentation) -> str | None:
     """
     report = result.report
     usable = report.n_points - report.n_nonfinite - report.n_origin
-    if usable == 0 or result.labels.max() > 0:
+    if usable == 0 or not result.views or result.labels.max() > 0:
         return None
     if report.n_in_view == 0 and report.n_behind == usable:
         found, cause = "every point lies behind the camera", "is T_camera_lidar that of this lidar, or its inverse"
     elif report.n_in_view == 0:
         found, cause = "no point falls inside the image", "are calibration and image size those of this camera"
-    elif len(report.empty_masks) < len(result.instances) and not (result.direct_labels > 0).any():
+    elif _expected_on_masks(result.views) > EXPECTED_ON_MASKS and not (result.direct_labels > 0).any():
         found, cause = "no point in view falls on a mask", "are the masks those of this frame"
     else:
         return None
     return f"points: {found}; nothing is labelled; {cause}, and are x, y, z in order and in metres?"
+
+
+def _expected_on_masks(views: Sequence[SeenView]) -> float:
+    """Points that would fall on the masks if those in view were spread evenly over the images."""
+    areas = [(seen, sum(mask.area for mask in seen.view.masks)) for seen in views]
+    return sum(len(seen.in_view) * area / (seen.view.masks.height * seen.view.masks.width) for seen, area in areas)
 
 
 def _instance(label: int, parts: Sequence[tuple[int, int]], views: tuple[View, ...]) -> Instance:

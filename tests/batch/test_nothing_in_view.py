@@ -31,9 +31,9 @@ def swapped(points):
     ("points", "masks", "cause"),
     [
         pytest.param(-AHEAD, mask(), "behind the camera.* is T_camera_lidar that of this lidar", id="turned round"),
-        pytest.param(swapped(AHEAD) + [50, 0, 2], mask(), "inside the image.* are x, y, z in order", id="swapped axes"),
-        pytest.param(AHEAD + [100, 0, 0], mask(), "inside the image.* calibration and image size", id="beside"),
-        pytest.param(AHEAD, mask(slice(5), slice(5)), "on a mask.* masks those of this frame", id="other masks"),
+        pytest.param(swapped(AHEAD) + np.float32([50, 0, 2]), mask(), "the image.* x, y, z in order", id="swapped"),
+        pytest.param(AHEAD + np.float32([100, 0, 0]), mask(), "inside the image.* image size", id="beside"),
+        pytest.param(AHEAD, mask(slice(20)), "on a mask.* masks those of this frame", id="other masks"),
     ],
 )
 def test_the_likely_cause_is_warned_of(points, masks, cause):
@@ -47,6 +47,7 @@ def test_the_likely_cause_is_warned_of(points, masks, cause):
     ("points", "masks"),
     [
         pytest.param(AHEAD, mask(), id="labels"),
+        pytest.param(AHEAD, mask(slice(5), slice(5)), id="a mask so small that no point need be on it"),
         pytest.param(AHEAD, mask(n=0), id="no masks"),
         pytest.param(AHEAD, mask(slice(0)), id="masks without a pixel"),
         pytest.param(np.zeros((0, 3), np.float32), mask(), id="no points"),
@@ -73,7 +74,7 @@ def astray(few):
         layouts.write_points(few / f"velodyne/{number:06d}.bin", points * np.float32([-1, 1, 1, 1]))
     coco = layouts._coco(20)
     for annotation in coco["annotations"]:
-        annotation["segmentation"] = [[0, 0, 3, 0, 3, 3, 0, 3]]
+        annotation["segmentation"] = [[0, 0, 80, 0, 80, 15, 0, 15]]
     (few / "masks/000006.json").write_text(json.dumps(coco))
     return few
 

@@ -180,11 +180,13 @@ class FrameWork:
             }
         work.result = None
 
-    def do(self, work: Work) -> Outcome:
+    def do(self, work: Work, before_writing: Callable[[], None] = lambda: None) -> Outcome:
         """All stages of a frame, one after the other."""
         try:
-            for stage in (self.read, self.segment, self.write):
-                stage(work)
+            self.read(work)
+            self.segment(work)
+            before_writing()
+            self.write(work)
         except StageError as error:
             return work.failed(error)
         return work.outcome()

@@ -144,8 +144,8 @@ class Journal:
                 return record
             found = f"expected a record of {'settings' if number == 1 else 'a frame'}, got {line[:60]!r}"
         raise CorruptFileError(
-            f"{self._path}: line {number}: not a journal of ldls ({found}); choose another folder, or remove the file to "
-            "do all frames again"
+            f"{self._path}: line {number}: not a journal of ldls ({found}); choose another folder, or remove the file "
+            "to do all frames again"
         )
 
     def _check(self, header: Record) -> None:

@@ -119,12 +119,10 @@ pub fn segment(
     })
 }
 
-/// Refuses parameters outside their range; where no threads are given, the environment is asked when work begins.
+/// Refuses parameters outside their range.
 #[pyfunction]
 pub fn check_params(py: Python<'_>, params: ParamsAttributes) -> PyResult<()> {
-    if params.threads.is_some() {
-        checked_threads(py, params.threads)?;
-    }
+    checked_threads(py, params.threads)?;
     run_at_once(py, || params.params().check())
 }
 
