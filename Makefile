@@ -51,6 +51,10 @@ pictures: ## Make the pictures of the documentation anew, by the commands beside
 kills: ## Kill 200 runs of `ldls run` and hold what they leave, resumed, against an undisturbed one.
 	python tests/campaigns/kills.py
 
+.PHONY: ray-hosts
+ray-hosts: ## Run on a Ray cluster of three hosts, of which one is cut off and one joins late; needs root.
+	python tests/campaigns/ray_hosts.py
+
 .PHONY: sample
 sample: ## Make the frame of `ldls demo` anew, from its seed.
 	python tests/simulation/make_sample.py

@@ -32,6 +32,7 @@ PORT = 6379
 ADDRESS = "10.213.77."
 CORES = {"head": 1, "first": 2, "late": 2}
 HEALTH = {
+    "RAY_raylet_start_wait_time_s": "300",
     "RAY_health_check_initial_delay_ms": "1000",
     "RAY_health_check_period_ms": "500",
     "RAY_health_check_timeout_ms": "500",

@@ -147,6 +147,7 @@ class _Pool:
         self._alive: set[Any] = set()
         self._notes: dict[Any, Path] = {}
         self._noted: dict[str, Outcome] = {}
+        self._deaths: Counter[str] = Counter()
         self._stillbirths = 0
 
     def hire(self, count: int) -> None:
@@ -169,7 +170,6 @@ class _Pool:
 
     def outcomes(self, frames: Sequence[tuple[int, str]], wanted: Callable[[], int]) -> Iterator[Outcome]:
         waiting = deque(frames)
-        deaths: Counter[str] = Counter()
         idle: deque[Any] = deque()
         n_left = len(frames)
         looked = time.monotonic()
@@ -183,32 +183,35 @@ class _Pool:
                     frame = waiting.popleft()
                     self._tasks[worker.do.remote(*frame)] = (worker, frame)
             finished, _ = self._ray.wait(list(self._tasks), num_returns=1, timeout=LOOK_S)
-            if not finished:
-                continue
-            worker, frame = self._tasks.pop(finished[0])
-            try:
-                outcome = self._ray.get(finished[0])
-            except (self._ray.exceptions.RayActorError, self._ray.exceptions.RayTaskError) as error:
-                if isinstance(error, self._ray.exceptions.RayTaskError) and worker in self._alive:
-                    # a full disk, for one: what stops a run on one machine stops it here
-                    raise getattr(error, "cause", None) or error from None
-                self._replace(worker, frame, error)
+            for task in finished:
+                worker, frame = self._tasks.pop(task)
+                outcome = self._result(task, worker, frame)
                 if frame == STARTING:
-                    continue
-                noted = self._noted.pop(frame[1], None)
-                if noted is None:
-                    deaths[frame[1]] += 1
-                    if deaths[frame[1]] < MAX_DEATHS:
-                        waiting.appendleft(frame)
-                        continue
-                outcome = noted or _killer(frame[1])
-            if frame == STARTING:
-                self._stillbirths = 0
-                idle.extend([worker] * self._share)
-                continue
-            idle.append(worker)
-            n_left -= 1
-            yield outcome
+                    idle.extend([worker] * self._share)
+                elif outcome is None:
+                    waiting.appendleft(frame)
+                else:
+                    idle.append(worker)
+                    n_left -= 1
+                    yield outcome
+
+    def _result(self, task: Any, worker: Any, frame: tuple[int, str]) -> Outcome | None:  # noqa: ANN401
+        """What came of a frame; None for one that was lost with its worker and must be done again, or for a start."""
+        errors = self._ray.exceptions
+        try:
+            outcome: Outcome | None = self._ray.get(task)
+        except (errors.RayActorError, errors.RayTaskError) as error:
+            if isinstance(error, errors.RayTaskError) and worker in self._alive:
+                # a full disk, for one: what stops a run on one machine stops it here
+                raise getattr(error, "cause", None) or error from None
+            self._replace(worker, frame, error)
+            if frame == STARTING or frame[1] in self._noted:
+                return self._noted.pop(frame[1], None)
+            self._deaths[frame[1]] += 1
+            return _killer(frame[1]) if self._deaths[frame[1]] >= MAX_DEATHS else None
+        if frame == STARTING:
+            self._stillbirths = 0
+        return outcome
 
     def _replace(self, worker: Any, frame: tuple[int, str], death: Exception) -> None:  # noqa: ANN401
         if frame == STARTING:
