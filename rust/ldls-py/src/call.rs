@@ -93,7 +93,8 @@ pub fn default_threads(py: Python<'_>) -> PyResult<usize> {
     let Some(text) = std::env::var_os("LDLS_NUM_THREADS") else {
         return Ok(std::thread::available_parallelism().map_or(1, usize::from));
     };
-    if let Some(Ok(threads @ 1..=MAX_THREADS)) = text.to_str().map(|text| text.trim().parse()) {
+    let text = text.to_string_lossy();
+    if let Ok(threads @ 1..=MAX_THREADS) = text.trim().parse() {
         return Ok(threads);
     }
     let message =
