@@ -74,6 +74,10 @@ soak: ## Label 20,000 frames in one process and tell by how much its memory grow
 fuzz-files: ## Change a million files for each parser at random and read them: only errors of ldls may come of it.
 	python tests/campaigns/parsers.py
 
+.PHONY: ray-hosts
+ray-hosts: ## Run on a Ray cluster of three hosts, of which one is cut off and one joins late; needs root.
+	python tests/campaigns/ray_hosts.py
+
 .PHONY: sample
 sample: ## Make the frame of `ldls demo` anew, from its seed.
 	python tests/simulation/make_sample.py

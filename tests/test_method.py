@@ -25,6 +25,7 @@ def test_real_frames_get_the_reference_labels(kitti_frame, threads):
 
 @pytest.mark.parametrize("added", [False, True], ids=["paper", "best"])
 @pytest.mark.parametrize("seed", range(200))
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_random_scenes_equal_the_oracle(seed, added):
     points, pixels, camera, params = random_scene(np.random.default_rng(seed), added)
     masks = ldls.InstanceMasks.from_array(pixels)

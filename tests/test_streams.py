@@ -28,6 +28,7 @@ def test_a_stream_yields_what_segment_yields(small_scene):
     assert "LabelDiffusion(Camera" in repr(stream)
 
 
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_a_stream_takes_the_arguments_of_segment_and_refuses_the_same(small_scene):
     points, masks, camera = small_scene
     stream = ldls.LabelDiffusion(camera)

@@ -137,6 +137,10 @@ class NoUsablePoints(LdlsWarning):
     """No point has finite coordinates."""
 
 
+class NothingInView(LdlsWarning):
+    """No point is in view, or none of those in view is on a mask."""
+
+
 class PrecisionWarning(LdlsWarning):
     """Coordinates too large for single precision to resolve."""
 
@@ -155,6 +159,10 @@ class RecoveredFileWarning(LdlsWarning):
 
 class LeftOutWarning(LdlsWarning):
     """Sweeps that no frame is made of, for something that belongs to them is missing."""
+
+
+class ChangedFileWarning(LdlsWarning):
+    """Results of an earlier run that somebody changed since; they are made again."""
 
 
 def some(names: Sequence[str], most: int = 8) -> str:

@@ -17,6 +17,7 @@ from ldls.errors import (
     DuplicateWarning,
     InputError,
     NonFiniteError,
+    NothingInView,
     NoUsablePoints,
     ParameterError,
     PrecisionWarning,
@@ -31,6 +32,8 @@ COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
 WIDEST_CLOUD_M = 10_000.0
 """Extent beyond which the unit is probably not the metre."""
+EXPECTED_ON_MASKS = 20.0
+"""Points that masks of this area would have on them by chance, from which on none at all is no chance."""
 SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
@@ -166,8 +169,7 @@ def _segment(
         keep_origin,
     )
     instances = tuple(_instance(label, parts, views) for label, parts in enumerate(arrays.objects, start=1))
-    _warn(cloud, arrays.report)
-    return Segmentation(
+    result = Segmentation(
         labels=arrays.labels,
         diffused_labels=arrays.diffused_labels,
         confidence=arrays.confidence,
@@ -179,6 +181,34 @@ def _segment(
         points=cloud,
         params=params,
     )
+    _warn(result, arrays.report)
+    return result
+
+
+def nothing_in_view(result: Segmentation) -> str | None:
+    """Why nothing of a cloud is labelled, if no point is in view, or none of them on a mask; None otherwise.
+
+    The text has no numbers, so that those of many frames are few.
+    """
+    report = result.report
+    usable = report.n_points - report.n_nonfinite - report.n_origin
+    if usable == 0 or not result.views or result.labels.max() > 0:
+        return None
+    if report.n_in_view == 0 and report.n_behind == usable:
+        found, cause = "every point lies behind the camera", "is T_camera_lidar that of this lidar, or its inverse"
+    elif report.n_in_view == 0:
+        found, cause = "no point falls inside the image", "are calibration and image size those of this camera"
+    elif _expected_on_masks(result.views) > EXPECTED_ON_MASKS and not (result.direct_labels > 0).any():
+        found, cause = "no point in view falls on a mask", "are the masks those of this frame"
+    else:
+        return None
+    return f"points: {found}; nothing is labelled; {cause}, and are x, y, z in order and in metres?"
+
+
+def _expected_on_masks(views: Sequence[SeenView]) -> float:
+    """Points that would fall on the masks if those in view were spread evenly over the images."""
+    areas = [(seen, sum(mask.area for mask in seen.view.masks)) for seen in views]
+    return sum(len(seen.in_view) * area / (seen.view.masks.height * seen.view.masks.width) for seen, area in areas)
 
 
 def _instance(label: int, parts: Sequence[tuple[int, int]], views: tuple[View, ...]) -> Instance:
@@ -220,7 +250,8 @@ def _check_finite(cloud: Points) -> None:
         )
 
 
-def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
+def _warn(result: Segmentation, report: Mapping[str, Any]) -> None:
+    cloud = result.points
     if len(cloud) and report["n_nonfinite"] == len(cloud):
         _warning(f"points: 0 of {len(cloud)} rows are finite; nothing is labelled", NoUsablePoints)
         return
@@ -236,6 +267,9 @@ def _warn(cloud: Points, report: Mapping[str, Any]) -> None:
     if report["only_islands"]:
         message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
         _warning(message, DuplicateWarning)
+    doubt = nothing_in_view(result)
+    if doubt is not None:
+        _warning(doubt, NothingInView)
 
 
 def _warning(message: str, category: type[Warning]) -> None:

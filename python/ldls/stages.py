@@ -36,7 +36,8 @@ from ldls.params import Params
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-_BEST = Params()
+# with threads, an import does not ask the environment for them
+_BEST = Params(threads=1)
 GROUND_M = _ldls.GROUND_M
 """Heights in metres between which points are the ground's."""
 

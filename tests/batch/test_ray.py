@@ -10,9 +10,10 @@ import pytest
 import ldls
 from batch import runs
 from ldls import batch
+from ldls.batch import ray_engine
 from ldls.batch.engines import EngineOptions
 from ldls.batch.frame_work import FrameWork
-from ldls.batch.lock import LOCK_NAME
+from ldls.batch.lock import HOLDER_NAME
 from ldls.batch.ray_worker import RayWorker
 from ldls.datasets import open_source
 from ldls.errors import BatchError, ParameterError
@@ -160,18 +161,44 @@ def test_without_ray_the_extra_is_named(few, tmp_path, monkeypatch):
 )
 def test_a_worker_that_cannot_take_part_says_so(few, tmp_path, seen, version, named):
     if seen is not None:
-        (tmp_path / LOCK_NAME).write_text(seen)
+        (tmp_path / HOLDER_NAME).write_text(seen)
     work = FrameWork(open_source(few), stored(few), tmp_path)
     with pytest.raises(BatchError, match=named):
-        RayWorker().open(work, version, "this run", wait_s=0)
+        RayWorker().open(work, version, "this run", "notes", wait_s=0)
 
 
-def test_a_worker_does_frames(few, tmp_path):
-    (tmp_path / LOCK_NAME).write_text("this run")
+@pytest.fixture
+def worker(few, tmp_path):
+    """A worker that is ready, and its file of notes."""
+    (tmp_path / HOLDER_NAME).write_text("this run")
+    notes = tmp_path / ".worker-0"
+    notes.touch()
     worker = RayWorker()
-    worker.open(FrameWork(open_source(few), stored(few), tmp_path), ldls.__version__, "this run")
-    assert worker.do(3, "000003").record["frame"] == "000003"
+    worker.open(FrameWork(open_source(few), stored(few), tmp_path), ldls.__version__, "this run", notes.name)
+    return worker, notes
+
+
+def test_a_worker_does_frames(worker, tmp_path):
+    assert worker[0].do(3, "000003").record["frame"] == "000003"
     assert (tmp_path / "000003.label").exists()
+
+
+def test_a_worker_notes_what_it_did_for_whoever_loses_it(worker):
+    worker, notes = worker
+    outcomes = {name: worker.do(number, name) for number, name in enumerate(["000000", "000001", "000002"])}
+    # the machine went down in the middle of a line
+    notes.write_bytes(notes.read_bytes() + b'{"record":{"fr')
+    wanted = {"000001", "000002", "000003"}
+    assert ray_engine._noted(notes, wanted) == {name: outcomes[name] for name in ("000001", "000002")}
+    assert ray_engine._noted(notes, wanted) == {}
+
+
+def test_a_worker_that_was_given_up_writes_nothing(worker, tmp_path):
+    worker, notes = worker
+    notes.unlink()
+    with pytest.raises(BatchError, match="no longer wanted"):
+        worker.do(3, "000003")
+    assert not (tmp_path / "000003.label").exists()
 
 
 @pytest.mark.parametrize("gpus", [-1.0, 1.5, float("nan")])

@@ -22,7 +22,15 @@ from ldls.batch import lock
 from ldls.batch.plan import check_names, parse_frames
 from ldls.cli import app
 from ldls.datasets import open_source
-from ldls.errors import BatchError, CorruptFileError, InputError, ParameterError, UnsafePathError
+from ldls.errors import (
+    BatchError,
+    ChangedFileWarning,
+    CorruptFileError,
+    InputError,
+    NothingInView,
+    ParameterError,
+    UnsafePathError,
+)
 from ldls.io import files
 from ldls.viewing import overlay
 
@@ -164,8 +172,11 @@ def test_a_bag_with_stored_masks(tmp_path, n_cameras):
         for name in opened.names:
             layouts.write_text(tmp_path / f"masks/{image.name}/{name}.json", json.dumps(layouts.coco(20)))
     settings = batch.RunSettings(masks=str(tmp_path / "masks"))
-    assert batch.run(opened, tmp_path / "out", settings).n_done == 3
-    assert batch.run(opened, tmp_path / "out", settings).n_earlier == 3
+    for n_earlier in (0, 3):
+        # the cloud of this bag lies beside its images
+        with pytest.warns(NothingInView, match="3 of 3 frames"):
+            summary = batch.run(opened, tmp_path / "out", settings)
+        assert (summary.n_done, summary.n_earlier) == (3, n_earlier)
 
 
 def test_one_corrupt_frame_of_a_thousand(tmp_path):
@@ -230,7 +241,8 @@ def test_files_that_went_missing_or_shrank_are_made_again(source, undisturbed, t
     run(source, tmp_path)
     (tmp_path / "000003.label").unlink()
     (tmp_path / "000004.label").write_bytes(b"")
-    assert run(source, tmp_path).n_earlier == 58
+    with pytest.warns(ChangedFileWarning, match=r"files of 1 frames were changed .* \(000004\)"):
+        assert run(source, tmp_path).n_earlier == 58
     assert runs.contents(tmp_path) == undisturbed
 
 
@@ -303,7 +315,7 @@ def test_a_second_run_is_refused_while_the_first_lives(few, tmp_path):
         outcome = command(*runs.arguments(few, out))
         assert outcome.exit_code == 1
         assert f"another run is at work here (process {holder.pid} on " in outcome.output
-        assert [path.name for path in out.iterdir()] == [lock.LOCK_NAME]
+        assert {path.name for path in out.iterdir()} == {lock.LOCK_NAME, lock.HOLDER_NAME}
     outcome = command(*runs.arguments(few, out))
     assert outcome.exit_code == 0, outcome.output
     assert not (out / lock.LOCK_NAME).exists()
@@ -442,16 +454,17 @@ def test_a_read_only_folder(few, read_only, below):
 
 
 def test_memory_stays_flat(tmp_path):
-    source = layouts.many_frames(tmp_path / "source", 600)
+    source = layouts.many_frames(tmp_path / "source", 1500)
     used = {}
 
     def measure(finished, _failed, _total):
-        if finished in (200, 600):
+        # by then allocators have what they keep
+        if finished in (500, 1500):
             pages = int(Path("/proc/self/statm").read_text().split()[1])
             used[finished] = pages * resource.getpagesize()
 
     run(source, tmp_path / "out", on_progress=measure)
-    assert (used[600] - used[200]) / 400 < 2048
+    assert (used[1500] - used[500]) / 1000 < 2048
 
 
 def test_masks_that_are_nowhere(few, tmp_path):

@@ -306,6 +306,7 @@ def test_an_unknown_option_is_named_and_no_point(frame):
     assert "no such option: --jsn" in outcome.stderr
 
 
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_nothing_near_is_said_so():
     masks = ldls.InstanceMasks.from_array(np.ones((1, 40, 60), bool))
     camera = ldls.Camera(projection=[[40, 0, 30], [0, 40, 20], [0, 0, 1]])

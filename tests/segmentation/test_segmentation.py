@@ -218,6 +218,7 @@ def test_every_point_is_accounted_for(small_scene):
         pytest.param([[0.0, 0, -10], [50, 0, 10]], [-1, -1], id="nothing in view"),
     ],
 )
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_clouds_with_next_to_nothing_are_fine(small_scene, points, expected):
     _, masks, camera = small_scene
     result = ldls.segment(points, masks, camera)
@@ -284,6 +285,7 @@ def test_map_coordinates_in_double_precision_keep_their_precision(small_scene):
         ldls.segment((points + offset).astype(np.float32), masks, shifted)
 
 
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_single_precision_is_warned_of_once_its_steps_pass_a_centimetre(small_scene):
     points, masks, camera = small_scene
     # from 2^17 m = 131,072 m on, float32 has steps of 1/64 m

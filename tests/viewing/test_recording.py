@@ -197,6 +197,7 @@ def test_pinholes_give_the_pixels_of_their_cameras(camera):
     np.testing.assert_allclose(T_lidar_camera[:3, :3] @ T_lidar_camera[:3, :3].T, np.eye(3), atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_a_recorded_camera_is_that_pinhole(tmp_path, small_scene):
     points, masks, _ = small_scene
     camera = ldls.Camera(projection=KITTI, T_camera_lidar=POSE)
@@ -311,6 +312,7 @@ def test_a_diffusion_of_no_steps_is_refused(result, every):
         pytest.param(lambda p, m, c: (p * [1, 1, -1], m, c), id="no point in view"),
     ],
 )
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_empty_results_are_recorded_too(tmp_path, small_scene, change):
     result = ldls.segment(*change(*small_scene), params=ldls.Params.paper())
     rrd = recorded(tmp_path / "a.rrd", result, images={"camera 0": IMAGE}, diffusion=100)

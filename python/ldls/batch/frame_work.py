@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +20,26 @@ from ldls.batch.settings import PICTURE, RunSettings, fill
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.errors import BatchError
 from ldls.io import read_masks, save
-from ldls.label_diffusion import LabelDiffusion
+from ldls.io.files import digest_of
+from ldls.label_diffusion import LabelDiffusion, nothing_in_view
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
 from ldls.view import View
 from ldls.viewing import overlay, save_picture
+
+LARGEST_DIGESTED_BYTES = 1 << 26
+"""Larger inputs hold many frames, as bags do, and are known by size and time of change alone."""
+DIGESTS_KEPT = 256
+"""More than the frames on their way have files, so that what many share, as a model, is read once."""
+
+
+class Earlier(Enum):
+    """What an earlier run left of a frame: nothing or part of it, all of it, or files that were changed since."""
+
+    OPEN = "open"
+    DONE = "done"
+    CHANGED = "changed"
 
 
 @dataclass(frozen=True)
@@ -31,7 +47,7 @@ class Outcome:
     """A frame that is finished, well or not.
 
     Attributes:
-        record: Its line of the journal: `frame`, and `files` with their sizes, `inputs` and `objects`, or `error`.
+        record: Its line of the journal (journal.py).
         seconds: Time that each stage took.
     """
 
@@ -59,7 +75,8 @@ class Work:
         frame: What was read.
         images: The images of the frame, for its picture.
         masks: Stored masks of each image.
-        inputs: Size and time of change of the files that it is made of, by path.
+        inputs: Size, time of change and digest of the files that it is made of, by path; None for one that is not
+            there, and for the digest of one that is not read.
         result: What came of it.
         record: Its line for the journal.
         seconds: Time that each stage took.
@@ -70,7 +87,7 @@ class Work:
     frame: Frame | None = None
     images: tuple[CameraImage, ...] = ()
     masks: tuple[InstanceMasks, ...] | None = None
-    inputs: dict[str, list[int] | None] = field(default_factory=dict)
+    inputs: dict[str, list[int | str | None] | None] = field(default_factory=dict)
     result: Segmentation | None = None
     record: Mapping[str, Any] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -106,6 +123,8 @@ class FrameWork:
         self._diffusion = LabelDiffusion(params=replace(settings.params, threads=1))
         self._files = None if settings.masks is None else MaskFiles(settings.masks)
         self._segmenter = None if settings.segmenter is None else _segmenters(settings.segmenter, settings.min_score)
+        self._reads_images = self._segmenter is not None or PICTURE in settings.formats
+        self._digest = lru_cache(DIGESTS_KEPT)(_digest)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """In another process all is opened anew."""
@@ -114,8 +133,11 @@ class FrameWork:
     def read(self, work: Work) -> None:
         """Read points and stored masks; the files are looked at before, so that no change is missed."""
         with _stage(work, "read"):
-            work.inputs.update(_states(self._source.files(work.index)))
+            seen = {path: _look(path) for path in self._source.files(work.index)}
             work.frame = self._source[work.index]
+            unread = set() if self._reads_images else {image.path for image in work.frame.images}
+            for path, look in seen.items():
+                work.inputs[str(path.absolute())] = self._state(path, look, read=path not in unread)
         if self._files is not None:
             with _stage(work, "masks"):
                 work.masks = tuple(self._stored(work, image) for image in work.frame.images)
@@ -141,53 +163,73 @@ class FrameWork:
         with _stage(work, "write"):
             # times differ from run to run; files must not
             quiet = replace(result, timings={})
-            sizes = {}
+            written = {}
             for ending in self._settings.formats:
                 path = self.out / file_name(work.name, ending)
                 if ending == PICTURE:
                     save_picture(path, overlay(result, [image.read() for image in work.images]))
                 else:
                     save(quiet, path)
-                sizes[path.name] = path.stat().st_size
+                written[path.name] = [path.stat().st_size, digest_of(path)]
             work.record = {
                 "frame": work.name,
-                "files": sizes,
+                "files": written,
                 "inputs": work.inputs,
                 "objects": _objects(result),
+                "nothing_in_view": nothing_in_view(result),
             }
         work.result = None
 
-    def do(self, work: Work) -> Outcome:
+    def do(self, work: Work, before_writing: Callable[[], None] = lambda: None) -> Outcome:
         """All stages of a frame, one after the other."""
         try:
-            for stage in (self.read, self.segment, self.write):
-                stage(work)
+            self.read(work)
+            self.segment(work)
+            before_writing()
+            self.write(work)
         except StageError as error:
             return work.failed(error)
         return work.outcome()
 
-    def is_done(self, record: Mapping[str, Any] | None) -> bool:
-        """Return True if an earlier run finished a frame, by its `record`, and its files are still there.
+    def earlier(self, record: Mapping[str, Any] | None) -> Earlier:
+        """Return what an earlier run left of a frame, by its `record` and the files that are there.
 
         Raises:
             BatchError: Its input was changed since.
         """
         if record is None or "error" in record:
-            return False
+            return Earlier.OPEN
         for path, state in record["inputs"].items():
-            if _state(Path(path)) != state:
+            if not self._is_same(Path(path), state):
                 raise BatchError(
                     f"{self.out}: {path}, of which frame {record['frame']} was made, was changed since; choose another "
                     "folder"
                 )
-        return all(_has_size(self.out / file, size) for file, size in record["files"].items())
+        names = [file_name(record["frame"], ending) for ending in self._settings.formats]
+        there = [name for name in names if (self.out / name).is_file()]
+        if any(not _is_written(self.out / name, record["files"].get(name)) for name in there):
+            return Earlier.CHANGED
+        return Earlier.DONE if there == names else Earlier.OPEN
 
     def _stored(self, work: Work, image: CameraImage) -> InstanceMasks:
         assert self._files is not None
         assert work.frame is not None
         path = self._files.path(work.name, image.name, len(work.frame.images) == 1)
-        work.inputs.update(_states([path]))
+        work.inputs[str(path.absolute())] = self._state(path, _look(path))
         return self._wanted(read_masks(path, image_size=image.camera.image_size))
+
+    def _state(self, path: Path, look: Look, *, read: bool = True) -> list[int | str | None] | None:
+        """Size, time of change and digest of a file that was seen so, for the journal."""
+        if look is None:
+            return None
+        known = read and look[0] <= LARGEST_DIGESTED_BYTES
+        return [*look, self._digest(path, look) if known else None]
+
+    def _is_same(self, path: Path, state: list[int | str | None] | None) -> bool:
+        look = _look(path)
+        if look is None or state is None:
+            return look is None and state is None
+        return [*look] == state[:2] and (state[2] is None or self._digest(path, look) == state[2])
 
     def _wanted(self, masks: InstanceMasks) -> InstanceMasks:
         return masks.filter(min_score=self._settings.min_score or 0.0, categories=self._settings.categories)
@@ -196,7 +238,7 @@ class FrameWork:
         assert self._segmenter is not None
         path = self._settings.segmenter_file(work.name, image.name)
         if path is not None:
-            work.inputs.update(_states([path]))
+            work.inputs[str(path.absolute())] = self._state(path, _look(path))
         return self._wanted(self._segmenter(work.name, image)(image.read()))
 
 
@@ -215,21 +257,25 @@ def _objects(result: Segmentation) -> dict[str, int]:
     return dict(Counter(instance.name for instance in result.instances if points[instance.label] > 0))
 
 
-def _states(paths: Iterable[Path]) -> dict[str, list[int] | None]:
-    return {str(path.absolute()): _state(path) for path in paths}
+Look = tuple[int, int] | None
+"""Size and time of change of a file; None where there is none."""
 
 
-def _state(path: Path) -> list[int] | None:
-    """Size and time of change of a file; None where there is none."""
+def _look(path: Path) -> Look:
     try:
         found = path.stat()
-    except FileNotFoundError:
+    except (FileNotFoundError, ValueError):  # a name with a NUL, for one
         return None
-    return [found.st_size, found.st_mtime_ns]
+    return found.st_size, found.st_mtime_ns
 
 
-def _has_size(path: Path, size: int) -> bool:
-    return path.is_file() and path.stat().st_size == size
+def _digest(path: Path, look: Look) -> str:
+    """Digest of a file; `look` tells two states of it apart."""
+    return digest_of(path)
+
+
+def _is_written(path: Path, written: list[int | str] | None) -> bool:
+    return written is not None and path.stat().st_size == written[0] and digest_of(path) == written[1]
 
 
 @contextmanager

@@ -4,6 +4,15 @@ The first line holds the settings; a run goes on only with the same ones. Frames
 they are finished, in groups, so that the disk need not be waited for after each; a line that a crash cut off is
 dropped. When all is done the lines are put in the order of the frames: every run of the same settings ends with the
 same bytes.
+
+The line of a frame has its name, `frame`, and
+
+- `files`: size and digest of each result;
+- `inputs`: size, time of change and digest of each file that it was made of, as far as they are known;
+- `objects`: how many there are of each category;
+- `nothing_in_view`: why nothing is labelled, or null;
+
+or, where it failed, `error` with `stage`, `code` and `message`.
 """
 
 from __future__ import annotations
@@ -16,9 +25,10 @@ from pathlib import Path
 from typing import IO, Any
 
 from ldls.errors import BatchError, CorruptFileError
-from ldls.io.files import names_file, sync_folder, whole_file
+from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
 
 JOURNAL_NAME = "journal.jsonl"
+LONGEST_LINE_BYTES = 1 << 24
 Record = Mapping[str, Any]
 
 
@@ -31,12 +41,13 @@ class Journal:
         Raises:
             BatchError: The one there is belongs to a run of other settings.
             CorruptFileError: It is no journal.
+            UnsafePathError: It is a link.
         """
         self._folder = folder
         self._path = folder / JOURNAL_NAME
         self._header = header
         self._places: dict[str, int] = {}
-        self._file = self._path.open("ab+", buffering=0)
+        self._file = open_to_append(self._path)
         try:
             self._end = self._read()
             # a line that was cut off makes room for whole ones
@@ -108,20 +119,34 @@ class Journal:
         """Find the lines there are; the number of bytes up to the end of the last whole one."""
         whole = 0
         with self._path.open("rb") as file:
-            for line in file:
-                if not line.endswith(b"\n"):
+            for number, line in enumerate(iter(lambda: file.readline(LONGEST_LINE_BYTES), b""), start=1):
+                if not line.endswith(b"\n") and self._may_be_cut(line, number):
                     break
-                try:
-                    record = json.loads(line)
-                    if whole > 0:
-                        self._places[record["frame"]] = whole
-                except (ValueError, KeyError, TypeError) as error:
-                    message = f"{self._path}: not a journal of ldls ({error}); choose another folder"
-                    raise CorruptFileError(message) from None
-                if whole == 0:
+                record = self._parsed(line, number)
+                if number == 1:
                     self._check(record)
+                else:
+                    self._places[record["frame"]] = whole
                 whole += len(line)
         return whole
+
+    def _may_be_cut(self, line: bytes, number: int) -> bool:
+        """Return True for a line without an end that a run may have left; only our own are dropped."""
+        return len(line) < LONGEST_LINE_BYTES and (number > 1 or _line(self._header).startswith(line))
+
+    def _parsed(self, line: bytes, number: int) -> Record:
+        try:
+            record: Record = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            found = str(error)
+        else:
+            if isinstance(record, dict) if number == 1 else _is_of_frame(record):
+                return record
+            found = f"expected a record of {'settings' if number == 1 else 'a frame'}, got {line[:60]!r}"
+        raise CorruptFileError(
+            f"{self._path}: line {number}: not a journal of ldls ({found}); choose another folder, or remove the file "
+            "to do all frames again"
+        )
 
     def _check(self, header: Record) -> None:
         differences = list(_differences(header, self._header))
@@ -130,6 +155,39 @@ class Journal:
                 f"{self._folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go "
                 "on with it, or choose another folder"
             )
+
+
+def _is_of_frame(record: object) -> bool:
+    match record:
+        case {"frame": str(), "error": {"stage": str(), "code": str(), "message": str(), **rest}}:
+            return not rest
+        case {
+            "frame": str(),
+            "files": dict() as files,
+            "inputs": dict() as inputs,
+            "objects": dict() as objects,
+            "nothing_in_view": str() | None,
+        }:
+            return (
+                all(map(_is_of_file, files.values()))
+                and all(map(_is_of_input, inputs.values()))
+                and all(isinstance(count, int) for count in objects.values())
+            )
+    return False
+
+
+def _is_of_file(state: object) -> bool:
+    match state:
+        case [int(), str()]:
+            return True
+    return False
+
+
+def _is_of_input(state: object) -> bool:
+    match state:
+        case None | [int(), int(), str() | None]:
+            return True
+    return False
 
 
 def _record_at(file: IO[bytes], place: int) -> Record:

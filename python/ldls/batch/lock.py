@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import fcntl
+import contextlib
 import json
 import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+
+from filelock import FileLock, Timeout
 
 from ldls.errors import BatchError
-from ldls.io.files import names_file
+from ldls.io.files import refuse_link, regular_file, whole_file
 
 LOCK_NAME = ".ldls-lock"
+HOLDER_NAME = ".ldls-holder"
+"""Tells who holds the lock; a file of its own, as some systems let nobody read one that is locked."""
 
 
 @contextmanager
@@ -23,42 +26,32 @@ def only_run(folder: Path) -> Iterator[None]:
 
     Raises:
         BatchError: Another run, which still lives, holds it.
+        UnsafePathError: The lock is a link.
     """
-    path = folder / LOCK_NAME
-    file = _locked(path)
+    path, holder = folder / LOCK_NAME, folder / HOLDER_NAME
+    refuse_link(path)
+    lock = FileLock(path)
     try:
-        holder = {"pid": os.getpid(), "host": socket.gethostname()}
-        with names_file(path):
-            # past Python's buffers: on a full disk nothing is left over for close to trip on
-            os.ftruncate(file.fileno(), 0)
-            os.write(file.fileno(), json.dumps(holder).encode())
+        lock.acquire(blocking=False)
+    except Timeout:
+        raise BatchError(
+            f"{folder}: another run is at work here ({_holder(holder)}); wait for it, or choose another folder"
+        ) from None
+    try:
+        with whole_file(holder) as file:
+            file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname()}).encode())
         yield
     finally:
-        path.unlink(missing_ok=True)
-        file.close()
+        holder.unlink(missing_ok=True)
+        # while it is held, for then it is ours; Windows removes no open files
+        with contextlib.suppress(PermissionError):
+            path.unlink(missing_ok=True)
+        lock.release()
 
 
-def _locked(path: Path) -> IO[str]:
-    while True:
-        file = path.open("a+", encoding="utf-8")
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            file.seek(0)
-            holder = _holder(file.read())
-            file.close()
-            raise BatchError(
-                f"{path.parent}: another run is at work here ({holder}); wait for it, or choose another folder"
-            ) from None
-        # whoever held it may have removed it meanwhile, and another may have made a new one
-        if path.exists() and os.path.samestat(path.stat(), os.fstat(file.fileno())):
-            return file
-        file.close()
-
-
-def _holder(text: str) -> str:
+def _holder(path: Path) -> str:
     try:
-        holder = json.loads(text)
+        holder = json.loads(regular_file(path).read_text(encoding="utf-8"))
         return f"process {holder['pid']} on {holder['host']}"
-    except (ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return "process unknown"

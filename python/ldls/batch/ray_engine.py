@@ -1,34 +1,41 @@
 """The engine of a Ray cluster: workers in processes of their own, each a frame on one core.
 
-Frames go one by one to whoever is free. A worker that dies, with its machine or without, is replaced, and its frames
-are done again elsewhere: writing a frame twice leaves the same files. Outcomes come back to the process that began
-the run, which alone keeps the journal.
+Frames go one by one to whoever is free. A worker that dies, or whose machine is cut off, is replaced, and its frames
+are done elsewhere, save those whose outcome it could still note in the folder of the run. Machines that join the
+cluster on the way get workers too. Outcomes come back to the process that began the run, which alone keeps the journal.
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
 import pickle
+import secrets
 import socket
+import time
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.batch.frame_work import FrameWork, Outcome
-from ldls.batch.lock import LOCK_NAME
+from ldls.batch.lock import HOLDER_NAME
 from ldls.batch.ray_worker import RayWorker
 from ldls.errors import BatchError
+from ldls.io.files import UNFINISHED
 
 MAX_DEATHS = 3
 """Workers that one frame may take along before it counts as failed."""
 MAX_STILLBIRTHS = 20
 """Workers that may die one after the other before any of them is ready."""
 CONNECT_S = 10.0
+LOOK_S = 5.0
+"""Seconds between looks for machines that have joined the cluster."""
 STARTING = (-1, "")
 """State of a worker that is starting."""
 
@@ -105,13 +112,19 @@ def run_ray(
         cores = max(int(resources.get("CPU", 1)), 1)
         if resources.get("GPU", 0) < gpus:
             raise BatchError(f"gpus: the cluster has {resources.get('GPU', 0):g}, a worker wants {gpus:g}")
-        if workers is None:
-            workers = int(resources["GPU"] / gpus) if gpus else cores
-        share = max(cores // workers, 1) if gpus else 1
+
+        def wanted() -> int:
+            """How many workers there is room for."""
+            if workers is not None:
+                return workers
+            now = ray.cluster_resources()
+            return int(now.get("GPU", 0) / gpus if gpus else now.get("CPU", 1))
+
+        share = max(cores // max(wanted(), 1), 1) if gpus else 1
         pool = _Pool(ray, work, {"num_cpus": share, "num_gpus": gpus, "max_concurrency": share})
         try:
-            pool.hire(min(workers, len(frames)))
-            yield from pool.outcomes(frames)
+            pool.hire(min(max(wanted(), 1), len(frames)))
+            yield from pool.outcomes(frames, wanted)
         finally:
             pool.dismiss()
 
@@ -128,57 +141,77 @@ class _Pool:
             self._work = ray.put(work)
         except (TypeError, pickle.PicklingError) as error:
             raise BatchError(f"source: cannot be sent to other processes: {error}") from error
-        self._holder = (work.out / LOCK_NAME).read_text(encoding="utf-8")
+        self._folder = work.out
+        self._holder = (work.out / HOLDER_NAME).read_text(encoding="utf-8")
         self._tasks: dict[Any, tuple[Any, tuple[int, str]]] = {}
         self._alive: set[Any] = set()
+        self._notes: dict[Any, Path] = {}
+        self._noted: dict[str, Outcome] = {}
+        self._deaths: Counter[str] = Counter()
         self._stillbirths = 0
 
     def hire(self, count: int) -> None:
         for _ in range(count):
             worker = self._class.remote()
             self._alive.add(worker)
-            self._tasks[worker.open.remote(self._work, _ldls.__version__, self._holder)] = (worker, STARTING)
+            # swept with all that is unfinished, if nobody is left to take it away
+            notes = self._notes[worker] = self._folder / f".worker-{secrets.token_hex(6)}{UNFINISHED}"
+            notes.touch(exist_ok=False)
+            opened = worker.open.remote(self._work, _ldls.__version__, self._holder, notes.name)
+            self._tasks[opened] = (worker, STARTING)
 
     def dismiss(self) -> None:
         for worker in self._alive:
             # whatever state it is in
             with contextlib.suppress(Exception):
                 self._ray.kill(worker)
+        for notes in self._notes.values():
+            notes.unlink(missing_ok=True)
 
-    def outcomes(self, frames: Sequence[tuple[int, str]]) -> Iterator[Outcome]:
+    def outcomes(self, frames: Sequence[tuple[int, str]], wanted: Callable[[], int]) -> Iterator[Outcome]:
         waiting = deque(frames)
-        deaths: Counter[str] = Counter()
         idle: deque[Any] = deque()
         n_left = len(frames)
+        looked = time.monotonic()
         while n_left:
+            if time.monotonic() - looked > LOOK_S:
+                self.hire(min(wanted() - len(self._alive), len(waiting)))
+                looked = time.monotonic()
             while idle and waiting:
                 worker = idle.popleft()
                 if worker in self._alive:
                     frame = waiting.popleft()
                     self._tasks[worker.do.remote(*frame)] = (worker, frame)
-            (done, *_), _ = self._ray.wait(list(self._tasks), num_returns=1)
-            worker, frame = self._tasks.pop(done)
-            try:
-                outcome = self._ray.get(done)
-            except self._ray.exceptions.RayActorError as death:
-                self._replace(worker, frame, death)
+            finished, _ = self._ray.wait(list(self._tasks), num_returns=1, timeout=LOOK_S)
+            for task in finished:
+                worker, frame = self._tasks.pop(task)
+                outcome = self._result(task, worker, frame)
                 if frame == STARTING:
-                    continue
-                deaths[frame[1]] += 1
-                if deaths[frame[1]] < MAX_DEATHS:
+                    idle.extend([worker] * self._share)
+                elif outcome is None:
                     waiting.appendleft(frame)
-                    continue
-                outcome = _killer(frame[1])
-            except self._ray.exceptions.RayTaskError as error:
+                else:
+                    idle.append(worker)
+                    n_left -= 1
+                    yield outcome
+
+    def _result(self, task: Any, worker: Any, frame: tuple[int, str]) -> Outcome | None:  # noqa: ANN401
+        """What came of a frame; None for one that was lost with its worker and must be done again, or for a start."""
+        errors = self._ray.exceptions
+        try:
+            outcome: Outcome | None = self._ray.get(task)
+        except (errors.RayActorError, errors.RayTaskError) as error:
+            if isinstance(error, errors.RayTaskError) and worker in self._alive:
                 # a full disk, for one: what stops a run on one machine stops it here
                 raise getattr(error, "cause", None) or error from None
-            if frame == STARTING:
-                self._stillbirths = 0
-                idle.extend([worker] * self._share)
-                continue
-            idle.append(worker)
-            n_left -= 1
-            yield outcome
+            self._replace(worker, frame, error)
+            if frame == STARTING or frame[1] in self._noted:
+                return self._noted.pop(frame[1], None)
+            self._deaths[frame[1]] += 1
+            return _killer(frame[1]) if self._deaths[frame[1]] >= MAX_DEATHS else None
+        if frame == STARTING:
+            self._stillbirths = 0
+        return outcome
 
     def _replace(self, worker: Any, frame: tuple[int, str], death: Exception) -> None:  # noqa: ANN401
         if frame == STARTING:
@@ -188,7 +221,28 @@ class _Pool:
         # all frames of a worker come back with its death; one successor is enough
         if worker in self._alive:
             self._alive.remove(worker)
+            # one that is only out of reach must not go on
+            with contextlib.suppress(Exception):
+                self._ray.kill(worker)
+            in_hand = {frame[1], *(name for other, (_, name) in self._tasks.values() if other == worker)}
+            self._noted |= _noted(self._notes.pop(worker), in_hand)
             self.hire(1)
+
+
+def _noted(notes: Path, frames: set[str]) -> dict[str, Outcome]:
+    """The outcomes of frames that a worker noted; its notes are taken away, and it writes no more without them."""
+    taken = notes.with_name(f".taken{notes.name}")
+    try:
+        notes.replace(taken)
+    except FileNotFoundError:
+        return {}
+    outcomes = []
+    for line in taken.read_bytes().splitlines():
+        # the last one may be cut off
+        with contextlib.suppress(ValueError):
+            outcomes.append(Outcome(**json.loads(line)))
+    taken.unlink()
+    return {outcome.record["frame"]: outcome for outcome in outcomes if outcome.record["frame"] in frames}
 
 
 def _killer(frame: str) -> Outcome:

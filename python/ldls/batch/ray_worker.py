@@ -1,13 +1,20 @@
-"""A worker of a Ray cluster: a process, on some machine, that does frames."""
+"""A worker of a Ray cluster: a process, on some machine, that does frames.
+
+A worker notes each outcome in a file of its own in the folder of the run before it hands it back. If its machine is
+cut off meanwhile, whoever gave it the frame finds the outcome there, and the frame is not done again.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
 import time
 from pathlib import Path
 
 import ldls._ldls as _ldls
 from ldls.batch.frame_work import FrameWork, Outcome, Work
-from ldls.batch.lock import LOCK_NAME
+from ldls.batch.lock import HOLDER_NAME
 from ldls.errors import BatchError
 
 WAIT_S = 60.0
@@ -17,13 +24,14 @@ WAIT_S = 60.0
 class RayWorker:
     """Does frames one after the other, or some at a time where it has several cores beside its GPU."""
 
-    def open(self, work: FrameWork, version: str, holder: str, wait_s: float = WAIT_S) -> None:
+    def open(self, work: FrameWork, version: str, holder: str, notes: str, wait_s: float = WAIT_S) -> None:
         """Prepare for frames.
 
         Args:
             work: What is done with a frame; it was opened anew on its way here.
             version: Version of ldls of the run.
-            holder: What the run wrote into the lock of its folder.
+            holder: What the run says of itself in its folder.
+            notes: Name of the file of notes of this worker, which is there until the worker is given up.
             wait_s: How long to wait for that to be seen here.
 
         Raises:
@@ -36,18 +44,32 @@ class RayWorker:
                 f"{work.out}: a worker does not see the folder of the run; it must be on storage that all machines "
                 "share, under the same path"
             )
-        self._work = work
+        self._work, self._notes = work, work.out / notes
 
     def do(self, index: int, name: str) -> Outcome:
-        """Segment a frame; return its outcome."""
-        return self._work.do(Work(index, name))
+        """Segment a frame; return its outcome.
+
+        Raises:
+            BatchError: This worker was given up, and the frame is done by another.
+        """
+        outcome = self._work.do(Work(index, name), self._still_wanted)
+        line = json.dumps({"record": outcome.record, "seconds": outcome.seconds}) + "\n"
+        # without its notes it was given up; on a full disk the outcome still goes its usual way
+        with contextlib.suppress(OSError), os.fdopen(os.open(self._notes, os.O_WRONLY | os.O_APPEND), "ab") as file:
+            # closed at once, for only then network file systems show it to others
+            file.write(line.encode())
+        return outcome
+
+    def _still_wanted(self) -> None:
+        if not self._notes.exists():
+            raise BatchError(f"{self._notes}: is gone, so that this worker is no longer wanted")
 
 
 def _sees(folder: Path, holder: str, wait_s: float) -> bool:
     patience = time.monotonic() + wait_s
     while True:
         try:
-            if (folder / LOCK_NAME).read_text(encoding="utf-8") == holder:
+            if (folder / HOLDER_NAME).read_text(encoding="utf-8") == holder:
                 return True
         except OSError:
             pass

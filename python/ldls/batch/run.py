@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from os import PathLike
 from pathlib import Path
 
+import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
-from ldls.batch.frame_work import FrameWork, Outcome
+from ldls.batch.frame_work import Earlier, FrameWork, Outcome
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
 from ldls.batch.plan import check_names
 from ldls.batch.settings import RunSettings, source_record
-from ldls.batch.summary import Summary, count_objects, failures_of, write_failures
+from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, write_failures
 from ldls.datasets import Source, open_source
+from ldls.errors import ChangedFileWarning, NothingInView, some
 from ldls.io.files import sweep
 
 GROUP_S = 0.5
@@ -59,7 +63,8 @@ def run(
 
     Raises:
         BatchError: Another run is at work in `out`, or `out` holds a run of other settings, source or version.
-        UnsafePathError: A frame's name is no file name.
+        CorruptFileError: The journal in `out` is none.
+        UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
         ImportError: The engine needs an extra that is not installed.
         OSError: The results cannot be written, as on a full disk; what is written stays, and the run can go on.
     """
@@ -80,17 +85,20 @@ def run(
         journal = Journal(folder, header)
         try:
             # what an earlier run did must still be there, and of the same input
-            pending = [frame for frame in chosen if not work.is_done(journal.get(frame[1]))]
+            pending = _pending(chosen, work, journal)
             n_earlier = len(chosen) - len(pending)
             start = time.perf_counter()
             seconds: Counter[str] = Counter()
             n_finished, n_failed = n_earlier, 0
-            for outcome in _recorded(runner(work, pending), journal):
-                seconds.update(outcome.seconds)
-                n_finished += 1
-                n_failed += "error" in outcome.record
-                if on_progress is not None:
-                    on_progress(n_finished, n_failed, len(names))
+            with warnings.catch_warnings():
+                # said of all frames at once, below
+                warnings.simplefilter("ignore", NothingInView)
+                for outcome in _recorded(runner(work, pending), journal):
+                    seconds.update(outcome.seconds)
+                    n_finished += 1
+                    n_failed += "error" in outcome.record
+                    if on_progress is not None:
+                        on_progress(n_finished, n_failed, len(names))
         finally:
             journal.close()
         elapsed = time.perf_counter() - start
@@ -99,15 +107,35 @@ def run(
         write_failures(folder, failures)
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
+    doubts = doubts_of(journal.records(names))
+    for doubt, frames_in_doubt in doubts.items():
+        message = f"{len(frames_in_doubt):,} of {len(names):,} frames ({some(frames_in_doubt)}): {doubt}"
+        warnings.warn(message, NothingInView, stacklevel=2)
     return Summary(
         n_frames=len(names),
         n_done=len(names) - len(failures),
         n_earlier=n_earlier,
+        n_nothing_in_view=sum(map(len, doubts.values())),
         failures=failures,
         objects=count_objects(journal.records(names)),
         seconds=dict(seconds),
         elapsed=elapsed,
     )
+
+
+def _pending(chosen: Sequence[tuple[int, str]], work: FrameWork, journal: Journal) -> list[tuple[int, str]]:
+    """The frames that an earlier run left to do; warns of those whose files were changed since."""
+    with ThreadPoolExecutor(_ldls.default_threads()) as threads:
+        left = list(threads.map(lambda frame: work.earlier(journal.get(frame[1])), chosen))
+    pairs = list(zip(chosen, left, strict=True))
+    changed = [name for (_, name), earlier in pairs if earlier is Earlier.CHANGED]
+    if changed:
+        message = (
+            f"{work.out}: files of {len(changed):,} frames were changed since they were written ({some(changed)}); "
+            "these frames are done again"
+        )
+        warnings.warn(message, ChangedFileWarning, stacklevel=3)
+    return [frame for frame, earlier in pairs if earlier is not Earlier.DONE]
 
 
 def _recorded(outcomes: Iterator[Outcome], journal: Journal) -> Iterator[Outcome]:

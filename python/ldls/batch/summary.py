@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -37,6 +37,7 @@ class Summary:
         n_frames: Frames wanted.
         n_done: Frames whose files are written.
         n_earlier: Of these, those of earlier runs that were interrupted.
+        n_nothing_in_view: Of those done, frames without a point in view, or on a mask.
         failures: Frames that failed, in their order.
         objects: Objects with points, by category name.
         seconds: Time of each stage, added up over the frames of this run.
@@ -46,6 +47,7 @@ class Summary:
     n_frames: int
     n_done: int
     n_earlier: int
+    n_nothing_in_view: int
     failures: tuple[Failure, ...]
     objects: Mapping[str, int]
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -63,6 +65,15 @@ FAILURES_NAME = "failures.jsonl"
 def failures_of(records: Iterable[Mapping[str, Any]]) -> tuple[Failure, ...]:
     """The frames that failed."""
     return tuple(Failure(record["frame"], **record["error"]) for record in records if "error" in record)
+
+
+def doubts_of(records: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """The frames of which nothing is labelled, by the likely cause."""
+    doubts: defaultdict[str, list[str]] = defaultdict(list)
+    for record in records:
+        if record.get("nothing_in_view") is not None:
+            doubts[record["nothing_in_view"]].append(record["frame"])
+    return dict(doubts)
 
 
 def write_failures(folder: Path, failures: Sequence[Failure]) -> None:

@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+import io
+import sys
+from typing import Any
+
 import typer
+from typer.core import TyperGroup
 
 from ldls.cli import annotate, demo, evaluate, explain, info, masks, reproduce, run, segment, simulate, view
 
+
+class Commands(TyperGroup):
+    """The commands; what a terminal or a locale has no letter for comes out as its number, not as an error."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401
+        """Run the command that is named."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
+        return super().main(*args, **kwargs)
+
+
 app = typer.Typer(
+    cls=Commands,
     name="ldls",
     help="Instance labels for lidar points from 2D masks, by label diffusion.",
     no_args_is_help=True,

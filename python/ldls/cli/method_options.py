@@ -73,7 +73,7 @@ def _params_of(*, paper: bool, converge: bool, **given: Any) -> Params:  # noqa:
 
 
 def _parameter_option(name: str) -> inspect.Parameter:
-    best, published = (getattr(params, name) for params in (Params(), Params.paper()))
+    best, published = (getattr(params, name) for params in (Params(threads=1), Params.paper(threads=1)))
     if name in SWITCHES:
         shown = SWITCHES[name].split("/")[not best].removeprefix("--")
         option = typer.Option(SWITCHES[name], help=HELP[name], show_default=shown, rich_help_panel=PANEL)

@@ -17,6 +17,8 @@ class SuitePart(StrEnum):
 
 FRAMES_FAILED = 2
 """Exit status where frames failed and the rest is done."""
+STOPPED = 130
+"""Exit status after Ctrl-C, as of other programs."""
 
 
 def words(text: str) -> tuple[str, ...]:

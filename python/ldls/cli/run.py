@@ -10,7 +10,7 @@ import typer
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
-from ldls.cli.options import FRAMES_FAILED, words
+from ldls.cli.options import FRAMES_FAILED, STOPPED, words
 from ldls.cli.progress import frame_progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, StoredMasksOption
 from ldls.params import Params
@@ -76,18 +76,31 @@ def run(
         formats=words(formats),
     )
     opened = open_source(source, kind=dataset, truth=False)
-    with frame_progress("labelling") as on_progress:
-        summary = batch.run(
-            opened,
-            out,
-            settings,
-            frames=parse_frames(frames),
-            workers=workers,
-            engine=engine,
-            ray_address=ray_address,
-            gpus=gpus,
-            on_progress=on_progress,
-        )
+    finished = failed = 0
+    with frame_progress("labelling") as show_progress:
+
+        def on_progress(*counts: int) -> None:
+            nonlocal finished, failed
+            finished, failed, _ = counts
+            show_progress(*counts)
+
+        try:
+            summary = batch.run(
+                opened,
+                out,
+                settings,
+                frames=parse_frames(frames),
+                workers=workers,
+                engine=engine,
+                ray_address=ray_address,
+                gpus=gpus,
+                on_progress=on_progress,
+            )
+        except KeyboardInterrupt:
+            typer.echo(
+                f"stopped: {finished - failed:,} frames are done; give the same command again to go on", err=True
+            )
+            raise typer.Exit(STOPPED) from None
     show(summary, out)
     if summary.failures:
         raise typer.Exit(FRAMES_FAILED)
@@ -110,6 +123,8 @@ def show(summary: Summary, out: Path) -> None:
         counts.append(f"{summary.n_earlier:,} of them by earlier runs")
     if summary.failures:
         counts.append(f"{len(summary.failures):,} failed")
+    if summary.n_nothing_in_view:
+        counts.append(f"{summary.n_nothing_in_view:,} with nothing in view")
     if summary.seconds:
         counts.append(f"{summary.frames_per_second:.1f} frames a second")
     screen.print(f"{', '.join(counts)}; results in {out}", highlight=False, soft_wrap=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import io
 import os
 import secrets
@@ -28,6 +29,8 @@ UNFINISHED = ".ldls-part"
 MAX_BYTES = 4 << 30
 """Largest file that is read where its reader states no limit of its own."""
 MAX_TEXT_BYTES = 1 << 30
+DIGEST_BLOCK_BYTES = 1 << 16
+"""Allocators use larger ones once and then keep them."""
 KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -192,6 +195,41 @@ def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of the bytes of a regular file, in hexadecimal digits."""
+    digest = hashlib.sha256()
+    with regular_file(path).open("rb", buffering=0) as file:
+        while block := file.read(DIGEST_BLOCK_BYTES):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def refuse_link(path: Path) -> None:
+    """Refuse a link in the place of a file of ours: whoever put it there would have its target written to.
+
+    Raises:
+        UnsafePathError: It is one.
+    """
+    if path.is_symlink():
+        raise UnsafePathError(f"{path}: is a link to {path.readlink()}, expected a plain file or none; remove the link")
+
+
+def open_to_append(path: Path) -> IO[bytes]:
+    """A regular file, made if need be, to read and to append to, without a buffer; links are not followed.
+
+    Raises:
+        UnsafePathError: It is a link.
+        FileFormatError: It is a folder, a pipe or a device.
+    """
+    refuse_link(path)
+    if path.exists():
+        regular_file(path)
+    # where a link or a pipe takes its place meanwhile, the system itself refuses it, or does not wait for it
+    careful = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+    handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | careful, 0o666)
+    return os.fdopen(handle, "ab+", buffering=0)
 
 
 def sync_folder(folder: str | PathLike[str]) -> None:

@@ -158,9 +158,19 @@ def seeded_orders(
 
 
 def suite_folder(part: str = "validation") -> Path:
-    """Folder that a part is kept in: below LDLS_CACHE if it is set, else below ~/.cache/ldls."""
+    """Folder that a part is kept in: below LDLS_CACHE if it is set, else below ~/.cache/ldls.
+
+    Raises:
+        ParameterError: LDLS_CACHE is no folder, or there is no home.
+    """
     cache = os.environ.get("LDLS_CACHE")
-    return (Path(cache) if cache else Path.home() / ".cache" / "ldls") / SUITE_VERSION / part
+    try:
+        folder = Path(cache) if cache else Path.home() / ".cache" / "ldls"
+    except RuntimeError:
+        raise ParameterError("LDLS_CACHE: is not set, and there is no home folder; set it to a folder") from None
+    if folder.exists() and not folder.is_dir():
+        raise ParameterError(f"LDLS_CACHE: {folder} is no folder; set it to one, or to a path where one can be made")
+    return folder / SUITE_VERSION / part
 
 
 def make_suite(

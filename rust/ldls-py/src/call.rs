@@ -137,9 +137,10 @@ fn look_around() -> PyResult<()> {
 /// and container quota.
 #[pyfunction]
 pub fn default_threads(py: Python<'_>) -> PyResult<usize> {
-    let Ok(text) = std::env::var("LDLS_NUM_THREADS") else {
+    let Some(text) = std::env::var_os("LDLS_NUM_THREADS") else {
         return Ok(std::thread::available_parallelism().map_or(1, usize::from));
     };
+    let text = text.to_string_lossy();
     if let Ok(threads @ 1..=MAX_THREADS) = text.trim().parse() {
         return Ok(threads);
     }

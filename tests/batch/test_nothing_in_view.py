@@ -1,0 +1,109 @@
+"""Frames of which nothing is labelled: a warning with the likely cause, counted by runs."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+
+import ldls
+from batch import runs
+from datasets import layouts
+from ldls import batch
+from ldls.errors import NothingInView, NoUsablePoints
+
+CAMERA = ldls.Camera(projection=[[50, 0, 40], [0, 50, 30], [0, 0, 1]])
+AHEAD = np.random.default_rng(0).uniform([-1, -1, 8], [1, 1, 12], (100, 3)).astype(np.float32)
+
+
+def mask(rows=slice(None), columns=slice(None), n=1):
+    pixels = np.zeros((n, 60, 80), bool)
+    pixels[:, rows, columns] = True
+    return ldls.InstanceMasks.from_array(pixels, categories=[3] * n)
+
+
+def swapped(points):
+    """x forward, as lidars have it, for a camera that looks along z."""
+    return points[:, [2, 0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("points", "masks", "cause"),
+    [
+        pytest.param(-AHEAD, mask(), "behind the camera.* is T_camera_lidar that of this lidar", id="turned round"),
+        pytest.param(swapped(AHEAD) + np.float32([50, 0, 2]), mask(), "the image.* x, y, z in order", id="swapped"),
+        pytest.param(AHEAD + np.float32([100, 0, 0]), mask(), "inside the image.* image size", id="beside"),
+        pytest.param(AHEAD, mask(slice(20)), "on a mask.* masks those of this frame", id="other masks"),
+    ],
+)
+def test_the_likely_cause_is_warned_of(points, masks, cause):
+    with pytest.warns(NothingInView, match=f"^points: .*{cause}") as caught:
+        result = ldls.segment(points, masks, CAMERA)
+    assert not (result.labels > 0).any()
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    ("points", "masks"),
+    [
+        pytest.param(AHEAD, mask(), id="labels"),
+        pytest.param(AHEAD, mask(slice(5), slice(5)), id="a mask so small that no point need be on it"),
+        pytest.param(AHEAD, mask(n=0), id="no masks"),
+        pytest.param(AHEAD, mask(slice(0)), id="masks without a pixel"),
+        pytest.param(np.zeros((0, 3), np.float32), mask(), id="no points"),
+        pytest.param(np.zeros((5, 3), np.float32), mask(), id="no returns"),
+    ],
+)
+def test_what_is_as_it_should_be_is_not_warned_of(points, masks):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ldls.segment(points, masks, CAMERA)
+
+
+def test_points_that_are_all_nan_have_their_own_warning_alone():
+    with pytest.warns(NoUsablePoints) as caught:
+        ldls.segment(np.full((5, 3), np.nan), mask(), CAMERA)
+    assert len(caught) == 1
+
+
+@pytest.fixture
+def astray(few):
+    """Twelve frames: three without a point in view, one with masks that no point is on."""
+    for number in (1, 4, 9):
+        points = np.fromfile(few / f"velodyne/{number:06d}.bin", "<f4").reshape(-1, 4)
+        layouts.write_points(few / f"velodyne/{number:06d}.bin", points * np.float32([-1, 1, 1, 1]))
+    coco = layouts._coco(20)
+    for annotation in coco["annotations"]:
+        annotation["segmentation"] = [[0, 0, 80, 0, 80, 15, 0, 15]]
+    (few / "masks/000006.json").write_text(json.dumps(coco))
+    return few
+
+
+def test_segment_exits_well_and_prints_the_warning(astray, tmp_path):
+    files = {"points": "velodyne/000004.bin", "calib": "calib/000004.txt", "masks": "masks/000004.json"}
+    words = [word for name, file in files.items() for word in (f"--{name}", str(astray / file))]
+    outcome = runs.finished(["segment", *words, "--out", str(tmp_path / "out")])
+    assert outcome.returncode == 0
+    assert outcome.stderr.startswith("warning: points: every point lies behind the camera; nothing is labelled; is ")
+    assert outcome.stderr.count("\n") == 1
+
+
+def test_a_run_counts_such_frames_and_warns_once_of_each_cause(astray, tmp_path):
+    words = runs.arguments(astray, tmp_path / "out")
+    for _ in "ab":
+        outcome = runs.finished(words)
+        assert outcome.returncode == 0
+        assert "12 of 12 frames done" in outcome.stdout
+        assert ", 4 with nothing in view" in outcome.stdout
+        behind, beside = sorted(outcome.stderr.splitlines(), reverse=True)
+        assert behind.startswith("warning: 3 of 12 frames (000001, 000004, 000009): points: every point lies behind")
+        assert beside.startswith("warning: 1 of 12 frames (000006): points: no point in view falls on a mask")
+
+
+def test_the_journal_has_the_cause(astray, tmp_path):
+    with pytest.warns(NothingInView):
+        summary = batch.run(astray, tmp_path / "out", batch.RunSettings(masks=str(astray / "masks")))
+    assert summary.n_nothing_in_view == 4
+    _, *lines = (tmp_path / "out/journal.jsonl").read_text().splitlines()
+    causes = {record["frame"]: record["nothing_in_view"] for record in map(json.loads, lines)}
+    assert [frame for frame, cause in causes.items() if cause] == ["000001", "000004", "000006", "000009"]
