@@ -3,7 +3,7 @@
 
 .PHONY: help
 help: ## Print these targets.
-	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  \1\t\2/' | expand -t 16
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  \1\t\2/' | expand -t 18
 
 .PHONY: install
 install: ## Install the package, optimised, with what the tests and linters need.
@@ -25,6 +25,7 @@ lint: ## Run all linters and type checks.
 	ruff check .
 	ruff format --check .
 	mypy
+	mypy --platform win32
 	python -m mypy.stubtest ldls._ldls
 	lint-imports
 
@@ -81,3 +82,51 @@ ray-hosts: ## Run on a Ray cluster of three hosts, of which one is cut off and o
 .PHONY: sample
 sample: ## Make the frame of `ldls demo` anew, from its seed.
 	python tests/simulation/make_sample.py
+
+# manylinux2014: any Linux with glibc 2.17, of 2012, or newer
+.PHONY: release
+release: ## Build wheel and sdist into dist/, check both, and build the sdist again.
+	rm -rf dist build/from-sdist
+	maturin build --release --locked --zig --compatibility manylinux2014 --out dist
+	maturin sdist --out dist
+	twine check --strict dist/*
+	auditwheel show dist/*.whl | grep '"manylinux_2_17_'
+	pip wheel --no-deps --wheel-dir build/from-sdist dist/*.tar.gz
+
+.PHONY: release-test
+release-test: ## Test the wheel of dist/ as users have it: a fresh environment, no Rust.
+	rm -rf build/fresh
+	python -m venv build/fresh
+	build/fresh/bin/pip install "$$(ls dist/*.whl)[test]"
+	PATH="$(CURDIR)/build/fresh/bin:/usr/bin:/bin" pytest
+
+.PHONY: check-windows
+check-windows: ## Check that the Rust compiles for Windows.
+	cargo check --workspace --locked --target x86_64-pc-windows-gnu
+
+# sanitizers come with nightly Rust, for code that is compiled for a target named by itself
+HOST = $(shell rustc -vV | sed -n 's/^host: //p')
+
+.PHONY: asan
+asan: ## Run the core's tests under AddressSanitizer.
+	RUSTFLAGS=-Zsanitizer=address cargo +nightly test -p ldls-core --locked --tests --target $(HOST)
+
+# the standard library too is compiled for it: locks that it cannot see look like races
+.PHONY: tsan
+tsan: ## Run the core's tests under ThreadSanitizer.
+	PROPTEST_CASES=32 RUSTFLAGS=-Zsanitizer=thread cargo +nightly test -p ldls-core --locked --tests --target $(HOST) -Zbuild-std
+
+# the tests that end within minutes there. Pools of threads end with the process, and so leak; crossbeam, below rayon, keeps
+# the rules of tree borrows alone
+.PHONY: miri
+miri: ## Run part of the core's tests under Miri.
+	MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-permissive-provenance -Zmiri-ignore-leaks -Zmiri-tree-borrows" \
+		PROPTEST_CASES=4 RAYON_NUM_THREADS=2 cargo +nightly miri test -p ldls-core --locked --lib -- $(MIRI_TESTS)
+
+MIRI_TESTS = diffusion::pass diffusion::tests::a_point diffusion::winners graph:: masks::compressed masks::polygon \
+	masks::rle ring::
+
+.PHONY: audit
+audit: ## Look up known weaknesses of the libraries that are used.
+	cargo audit
+	pip-audit --strict .

@@ -1,5 +1,7 @@
 import os
+import re
 import shutil
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +19,9 @@ settings.register_profile("tests", deadline=None, derandomize=True, suppress_hea
 settings.register_profile("fuzz", settings.get_profile("tests"), derandomize=False, max_examples=5_000)
 settings.load_profile("tests")
 
+# pipes, signals, limits and mounts, which other systems lack or have in other ways
+NEEDS_LINUX = re.compile(r"\bimport resource\b|os\.(mkfifo|geteuid|fork)|SIGKILL|SIGPROF|/proc/|/dev/|setrlimit")
+
 KITTI_FRAMES = ("000000", "000001", "000002", "000003", "000571")
 
 
@@ -27,6 +32,13 @@ def pytest_xdist_auto_num_workers(config):
         return min(cores, 4)
     config.option.dist = "no"
     return 0
+
+
+def pytest_ignore_collect(collection_path):
+    """Leave out, on other systems than Linux, the files of tests that need it."""
+    if sys.platform != "linux" and collection_path.suffix == ".py":
+        return bool(NEEDS_LINUX.search(collection_path.read_text(encoding="utf-8"))) or None
+    return None
 
 
 @dataclass(frozen=True)
