@@ -1,5 +1,6 @@
 """Links and other things that somebody put into the folder of results beforehand are never followed."""
 
+import itertools
 import os
 
 import pytest
@@ -65,8 +66,11 @@ def test_a_link_in_the_place_of_a_file_is_replaced(few, folder, name):
 
 def test_links_with_the_names_of_temporary_files_are_neither_written_to_nor_kept(folder, monkeypatch):
     out, precious, run = folder
-    monkeypatch.setattr(files.secrets, "token_hex", lambda _: "0123")
-    link(out / f".000003.label.0123{files.UNFINISHED}", precious)
+    tokens = itertools.count()
+    monkeypatch.setattr(files.secrets, "token_hex", lambda _: f"{next(tokens):04}")
+    # the note of who holds the lock is written before the folder is swept
+    for token in range(3, 30):
+        link(out / f".{token:04}{files.UNFINISHED}", precious)
     assert run().n_done == 12
     assert not list(out.glob(f"*{files.UNFINISHED}"))
 

@@ -72,7 +72,7 @@ def astray(few):
     for number in (1, 4, 9):
         points = np.fromfile(few / f"velodyne/{number:06d}.bin", "<f4").reshape(-1, 4)
         layouts.write_points(few / f"velodyne/{number:06d}.bin", points * np.float32([-1, 1, 1, 1]))
-    coco = layouts._coco(20)
+    coco = layouts.coco(20)
     for annotation in coco["annotations"]:
         annotation["segmentation"] = [[0, 0, 80, 0, 80, 15, 0, 15]]
     (few / "masks/000006.json").write_text(json.dumps(coco))

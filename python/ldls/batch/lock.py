@@ -13,7 +13,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from ldls.errors import BatchError
-from ldls.io.files import refuse_link, regular_file, whole_file
+from ldls.io.files import open_file, refuse_link, whole_file
 
 LOCK_NAME = ".ldls-lock"
 HOLDER_NAME = ".ldls-holder"
@@ -51,7 +51,8 @@ def only_run(folder: Path) -> Iterator[None]:
 
 def _holder(path: Path) -> str:
     try:
-        holder = json.loads(regular_file(path).read_text(encoding="utf-8"))
+        with open_file(path, "note of a run") as file:
+            holder = json.loads(file.text())
         return f"process {holder['pid']} on {holder['host']}"
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return "process unknown"

@@ -200,7 +200,7 @@ def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
 def digest_of(path: Path) -> str:
     """SHA-256 of the bytes of a regular file, in hexadecimal digits."""
     digest = hashlib.sha256()
-    with regular_file(path).open("rb", buffering=0) as file:
+    with open_file(path, "file") as file:
         while block := file.read(DIGEST_BLOCK_BYTES):
             digest.update(block)
     return digest.hexdigest()
@@ -225,7 +225,8 @@ def open_to_append(path: Path) -> IO[bytes]:
     """
     refuse_link(path)
     if path.exists():
-        regular_file(path)
+        with within(path):
+            _check_regular(path.stat().st_mode)
     # where a link or a pipe takes its place meanwhile, the system itself refuses it, or does not wait for it
     careful = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
     handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | careful, 0o666)

@@ -2,7 +2,7 @@
 
 use crate::clouds::random_cloud;
 use crate::{Bytes, Outcome};
-use ldls_core::{Neighbors, PixelLabels, PointGraph, Products, Real, diffuse, likelihoods};
+use ldls_core::{Cancel, Neighbors, PixelLabels, PointGraph, Products, Real, diffuse, likelihoods};
 
 /// Largest error of a likelihood on the graph of a cloud, as a share of the largest there is.
 const TOLERANCE: f64 = 5e-4;
@@ -39,7 +39,8 @@ pub fn diffusion(data: &[u8]) -> Outcome {
     let iterations = [Some(1 + bytes.below(12)), Some(1 + bytes.below(300)), None][bytes.below(3)];
     let (a, b) = system::<f32>(&graph, &labels, &mass);
 
-    let (found, convergence) = likelihoods(&a, &b, n_labels, iterations).expect("the system fits");
+    let (found, convergence) =
+        likelihoods(&a, &b, n_labels, iterations, Cancel::never()).expect("the system fits");
     let products = iterations.unwrap_or(convergence.sweeps);
     let plain = plain_products(&a, &b, n_labels, products);
     match iterations {
@@ -66,10 +67,16 @@ pub fn diffusion(data: &[u8]) -> Outcome {
         let mut products = Products::new(a.clone(), b.clone(), n_labels, Some(iterations))
             .expect("the system fits");
         while !products.is_finished() {
-            products.advance(1 + bytes.below(9));
+            products
+                .advance(1 + bytes.below(9), Cancel::never())
+                .expect("nobody cancels");
         }
         let plain: Vec<f32> = plain.iter().map(|&value| value as f32).collect();
-        assert_eq!(products.likelihoods(), plain, "products one by one");
+        assert_eq!(
+            products.likelihoods().expect("memory"),
+            plain,
+            "products one by one"
+        );
         if of_cloud {
             check_winners(&graph, (&labels, &mass), (&a, &b), n_labels, iterations);
         }
@@ -90,7 +97,15 @@ fn check_winners(
     let weights =
         (0..labels.offsets.len() - 1).flat_map(|i| exact.1.row(i).map(|(_, weight)| weight));
     let seeds = weights.fold(0.0, f64::max);
-    let found = diffuse(a, b, n_labels, Some(iterations), || Ok(exact)).expect("the system fits");
+    let found = diffuse(
+        a,
+        b,
+        n_labels,
+        Some(iterations),
+        || Ok(exact),
+        Cancel::never(),
+    )
+    .expect("the system fits");
     for (i, (row, &label)) in plain.chunks(n_labels).zip(&found.labels).enumerate() {
         let best = row.iter().copied().fold(0.0, f64::max);
         let own = row[label as usize];
@@ -172,7 +187,8 @@ fn system<T: Real>(graph: &Csr, labels: &Csr, mass: &[f64]) -> (PointGraph<T>, P
         of(mass),
     )
     .expect("it is a matrix");
-    a.normalize_rows(&mut b).expect("as many rows");
+    a.normalize_rows(&mut b, Cancel::never())
+        .expect("as many rows");
     (a, b)
 }
 
@@ -181,8 +197,11 @@ fn cloud_graph(bytes: &mut Bytes<'_>) -> Csr {
     let mut points = random_cloud(bytes);
     points.truncate(200);
     let sigma = 10_f64.powf(bytes.between(-2.0, 2.0));
-    let neighbors = Neighbors::search(&points, 1 + bytes.below(12));
-    let squared = neighbors.squared_distances(&points);
+    let neighbors =
+        Neighbors::search(&points, 1 + bytes.below(12), Cancel::never()).expect("memory");
+    let squared = neighbors
+        .squared_distances(&points, Cancel::never())
+        .expect("memory");
     let (mut columns, mut weights) = (Vec::new(), Vec::new());
     for i in 0..points.len() {
         let row = i * neighbors.k..(i + 1) * neighbors.k;

@@ -2,7 +2,7 @@
 
 use crate::clouds::{Point, random_cloud};
 use crate::{Bytes, Outcome};
-use ldls_core::Neighbors;
+use ldls_core::{Cancel, Neighbors};
 
 /// Neighbours of a random cloud.
 pub fn knn(data: &[u8]) -> Outcome {
@@ -29,7 +29,7 @@ pub fn knn(data: &[u8]) -> Outcome {
 /// # Panics
 /// If they differ.
 pub fn check_neighbors(points: &[Point], k: usize) {
-    let found = Neighbors::search(points, k);
+    let found = Neighbors::search(points, k, Cancel::never()).expect("memory");
     assert_eq!(
         found.k,
         k.min(points.len().saturating_sub(1)),
@@ -37,7 +37,9 @@ pub fn check_neighbors(points: &[Point], k: usize) {
         points.len()
     );
     assert_eq!(found.indices.len(), points.len() * found.k);
-    let distances = found.squared_distances(points);
+    let distances = found
+        .squared_distances(points, Cancel::never())
+        .expect("memory");
     let mut others = Vec::new();
     for (i, from) in points.iter().enumerate() {
         brute_force(points, i, found.k, &mut others);
