@@ -52,6 +52,14 @@ pictures: ## Make the pictures of the documentation anew, by the commands beside
 kills: ## Kill 200 runs of `ldls run` and hold what they leave, resumed, against an undisturbed one.
 	python tests/campaigns/kills.py
 
+.PHONY: ctrl-c
+ctrl-c: ## Press Ctrl-C at 20 moments of a call with ten million points and time its return.
+	python tests/campaigns/stopping.py ctrl-c
+
+.PHONY: memory
+memory: ## Run six million points under 50 limits of memory: labels or MemoryError, never an abort.
+	python tests/campaigns/stopping.py memory
+
 .PHONY: fuzz
 fuzz: ## Hold fast paths of the core against slow ones on many random inputs.
 	cargo run --release -p ldls-fuzz -- knn --count 10000
