@@ -14,20 +14,11 @@ use rayon::prelude::*;
 /// [`Error::OutOfMemory`].
 pub fn with_room<T>(len: usize) -> Result<Vec<T>> {
     let mut values = Vec::new();
-    reserve(&mut values, len)?;
-    Ok(values)
-}
-
-/// Makes room in `values` for `more` values.
-///
-/// # Errors
-/// [`Error::OutOfMemory`].
-pub fn reserve<T>(values: &mut Vec<T>, more: usize) -> Result<()> {
+    let bytes = size_of::<T>().saturating_mul(len);
     values
-        .try_reserve_exact(more)
-        .map_err(|_| Error::OutOfMemory {
-            bytes: size_of::<T>().saturating_mul(values.len() + more),
-        })
+        .try_reserve_exact(len)
+        .map_err(|_| Error::OutOfMemory { bytes })?;
+    Ok(values)
 }
 
 /// Appends `value`.

@@ -6,7 +6,7 @@ use crate::graph::{PointGraph, remove_outliers_by_index};
 use crate::ground::{clear_ground, is_ground};
 use crate::masks::PixelLabels;
 use crate::memory::{collect, filled};
-use crate::neighbors::{Adjacency, arrange};
+use crate::neighbors::{self, Adjacency, arrange};
 use crate::projection::{Cloud, Sighting};
 use crate::report::{Report, Timings, timed};
 use crate::ring::{Images, Objects, View};
@@ -67,7 +67,7 @@ pub fn segment(
     })?;
     let (scene, k) = (&images, params.neighbors);
     let nearest = &timed(&mut t.neighbors, || {
-        Adjacency::search(in_view.points, k, cancel)
+        neighbors::search(in_view.points, k, cancel)
     })?;
     let order = &nearest.order;
     let heights = &arrange(order, &scene.heights, cancel)?;

@@ -1,7 +1,6 @@
 //! The rows of the point graph: each point and its nearest neighbours, in an order in which near points are near in
 //! memory.
 
-use super::coincident;
 use super::kdtree::{FAN, KdTree, arrange};
 use super::leaf_search::search_leaf;
 use crate::memory::zeros;
@@ -28,27 +27,13 @@ pub(crate) struct Adjacency {
 }
 
 impl Adjacency {
-    /// The `k` nearest neighbours of each of `points`, finite coordinates in metres; all others where there are fewer.
-    pub(crate) fn search(points: Vec<[f64; 3]>, k: usize, cancel: &Cancel) -> Result<Self> {
-        let tree = KdTree::new(&points, cancel)?;
-        if coincident::is_crowded(&tree) {
-            drop(tree);
-            return coincident::search(&points, k, cancel);
-        }
-        Self::search_tree(tree, points, k, cancel)
-    }
-
-    /// The same for points of which no two need share a place.
-    pub(super) fn search_distinct(
+    /// The `k` nearest neighbours of each of `points`, of which `tree` is made; all others where there are fewer.
+    pub(super) fn search(
+        tree: KdTree,
         points: Vec<[f64; 3]>,
         k: usize,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let tree = KdTree::new(&points, cancel)?;
-        Self::search_tree(tree, points, k, cancel)
-    }
-
-    fn search_tree(tree: KdTree, points: Vec<[f64; 3]>, k: usize, cancel: &Cancel) -> Result<Self> {
         let points = arrange(&tree.order, &{ points }, cancel)?;
         let degree = k.min(points.len().saturating_sub(1)) + 1;
         let mut columns = zeros(points.len() * degree)?;
@@ -97,18 +82,5 @@ impl Adjacency {
             .filter(move |row| row.len() > rank);
         rows.zip(&self.points)
             .map(move |(row, point)| *point == self.points[row[rank] as usize])
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn coincident_points_are_duplicates_and_islands() {
-        let points = vec![[1.0, 2.0, 3.0]; 120_000];
-        let adjacency = Adjacency::search(points, 10, Cancel::never()).unwrap();
-        assert_eq!(adjacency.duplicates(), 120_000);
-        assert!(adjacency.only_islands());
     }
 }

@@ -38,12 +38,13 @@ pub(super) fn is_crowded(tree: &KdTree) -> bool {
     points > 1 && 2 * shared >= points
 }
 
-/// The `k` nearest neighbours of each of `points`, as [`Adjacency::search`] has them.
+/// The `k` nearest neighbours of each of `points`.
 pub(super) fn search(points: &[[f64; 3]], k: usize, cancel: &Cancel) -> Result<Adjacency> {
     let (places, place_of) = number_places(points, cancel)?;
     let members = Members::new(&place_of, places.len(), cancel)?;
     // k other places are enough: the lowest point of each is among the nearest
-    let nearest = Adjacency::search_distinct(places, k, cancel)?;
+    let tree = KdTree::new(&places, cancel)?;
+    let nearest = Adjacency::search(tree, places, k, cancel)?;
     let degree = k.min(points.len() - 1) + 1;
 
     let mut order = with_room(points.len())?;

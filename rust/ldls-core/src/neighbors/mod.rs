@@ -16,6 +16,7 @@ pub(crate) use kdtree::arrange;
 
 use crate::memory::{with_room, zeros};
 use crate::{Cancel, Error, Result};
+use kdtree::KdTree;
 use rayon::prelude::*;
 
 /// Points handled by one task of the thread pool, or between two looks at the flag.
@@ -39,7 +40,7 @@ impl Neighbors {
     pub fn search(points: &[[f64; 3]], k: usize, cancel: &Cancel) -> Result<Self> {
         let mut copy = with_room(points.len())?;
         copy.extend_from_slice(points);
-        let adjacency = Adjacency::search(copy, k, cancel)?;
+        let adjacency = search(copy, k, cancel)?;
         let (order, k) = (&adjacency.order, adjacency.degree - 1);
         let mut indices = zeros(points.len() * k)?;
         if k > 0 {
@@ -77,6 +78,16 @@ impl Neighbors {
         })?;
         Ok(squared)
     }
+}
+
+/// The `k` nearest neighbours of each of `points`, finite coordinates in metres; all others where there are fewer.
+pub(crate) fn search(points: Vec<[f64; 3]>, k: usize, cancel: &Cancel) -> Result<Adjacency> {
+    let tree = KdTree::new(&points, cancel)?;
+    if coincident::is_crowded(&tree) {
+        drop(tree);
+        return coincident::search(&points, k, cancel);
+    }
+    Adjacency::search(tree, points, k, cancel)
 }
 
 #[cfg(test)]
@@ -198,6 +209,14 @@ mod tests {
             neighbors.indices[119_999 * 10..],
             [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
         );
+    }
+
+    #[test]
+    fn coincident_points_are_duplicates_and_islands() {
+        let points = vec![[1.0, 2.0, 3.0]; 120_000];
+        let adjacency = search(points, 10, Cancel::never()).unwrap();
+        assert_eq!(adjacency.duplicates(), 120_000);
+        assert!(adjacency.only_islands());
     }
 
     #[test]
