@@ -13,10 +13,13 @@ import ldls
 from ldls import stages
 
 CLOUD = """
+import signal
 import sys
 import numpy as np
 import ldls
 
+# what shells start in the background ignores Ctrl-C
+signal.signal(signal.SIGINT, signal.default_int_handler)
 rng = np.random.default_rng(0)
 n = int(sys.argv[1])
 points = np.column_stack([rng.uniform(4, 40, n), rng.uniform(-4, 4, n), rng.uniform(-1.7, 2, n)]).astype(np.float32)

@@ -10,7 +10,6 @@ KERNEL = "ldls-core/src/diffusion"
 ALLOWED = {
     f"{KERNEL}/sweep.rs",  # the kernel
     f"{KERNEL}/values.rs",  # the values that its threads share
-    f"{KERNEL}/pass.rs",  # its one call
     "ldls-py/src/allocator.rs",  # the binding of a C library
 }
 UNSAFE = re.compile(r"\bunsafe\b(?!_code)")

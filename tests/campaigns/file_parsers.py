@@ -435,7 +435,7 @@ def coco(folder):
     ldls.save(MASKS[0], folder / "a.json")
     ldls.save(MASKS[1], folder / "b.json", results=True)
     polygons = layouts.coco(20)
-    lists = {"size": [4, 5], "counts": [3, 4, 13]}
+    lists = {"size": [60, 80], "counts": [3, 4, 60 * 80 - 7]}
     polygons["annotations"].append(polygons["annotations"][0] | {"id": 9, "segmentation": lists, "iscrowd": 1})
     return [[(folder / name).read_bytes()] for name in ("a.json", "b.json")] + [[json.dumps(polygons).encode()]]
 
@@ -591,7 +591,18 @@ FRAMES = ("000000", "000001")
 def journal(path):
     path.mkdir()
     with closing(Journal(path, HEADER)) as made:
-        made.add([{"frame": name, "files": {f"{name}.label": 400}, "timings": {"segment": 0.1}} for name in FRAMES])
+        made.add([record(name) for name in FRAMES])
+
+
+def record(name):
+    """What a run writes of a frame."""
+    return {
+        "frame": name,
+        "files": {f"{name}.label": [400, "5d" * 32]},
+        "inputs": {f"velodyne/{name}.bin": [1600, 1_792_000_000, "a7" * 32], f"masks/{name}.json": None},
+        "objects": {"car": 2, "person": 1},
+        "nothing_in_view": None,
+    }
 
 
 def journals(folder):

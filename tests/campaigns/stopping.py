@@ -18,8 +18,10 @@ TIMED = (
     + """
 import time
 
-start = time.monotonic()
-ldls.segment(points, masks, camera)
+for _ in range(2):
+    start = time.monotonic()
+    ldls.segment(points, masks, camera)
+# the first call also fetches memory
 print(time.monotonic() - start, flush=True)
 while sys.stdin.readline():
     try:

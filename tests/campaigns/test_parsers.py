@@ -16,7 +16,7 @@ pytest.importorskip("onnx")
 pytest.importorskip("rosbags")
 
 from campaigns import parsers
-from campaigns.file_parsers import Parser
+from campaigns.file_parsers import PARSERS, Inputs, Parser
 from ldls.errors import CorruptFileError
 
 DEEDS = {
@@ -41,6 +41,13 @@ class Deeds:
 
     def __getitem__(self, number):
         return list(DEEDS)[number]
+
+
+@pytest.mark.parametrize("name", PARSERS)
+def test_files_that_nobody_changed_are_read(name, tmp_path):
+    inputs = Inputs(name, 0)
+    for seed in inputs.seeds:
+        assert inputs.parser.outcome(tmp_path, inputs.parser.join(seed)) == "accepted"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the driver reads /proc")

@@ -4,12 +4,9 @@
 //! simulated frames of four lidars whose truth is known.
 
 use crate::diffusion::Diffused;
-use crate::memory::{collect, collect_parallel};
-use crate::{Params, Result};
-use rayon::prelude::*;
+use crate::memory::{collect, tabulate};
+use crate::{Cancel, Params, Result};
 
-/// Fewest points for a task of the thread pool.
-const POINTS_A_TASK: usize = 4096;
 /// Constant, and the slope of the share and of the score, for points of objects.
 const OBJECT: [f64; 3] = [-2.30, 0.23, 2.47];
 /// Constant and the slope of the share for points that diffusion gave to the background.
@@ -24,16 +21,17 @@ const SCORES: [f64; 2] = [0.05, 0.95];
 /// score of the object of each label from 1.
 ///
 /// # Errors
-/// [`crate::Error::OutOfMemory`].
+/// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
 pub fn calibrated_confidence(
     shares: &[f32],
     diffused: &[u32],
     labels: &[u32],
     scores: &[f32],
+    cancel: &Cancel,
 ) -> Result<Vec<f32>> {
-    let probability = |((&share, &diffused), &label): ((&f32, &u32), &u32)| {
-        let share = log_odds(share, SHARES);
-        let odds = match (diffused, label) {
+    let probability = |i: usize| {
+        let share = log_odds(shares[i], SHARES);
+        let odds = match (diffused[i], labels[i]) {
             (0, _) => BACKGROUND[0] + BACKGROUND[1] * share,
             (_, 0) => REMOVED[0] + REMOVED[1] * share,
             (_, label) => {
@@ -43,8 +41,7 @@ pub fn calibrated_confidence(
         };
         (1.0 / (1.0 + (-odds).exp())) as f32
     };
-    let points = shares.par_iter().zip(diffused).zip(labels);
-    collect_parallel(points.with_min_len(POINTS_A_TASK).map(probability))
+    tabulate(shares.len(), probability, cancel)
 }
 
 fn log_odds(probability: f32, [low, high]: [f64; 2]) -> f64 {
@@ -59,12 +56,13 @@ pub(crate) fn judge(
     diffused: &Diffused,
     scores: &[f32],
     params: &Params,
+    cancel: &Cancel,
 ) -> Result<Vec<f32>> {
     let shares = &diffused.confidence;
     let confidence = if params.calibrated {
-        calibrated_confidence(shares, &diffused.labels, labels, scores)?
+        calibrated_confidence(shares, &diffused.labels, labels, scores, cancel)?
     } else {
-        collect(shares.iter().copied())?
+        collect(shares.iter().copied(), cancel)?
     };
     let doubtful = |(_, confidence): &(_, &f32)| f64::from(**confidence) < params.abstain;
     let doubtful = labels.iter_mut().zip(&confidence).filter(doubtful);
@@ -77,7 +75,8 @@ mod tests {
     use super::*;
 
     fn confidence(share: f32, diffused: u32, label: u32, score: f32) -> f32 {
-        calibrated_confidence(&[share], &[diffused], &[label], &[score]).unwrap()[0]
+        calibrated_confidence(&[share], &[diffused], &[label], &[score], Cancel::never()).unwrap()
+            [0]
     }
 
     #[test]
@@ -109,7 +108,7 @@ mod tests {
             ..Params::paper()
         };
         let mut labels = [1, 1];
-        let confidence = judge(&mut labels, &diffused, &[1.0], &params).unwrap();
+        let confidence = judge(&mut labels, &diffused, &[1.0], &params, Cancel::never()).unwrap();
         assert_eq!(confidence, [0.99, 0.4]);
         assert_eq!(labels, [1, 0]);
     }

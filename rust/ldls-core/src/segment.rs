@@ -86,8 +86,7 @@ pub fn segment(
     })?;
     let heights = heights.iter().copied();
     clear_ground(&mut kept, heights, params.ground_clearance);
-    let confidence = judge(&mut kept, &diffused, &scene.scores(), params)?;
-    cancel.check()?;
+    let confidence = judge(&mut kept, &diffused, &scene.scores(), params, cancel)?;
 
     // back to the rows of the cloud
     let rows = arrange(order, &in_view.indices, cancel)?;
@@ -132,7 +131,7 @@ fn normalize<T: Real>(
 ) -> Result<(PointGraph<T>, PixelLabels<T>)> {
     let mut a = PointGraph::from_adjacency(nearest, params.sigma, cancel)?;
     if params.ground_edges < 1.0 {
-        let ground = collect(heights.iter().map(|&height| is_ground(height)))?;
+        let ground = collect(heights.iter().map(|&height| is_ground(height)), cancel)?;
         a.weaken_ground_edges(&ground, params.ground_edges, cancel)?;
     }
     a.normalize_rows(&mut b, cancel)?;
@@ -148,7 +147,7 @@ fn remove_outliers(
     params: &Params,
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
-    let mut kept = collect(labels.iter().copied())?;
+    let mut kept = collect(labels.iter().copied(), cancel)?;
     if params.remove_outliers {
         let at_depth = |row: usize, label| images.at_depth(order[row], label);
         kept = remove_outliers_by_index(a, labels, order, params.part_size, at_depth, cancel)?;
@@ -162,14 +161,14 @@ fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32], cancel: &Cancel) -> R
 }
 
 /// `values` laid out over a cloud of `n` points, each in its row.
-fn scatter<T: Copy>(
+fn scatter<T: Copy + Send + Sync>(
     n: usize,
     rows: &[u32],
     elsewhere: T,
     values: impl IntoIterator<Item = T>,
     cancel: &Cancel,
 ) -> Result<Vec<T>> {
-    let mut all = filled(elsewhere, n)?;
+    let mut all = filled(elsewhere, n, cancel)?;
     let mut values = values.into_iter();
     for rows in rows.chunks(POINTS_A_BLOCK) {
         cancel.check()?;

@@ -64,8 +64,14 @@ pub fn diffusion(data: &[u8]) -> Outcome {
         ),
     }
     if let Some(iterations) = iterations {
-        let mut products = Products::new(a.clone(), b.clone(), n_labels, Some(iterations))
-            .expect("the system fits");
+        let mut products = Products::new(
+            a.clone(),
+            b.clone(),
+            n_labels,
+            Some(iterations),
+            Cancel::never(),
+        )
+        .expect("the system fits");
         while !products.is_finished() {
             products
                 .advance(1 + bytes.below(9), Cancel::never())
@@ -73,7 +79,7 @@ pub fn diffusion(data: &[u8]) -> Outcome {
         }
         let plain: Vec<f32> = plain.iter().map(|&value| value as f32).collect();
         assert_eq!(
-            products.likelihoods().expect("memory"),
+            products.likelihoods(Cancel::never()).expect("memory"),
             plain,
             "products one by one"
         );

@@ -1,7 +1,7 @@
 //! NumPy arrays in and out. Input arrays are C-contiguous: the Python side sees to that.
 
 use crate::errors::{or_raise, raise};
-use ldls_core::{Cloud, PixelLabels, PointGraph, memory};
+use ldls_core::{Cancel, Cloud, PixelLabels, PointGraph, memory};
 use numpy::ndarray::{ArrayView, Dimension};
 use numpy::{
     Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray1,
@@ -79,7 +79,12 @@ pub fn rows<const COLUMNS: usize>(
 
 /// A copy of `values`.
 pub fn copied<T: Copy>(py: Python<'_>, values: &[T]) -> PyResult<Vec<T>> {
-    or_raise(py, memory::collect(values.iter().copied()))
+    collected(py, values.iter().copied())
+}
+
+/// `values` in memory, if there is enough.
+pub fn collected<T>(py: Python<'_>, values: impl ExactSizeIterator<Item = T>) -> PyResult<Vec<T>> {
+    or_raise(py, memory::collect(values, Cancel::never()))
 }
 
 /// A matrix of `columns` columns from its values row by row.
@@ -108,10 +113,8 @@ pub fn csr_arrays(
     columns: &[u32],
     weights: Vec<f32>,
 ) -> PyResult<CsrArrays> {
-    let offsets = offsets.iter().map(|&offset| offset as i64);
-    let offsets = or_raise(py, memory::collect(offsets))?;
-    let columns = columns.iter().map(|&column| column as i32);
-    let columns = or_raise(py, memory::collect(columns))?;
+    let offsets = collected(py, offsets.iter().map(|&offset| offset as i64))?;
+    let columns = collected(py, columns.iter().map(|&column| column as i32))?;
     Ok((
         offsets.into_pyarray(py).unbind(),
         columns.into_pyarray(py).unbind(),
@@ -141,9 +144,9 @@ fn csr_vectors(
 ) -> PyResult<(Vec<usize>, Vec<u32>, Vec<f32>)> {
     // negative indices turn into huge ones, which the core refuses
     let offsets = slice(py, "indptr", &arrays.0)?.iter();
-    let offsets = memory::collect(offsets.map(|&offset| offset as usize));
+    let offsets = collected(py, offsets.map(|&offset| offset as usize))?;
     let columns = slice(py, "indices", &arrays.1)?.iter();
-    let columns = memory::collect(columns.map(|&column| column as u32));
+    let columns = collected(py, columns.map(|&column| column as u32))?;
     let weights = copied(py, slice(py, "values", &arrays.2)?)?;
-    Ok((or_raise(py, offsets)?, or_raise(py, columns)?, weights))
+    Ok((offsets, columns, weights))
 }

@@ -1,11 +1,10 @@
 //! Diffusion some products at a time, for `ldls.stages.diffuse`.
 
-use crate::arrays::{CsrArguments, graph, matrix, pixel_labels};
-use crate::call::{run, run_here};
-use crate::errors::or_raise;
-use ldls_core::memory;
+use crate::arrays::{CsrArguments, collected, graph, matrix, pixel_labels};
+use crate::call::run;
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use std::iter::repeat_n;
 
 /// A diffusion on its way. One thread at a time may use it; others get a `RuntimeError` meanwhile.
 #[pyclass(module = "ldls._ldls")]
@@ -27,9 +26,11 @@ impl Products {
         let a = graph(py, &point_graph)?;
         // nobody asks for it, but there is one for each row
         let rows = labels.0.as_array().len().saturating_sub(1);
-        let mass = or_raise(py, memory::zeros(rows))?;
+        let mass = collected(py, repeat_n(0.0, rows))?;
         let b = pixel_labels(py, &labels, mass)?;
-        let state = run_here(py, || ldls_core::Products::new(a, b, n_labels, iterations))?;
+        let state = run(py, None, |cancel| {
+            ldls_core::Products::new(a, b, n_labels, iterations, cancel)
+        })?;
         Ok(Self { state, n_labels })
     }
 
@@ -42,7 +43,7 @@ impl Products {
     ) -> PyResult<Py<PyArray2<f32>>> {
         let z = run(py, threads, |cancel| {
             self.state.advance(products, cancel)?;
-            self.state.likelihoods()
+            self.state.likelihoods(cancel)
         })?;
         matrix(py, z, self.n_labels)
     }

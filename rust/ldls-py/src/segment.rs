@@ -1,11 +1,10 @@
 //! The whole method for Python.
 
-use crate::arrays::{Points, matrix};
+use crate::arrays::{Points, collected, matrix};
 use crate::call::{checked_threads, run, run_at_once};
 use crate::camera::Camera;
-use crate::errors::or_raise;
 use crate::masks::Masks;
-use ldls_core::{Params, Timings, View, memory};
+use ldls_core::{Params, Timings, View};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -103,11 +102,10 @@ pub fn segment(
         ldls_core::segment(cloud, &views, same_object, &params, keep_origin, cancel)
     })?;
     let rows = segmentation.in_view.iter().map(|&row| i64::from(row));
-    let in_view = or_raise(py, memory::collect(rows))?;
+    let in_view = collected(py, rows)?;
     let sightings = segmentation.sightings.into_iter().map(|sighting| {
         let rows = sighting.seen.iter().map(|&at| in_view[at as usize]);
-        let rows = or_raise(py, memory::collect(rows))?;
-        let rows = rows.into_pyarray(py).unbind();
+        let rows = collected(py, rows)?.into_pyarray(py).unbind();
         Ok((rows, matrix(py, sighting.uv.into_flattened(), 2)?))
     });
     Ok(SegmentationArrays {

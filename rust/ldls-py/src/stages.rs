@@ -1,12 +1,11 @@
 //! The steps of the method one by one, for `ldls.stages`.
 
 use crate::arrays::{
-    CsrArguments, CsrArrays, Points, copied, csr_arrays, graph, matrix, pixel_labels as labels_of,
-    rows, slice,
+    CsrArguments, CsrArrays, Points, collected, copied, csr_arrays, graph, matrix,
+    pixel_labels as labels_of, rows, slice,
 };
 use crate::call::run;
 use crate::camera::Camera;
-use crate::errors::or_raise;
 use crate::masks::Masks;
 use crate::segment::ParamsAttributes;
 use ldls_core::{DepthGroups, PointGraph, memory};
@@ -45,7 +44,7 @@ pub fn project(
         ldls_core::project(cloud, &[(&camera.0, [height, width])], keep_origin, cancel)
     })?;
     let indices = in_view.indices.iter().map(|&row| i64::from(row));
-    let indices = or_raise(py, memory::collect(indices))?;
+    let indices = collected(py, indices)?;
     let uv = in_view.sightings.swap_remove(0).uv;
     Ok((
         indices.into_pyarray(py).unbind(),
@@ -84,8 +83,9 @@ pub fn depth_groups(
     let pixels = rows::<2>(py, "pixels", &pixels)?;
     let heights = slice(py, "heights", &heights)?;
     let groups = run(py, params.threads, |cancel| {
-        let distances = memory::collect(points.iter().map(|point| camera.0.distance(point)))?;
-        let standing = memory::collect(heights.iter().map(|&h| !ldls_core::is_ground(h)))?;
+        let distances =
+            memory::collect(points.iter().map(|point| camera.0.distance(point)), cancel)?;
+        let standing = memory::collect(heights.iter().map(|&h| !ldls_core::is_ground(h)), cancel)?;
         let params = params.params();
         masks
             .0
@@ -155,7 +155,7 @@ pub fn point_graph(
         if let Some(ground) = ground {
             graph.weaken_ground_edges(ground, ground_edges, cancel)?;
         }
-        graph.into_csr()
+        graph.into_csr(cancel)
     })?;
     csr_arrays(py, &offsets, &columns, weights)
 }
@@ -212,7 +212,7 @@ pub fn normalize_rows(
     let mut labels = labels_of(py, &labels, copied(py, slice(py, "mass", &mass)?)?)?;
     let (offsets, columns, weights) = run(py, None, |cancel| {
         graph.normalize_rows(&mut labels, cancel)?;
-        graph.into_csr()
+        graph.into_csr(cancel)
     })?;
     Ok((
         csr_arrays(py, &offsets, &columns, weights)?,
@@ -295,8 +295,8 @@ pub fn confidence(
     let diffused = slice(py, "diffused", &diffused)?;
     let labels = slice(py, "labels", &labels)?;
     let scores = slice(py, "scores", &scores)?;
-    let found = run(py, None, |_| {
-        ldls_core::calibrated_confidence(shares, diffused, labels, scores)
+    let found = run(py, None, |cancel| {
+        ldls_core::calibrated_confidence(shares, diffused, labels, scores, cancel)
     })?;
     Ok(found.into_pyarray(py).unbind())
 }
@@ -324,6 +324,6 @@ fn label_arrays(py: Python<'_>, labels: ldls_core::PixelLabels) -> PyResult<Pixe
 
 fn signed(py: Python<'_>, labels: &[u32]) -> PyResult<Py<PyArray1<i32>>> {
     let labels = labels.iter().map(|&label| label as i32);
-    let labels = or_raise(py, memory::collect(labels))?;
+    let labels = collected(py, labels)?;
     Ok(labels.into_pyarray(py).unbind())
 }

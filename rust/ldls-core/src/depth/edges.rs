@@ -1,7 +1,7 @@
 //! How far pixels lie from the edge of a mask, inside and outside.
 
 use crate::memory::{collect, zeros};
-use crate::{Result, Rle};
+use crate::{Cancel, Result, Rle};
 use std::ops::Range;
 
 /// Most pixels by which a mask may be off, and pixels inside it on which all count alike.
@@ -21,7 +21,7 @@ pub(super) struct Edges {
 
 impl Edges {
     /// The edges of a mask that may be off by the share `margin` of its shorter side; none of an empty mask.
-    pub(super) fn of(mask: &Rle, margin: f64) -> Result<Option<Self>> {
+    pub(super) fn of(mask: &Rle, margin: f64, cancel: &Cancel) -> Result<Option<Self>> {
         let Some([columns, rows]) = extent(mask) else {
             return Ok(None);
         };
@@ -31,18 +31,18 @@ impl Edges {
             side.start.saturating_sub(margin)..(side.end + margin).min(end)
         };
         let (columns, rows) = (around(columns, mask.width()), around(rows, mask.height()));
-        let mut inside = zeros(columns.len() * rows.len())?;
+        let mut inside = zeros(columns.len() * rows.len(), cancel)?;
         for (column, span) in mask.column_spans() {
             let start = (column - columns.start) * rows.len();
             inside[start + span.start - rows.start..start + span.end - rows.start].fill(true);
         }
-        let to_outside = steps_to(&inside, false, rows.len())?;
-        let to_inside = steps_to(&inside, true, rows.len())?;
+        let to_outside = steps_to(&inside, false, rows.len(), cancel)?;
+        let to_inside = steps_to(&inside, true, rows.len(), cancel)?;
         let signed = |(&out, &back): (&u8, &u8)| match (out, back) {
             (0, back) if usize::from(back) <= margin => -(back as i8),
             (out, _) => out.min(REACH as u8) as i8,
         };
-        let steps = collect(to_outside.iter().zip(&to_inside).map(signed))?;
+        let steps = collect(to_outside.iter().zip(&to_inside).map(signed), cancel)?;
         Ok(Some(Self {
             columns,
             rows,
@@ -72,9 +72,9 @@ fn extent(mask: &Rle) -> Option<[Range<usize>; 2]> {
 }
 
 /// Steps from each pixel to the nearest one of `wanted`, at most one more than [`REACH`], in columns of `height` pixels.
-fn steps_to(pixels: &[bool], wanted: bool, height: usize) -> Result<Vec<u8>> {
+fn steps_to(pixels: &[bool], wanted: bool, height: usize, cancel: &Cancel) -> Result<Vec<u8>> {
     let start = |&pixel: &bool| if pixel == wanted { 0 } else { FARTHER };
-    let mut steps = collect(pixels.iter().map(start))?;
+    let mut steps = collect(pixels.iter().map(start), cancel)?;
     // two passes: what comes from the columns before and the pixels above, and then the other way around
     for _ in 0..2 {
         let mut before = vec![FARTHER; height];
@@ -114,7 +114,7 @@ mod tests {
             let pixels: Vec<bool> = (0..PIXELS).map(|at| within(at) || others.contains(&at)).collect();
             let row_major: Vec<bool> = (0..PIXELS).map(|at| pixels[at % 40 * ROWS + at / 40]).collect();
             let mask = Rle::from_pixels(ROWS, 40, &row_major).unwrap();
-            let Some(edges) = Edges::of(&mask, share).unwrap() else {
+            let Some(edges) = Edges::of(&mask, share, Cancel::never()).unwrap() else {
                 prop_assert!(!pixels.contains(&true));
                 return Ok(());
             };

@@ -64,10 +64,13 @@ impl InstanceMasks {
             standing[point].then_some((point, pixel))
         };
         let mut pixels = with_room(standing.iter().filter(|&&stands| stands).count())?;
-        pixels.extend(uv.iter().enumerate().filter_map(pixel));
+        for (block, uv) in uv.chunks(POINTS_A_BLOCK).enumerate() {
+            cancel.check()?;
+            pixels.extend((block * POINTS_A_BLOCK..).zip(uv).filter_map(pixel));
+        }
         let of_mask = |mask: &Rle| {
             cancel.check()?;
-            let Some(edges) = Edges::of(mask, params.edge_margin)? else {
+            let Some(edges) = Edges::of(mask, params.edge_margin, cancel)? else {
                 return Ok(None);
             };
             let (mut members, mut beside) = (Vec::new(), Vec::new());
@@ -87,7 +90,7 @@ impl InstanceMasks {
             }
             sort(&mut members, |member| member.distance, cancel)?;
             sort(&mut beside, |&(distance, _)| distance, cancel)?;
-            let distances = collect(beside.iter().map(|&(distance, _)| distance))?;
+            let distances = collect(beside.iter().map(|&(distance, _)| distance), cancel)?;
             let Some([near, far]) = object_of(&members, &distances, params) else {
                 return Ok(None);
             };
@@ -96,7 +99,7 @@ impl InstanceMasks {
         };
         let found = self.masks().par_iter().map(of_mask);
         let found = found.collect::<Result<Vec<_>>>()?;
-        let mut unsure = zeros(uv.len())?;
+        let mut unsure = zeros(uv.len(), cancel)?;
         if params.edge_margin > 0.0 {
             let points = found.iter().flatten().flat_map(|(_, beside)| beside);
             points.for_each(|&(_, point)| unsure[point] = true);

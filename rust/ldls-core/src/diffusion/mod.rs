@@ -19,16 +19,15 @@ pub use convergence::Convergence;
 pub use products::Products;
 
 use self::pass::Pass;
-use self::schedule::{ROWS_A_TASK, Schedule};
+use self::schedule::Schedule;
 use self::seeds::{Seeds, plan};
 use self::series::Series;
 use self::sweep::{WIDTH_F32, WIDTH_F64};
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect_parallel, filled, zeros};
+use crate::memory::{filled, tabulate, zeros};
 use crate::{Cancel, Real, Result};
-use rayon::prelude::*;
 
 /// Share of the largest likelihood that a series in single precision may leave out.
 const TOLERANCE_F32: f64 = 1e-7;
@@ -62,7 +61,7 @@ pub fn diffuse(
     cancel: &Cancel,
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
-    let mut best = filled(Best::default(), a.len())?;
+    let mut best = filled(Best::default(), a.len(), cancel)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let choose = |pass: &Pass<f32, WIDTH_F32>| winners::update(&mut best, pass);
     let mut convergence = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
@@ -70,7 +69,7 @@ pub fn diffuse(
     if !contested.is_empty() {
         let (a, b) = exact()?;
         let labels = winners::candidates(&best, &contested, n_labels, convergence.error);
-        let mut refined = filled((0, f64::NEG_INFINITY), contested.len())?;
+        let mut refined = filled((0, f64::NEG_INFINITY), contested.len(), cancel)?;
         let choose = |pass: &Pass<f64, WIDTH_F64>| winners::refine(&contested, &mut refined, pass);
         for_each_pass(&a, &b, &labels, iterations, cancel, choose)?;
         for (&point, &(label, _)) in contested.iter().zip(&refined) {
@@ -78,10 +77,9 @@ pub fn diffuse(
         }
         convergence.refined = contested.len();
     }
-    let best = best.par_iter().with_min_len(ROWS_A_TASK);
     Ok(Diffused {
-        labels: collect_parallel(best.clone().map(|best| best.labels[0]))?,
-        confidence: collect_parallel(best.map(Best::confidence))?,
+        labels: tabulate(best.len(), |i| best[i].labels[0], cancel)?,
+        confidence: tabulate(best.len(), |i| best[i].confidence(), cancel)?,
         convergence,
     })
 }
@@ -98,7 +96,7 @@ pub fn likelihoods(
     cancel: &Cancel,
 ) -> Result<(Vec<f32>, Convergence)> {
     b.check(a.len(), n_labels)?;
-    let mut all = zeros(a.len().saturating_mul(n_labels))?;
+    let mut all = zeros(a.len().saturating_mul(n_labels), cancel)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let write = |pass: &Pass<f32, WIDTH_F32>| {
         for (label, group, lane) in pass.labels() {

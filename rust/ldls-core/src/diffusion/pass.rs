@@ -4,10 +4,10 @@ use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
 use super::schedule::{Activity, ROWS_A_TASK, Schedule};
 use super::seeds::{BACKGROUND_LANE, Seeds};
 use super::series::Series;
-use super::sweep::{Step, sweep};
-use super::values::{SharedValues, zeros};
+use super::sweep::{Step, take_steps};
+use super::values::zeros;
 use crate::graph::PointGraph;
-use crate::{Cancel, Real, Result};
+use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 
 /// Error from which on a series is given up for plain products.
@@ -73,9 +73,14 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         let groups = seeds.lanes.len().div_ceil(WIDTH).max(1);
         let mut z = zeros(a.len(), groups, cancel)?;
         let previous = zeros(a.len(), groups, cancel)?;
-        let rows = z[0].par_iter_mut().zip(&seeds.background);
-        rows.with_min_len(ROWS_A_TASK)
-            .for_each(|(row, &weight)| row[BACKGROUND_LANE] = scale * weight);
+        let rows = z[0].par_chunks_mut(ROWS_A_TASK);
+        let rows = rows.zip(seeds.background.par_chunks(ROWS_A_TASK));
+        rows.try_for_each(|(rows, weights)| {
+            cancel.check()?;
+            let rows = rows.iter_mut().zip(weights);
+            rows.for_each(|(row, &weight)| row[BACKGROUND_LANE] = scale * weight);
+            Ok::<(), Error>(())
+        })?;
         for &(i, lane, weight) in seeds.of_rows(0..a.len()) {
             z[lane as usize / WIDTH][i as usize][lane as usize % WIDTH] = scale * weight;
         }
@@ -88,7 +93,7 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
             a,
             schedule,
             seeds,
-            activity: Activity::new(schedule, seeds.groups(WIDTH)?, groups),
+            activity: Activity::new(schedule, seeds.groups(WIDTH, cancel)?, groups),
             z,
             previous,
             convergence: Convergence::default(),
@@ -113,27 +118,17 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
     }
 
     /// Applies `steps` one after the other; what was z before the last becomes the previous values.
-    #[expect(unsafe_code, reason = "threads share values by rows")]
     fn advance(&mut self, steps: &[Step<T>], cancel: &Cancel) -> Result<()> {
-        let values = [
-            SharedValues::new(&mut self.z),
-            SharedValues::new(&mut self.previous),
-        ];
-        self.schedule.run(steps.len(), cancel, |rows, step| {
-            let from_to = [&values[step % 2], &values[(step + 1) % 2]];
-            // SAFETY: nobody else is in these rows, and what they have edges from lies in them or in tiles next to
-            // them, which neither are behind `step`, so have its z, nor ahead of the step after it, so have not lost it
-            unsafe {
-                sweep(
-                    self.a,
-                    self.seeds,
-                    steps[step],
-                    &self.activity,
-                    from_to,
-                    rows,
-                );
-            }
-        })?;
+        let values = [&mut self.z[..], &mut self.previous];
+        take_steps(
+            self.a,
+            self.seeds,
+            self.schedule,
+            steps,
+            &self.activity,
+            values,
+            cancel,
+        )?;
         if steps.len() % 2 == 1 {
             std::mem::swap(&mut self.z, &mut self.previous);
         }

@@ -8,7 +8,7 @@ use super::convergence::{CONVERGED, MOST_SWEEPS};
 use super::schedule::ROWS_A_TASK;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect_parallel, zeros};
+use crate::memory::{tabulate, zeros};
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 
@@ -33,12 +33,13 @@ impl Products {
     /// the number of products, `None` as many as it takes.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] where `b` does not fit `a` or `n_labels`, and [`Error::OutOfMemory`].
+    /// [`Error::Mismatch`] where `b` does not fit `a` or `n_labels`, [`Error::OutOfMemory`] and [`Error::Cancelled`].
     pub fn new(
         a: PointGraph,
         b: PixelLabels,
         n_labels: usize,
         iterations: Option<usize>,
+        cancel: &Cancel,
     ) -> Result<Self> {
         b.check(a.len(), n_labels)?;
         let likelihoods = a.len().saturating_mul(n_labels);
@@ -47,8 +48,8 @@ impl Products {
             b,
             n_labels,
             iterations,
-            next: zeros(likelihoods)?,
-            z: zeros(likelihoods)?,
+            next: zeros(likelihoods, cancel)?,
+            z: zeros(likelihoods, cancel)?,
             done: 0,
             converged: false,
         })
@@ -85,10 +86,9 @@ impl Products {
     /// The likelihoods after the products done, row by row.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
-    pub fn likelihoods(&self) -> Result<Vec<f32>> {
-        let values = self.z.par_iter().with_min_len(ROWS_A_TASK);
-        collect_parallel(values.map(|&value| f32::from_f64(value)))
+    /// [`Error::OutOfMemory`] and [`Error::Cancelled`].
+    pub fn likelihoods(&self, cancel: &Cancel) -> Result<Vec<f32>> {
+        tabulate(self.z.len(), |at| f32::from_f64(self.z[at]), cancel)
     }
 
     fn run_product(&mut self, cancel: &Cancel) -> Result<()> {
@@ -132,18 +132,21 @@ mod tests {
 
     fn products_of_pair(iterations: Option<usize>) -> Products {
         let (a, b) = pair();
-        Products::new(a, b, 2, iterations).unwrap()
+        Products::new(a, b, 2, iterations, Cancel::never()).unwrap()
     }
 
     #[test]
     fn products_are_run_from_zero_one_after_another_and_no_more_than_asked_for() {
         let mut products = products_of_pair(Some(3));
-        assert_eq!(products.likelihoods().unwrap(), [0.0; 4]);
-        products.advance(1, Cancel::never()).unwrap();
-        assert_eq!(products.likelihoods().unwrap(), [0.5, 0.0, 0.0, 0.5]);
+        assert_eq!(products.likelihoods(Cancel::never()).unwrap(), [0.0; 4]);
         products.advance(1, Cancel::never()).unwrap();
         assert_eq!(
-            products.likelihoods().unwrap(),
+            products.likelihoods(Cancel::never()).unwrap(),
+            [0.5, 0.0, 0.0, 0.5]
+        );
+        products.advance(1, Cancel::never()).unwrap();
+        assert_eq!(
+            products.likelihoods(Cancel::never()).unwrap(),
             [0.625, 0.125, 0.125, 0.625]
         );
         assert!(!products.is_finished());
@@ -159,7 +162,7 @@ mod tests {
         // product t changes likelihoods by 2^-(t + 1), and 2^-17 < 1e-5 < 2^-16
         assert_eq!(products.done(), 16);
         for (value, expected) in products
-            .likelihoods()
+            .likelihoods(Cancel::never())
             .unwrap()
             .iter()
             .zip([0.75, 0.25, 0.25, 0.75])
@@ -172,7 +175,7 @@ mod tests {
     fn seeds_of_another_graph_are_refused() {
         let a = PointGraph::from_csr(vec![0, 1], vec![0], vec![1.0]).unwrap();
         let b = PixelLabels::from_csr(vec![0, 1], vec![4], vec![0.5], vec![0.5]).unwrap();
-        assert!(Products::new(a.clone(), b.clone(), 4, None).is_err());
-        assert!(Products::new(a, b, 5, None).is_ok());
+        assert!(Products::new(a.clone(), b.clone(), 4, None, Cancel::never()).is_err());
+        assert!(Products::new(a, b, 5, None, Cancel::never()).is_ok());
     }
 }

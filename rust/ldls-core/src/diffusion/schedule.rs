@@ -68,7 +68,7 @@ impl Schedule {
         let mut regions = with_room(tiles * schedule.round)?;
         regions.extend((0..tiles).map(|tile| (tile / size) as u32));
         if schedule.round > 1 {
-            let edges = schedule.tile_edges()?;
+            let edges = schedule.tile_edges(cancel)?;
             for step in 1..schedule.round {
                 cancel.check()?;
                 regions.extend_from_within((step - 1) * tiles..);
@@ -81,19 +81,19 @@ impl Schedule {
                 }
             }
         }
-        schedule.sort(&regions, tiles, size)?;
+        schedule.sort(&regions, tiles, size, cancel)?;
         Ok(schedule)
     }
 
     /// Sorts the tiles by region and step.
-    fn sort(&mut self, regions: &[u32], tiles: usize, size: usize) -> Result<()> {
+    fn sort(&mut self, regions: &[u32], tiles: usize, size: usize, cancel: &Cancel) -> Result<()> {
         let place = |at: usize| regions[at] as usize * self.round + at / tiles;
         let mut offsets = vec![0; tiles.div_ceil(size) * self.round + 1];
         (0..regions.len()).for_each(|at| offsets[place(at) + 1] += 1);
         for at in 1..offsets.len() {
             offsets[at] += offsets[at - 1];
         }
-        let mut order = zeros(regions.len())?;
+        let mut order = zeros(regions.len(), cancel)?;
         for at in 0..regions.len() {
             let next = &mut offsets[place(at)];
             order[*next] = (at % tiles) as u32;
@@ -107,10 +107,10 @@ impl Schedule {
     }
 
     /// The pairs of different tiles with edges from one to the other, some of them twice.
-    fn tile_edges(&self) -> Result<Vec<[u32; 2]>> {
+    fn tile_edges(&self, cancel: &Cancel) -> Result<Vec<[u32; 2]>> {
         let mut edges = Vec::new();
         // at which tile each was last met
-        let mut met = filled(u32::MAX, self.rows.div_ceil(TILE))?;
+        let mut met = filled(u32::MAX, self.rows.div_ceil(TILE), cancel)?;
         for block in 0..self.rows.div_ceil(BLOCK) {
             let tile = (block * BLOCK / TILE) as u32;
             met[tile as usize] = tile;
@@ -170,7 +170,7 @@ fn sources<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<(Vec<u32>, Vec
     let of_task = |task: usize| {
         let (mut sources, mut ends) = (Vec::new(), with_room(size)?);
         // at which block each was last met
-        let mut met = filled(u32::MAX, count)?;
+        let mut met = filled(u32::MAX, count, cancel)?;
         for block in task * size..count.min((task + 1) * size) {
             if block % BLOCKS_A_LOOK == 0 {
                 cancel.check()?;
@@ -277,7 +277,7 @@ mod tests {
         ) {
             let schedule = Schedule::in_regions(&graph(rows, &reaches), region, Cancel::never()).unwrap();
             let count = rows.div_ceil(TILE);
-            let edges = schedule.tile_edges().unwrap();
+            let edges = schedule.tile_edges(Cancel::never()).unwrap();
             let taken: Vec<AtomicUsize> = (0..count).map(|_| AtomicUsize::new(0)).collect();
             let violations = AtomicUsize::new(0);
             schedule.run(steps, Cancel::never(), |rows, step| {

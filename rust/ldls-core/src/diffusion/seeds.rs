@@ -2,9 +2,8 @@
 
 use super::schedule::{BLOCK, ROWS_A_TASK};
 use crate::masks::PixelLabels;
-use crate::memory::{collect, collect_parallel, push, with_room, zeros};
+use crate::memory::{collect, push, tabulate, with_room, zeros};
 use crate::{Cancel, Real, Result};
-use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;
 
@@ -97,19 +96,17 @@ impl<T: Real> Seeds<T> {
                 *of_label = Some(lane as u32);
             }
         }
-        let points = || (0..b.rows()).into_par_iter().with_min_len(ROWS_A_TASK);
         let background = |i: usize| {
             let weight = b.row(i).find(|&(label, _)| label == 0);
             weight.map_or(T::default(), |(_, weight)| weight)
         };
         let background = match lanes[..] {
-            [Some(0), ..] => collect_parallel(points().map(background))?,
-            _ => zeros(b.rows())?,
+            [Some(0), ..] => tabulate(b.rows(), background, cancel)?,
+            _ => zeros(b.rows(), cancel)?,
         };
-        cancel.check()?;
         let signed = |(label, weight): (usize, T)| T::from_f64(random_sign(label)) * weight;
         let probe = if lanes.contains(&None) {
-            collect_parallel(points().map(|i| b.row(i).map(signed).sum()))?
+            tabulate(b.rows(), |i| b.row(i).map(signed).sum(), cancel)?
         } else {
             Vec::new()
         };
@@ -149,7 +146,7 @@ impl<T: Real> Seeds<T> {
     }
 
     /// For each block of rows, bit g where lanes of group g have seeds.
-    pub(super) fn groups(&self, width: usize) -> Result<Vec<u8>> {
+    pub(super) fn groups(&self, width: usize, cancel: &Cancel) -> Result<Vec<u8>> {
         let rows = self.background.len();
         let probed = self.probe_lane().map_or(0, |lane| 1 << (lane / width));
         let full = self.background.iter().any(|&weight| weight > T::default());
@@ -160,7 +157,7 @@ impl<T: Real> Seeds<T> {
                 bits | 1 << (*lane as usize / width)
             })
         };
-        collect((0..rows).step_by(BLOCK).map(of_block))
+        collect((0..rows).step_by(BLOCK).map(of_block), cancel)
     }
 
     /// Row, lane and weight of each seed of `rows`, but for the background's and the probe's.

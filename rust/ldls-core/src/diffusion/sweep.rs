@@ -5,11 +5,11 @@
     reason = "threads share values by rows, and a check of every column takes a sixth of the time of a sweep"
 )]
 
-use super::schedule::{Activity, BLOCK};
+use super::schedule::{Activity, BLOCK, Schedule};
 use super::seeds::{BACKGROUND_LANE, Seeds};
 use super::values::SharedValues;
-use crate::Real;
 use crate::graph::PointGraph;
+use crate::{Cancel, Real, Result};
 use multiversion::multiversion;
 use std::hint::black_box;
 use std::ops::Range;
@@ -31,6 +31,25 @@ pub(super) struct Step<T> {
     pub(super) back: T,
 }
 
+/// Takes `steps` one after the other, each from the first of `values` to the second, which change places after it.
+pub(super) fn take_steps<T: Real, const WIDTH: usize>(
+    a: &PointGraph<T>,
+    seeds: &Seeds<T>,
+    schedule: &Schedule,
+    steps: &[Step<T>],
+    activity: &Activity,
+    values: [&mut [Vec<[T; WIDTH]>]; 2],
+    cancel: &Cancel,
+) -> Result<()> {
+    let values = values.map(SharedValues::new);
+    schedule.run(steps.len(), cancel, |rows, step| {
+        let from_to = [&values[step % 2], &values[(step + 1) % 2]];
+        // SAFETY: nobody else is in these rows, and what they have edges from lies in them or in tiles next to them,
+        // which neither are behind `step`, so have its z, nor ahead of the step after it, so have not lost it
+        unsafe { sweep(a, seeds, steps[step], activity, from_to, rows) }
+    })
+}
+
 /// Computes the active groups of the rows in `all`, which are whole blocks, of the second values from the first.
 ///
 /// # Safety
@@ -38,7 +57,7 @@ pub(super) struct Step<T> {
 /// a row in `all` has an edge from.
 // without fused multiply-add, which is not faster here, results are the same bits on every processor
 #[multiversion(targets("x86_64+avx2"))]
-pub(super) unsafe fn sweep<T: Real, const WIDTH: usize>(
+unsafe fn sweep<T: Real, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,

@@ -19,10 +19,7 @@ pub(super) fn zeros<T: Real, const WIDTH: usize>(
     cancel: &Cancel,
 ) -> Result<Vec<Vec<[T; WIDTH]>>> {
     // threads share out what the allocator has to clear
-    let group = |_| {
-        cancel.check()?;
-        memory::zeros(points)
-    };
+    let group = |_| memory::zeros(points, cancel);
     (0..groups).into_par_iter().map(group).collect()
 }
 

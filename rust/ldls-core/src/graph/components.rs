@@ -23,7 +23,7 @@ pub fn remove_outliers(
     at_depth: impl Fn(usize, u32) -> bool,
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
-    let indices = collect(0..labels.len() as u32)?;
+    let indices = collect(0..labels.len() as u32, cancel)?;
     remove_outliers_by_index(graph, labels, &indices, part_size, at_depth, cancel)
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn remove_outliers_by_index(
             Ok(())
         }
     };
-    let mut sets = DisjointSets::new(labels.len())?;
+    let mut sets = DisjointSets::new(labels.len(), cancel)?;
     for (i, &label) in labels.iter().enumerate() {
         look(i)?;
         if label == 0 {
@@ -64,9 +64,8 @@ pub(crate) fn remove_outliers_by_index(
             sets.join(i as u32, j as u32);
         }
     }
-    cancel.check()?;
-    let roots = collect((0..labels.len() as u32).map(|i| sets.root(i)))?;
-    let mut components = filled(Component::NONE, labels.len())?;
+    let roots = collect((0..labels.len() as u32).map(|i| sets.root(i)), cancel)?;
+    let mut components = filled(Component::NONE, labels.len(), cancel)?;
     for (i, (&root, &index)) in roots.iter().zip(indices).enumerate() {
         look(i)?;
         components[root as usize].add(root, index, labels[i] > 0 && at_depth(i, labels[i]));
@@ -78,7 +77,7 @@ pub(crate) fn remove_outliers_by_index(
         root == largest.root || (part_size < 1.0 && component.is_part_of(largest, part_size))
     };
     let kept = |(&label, &root): (&u32, &u32)| if stays(label, root) { label } else { 0 };
-    collect(labels.iter().zip(&roots).map(kept))
+    collect(labels.iter().zip(&roots).map(kept), cancel)
 }
 
 /// Points between two looks at the flag.
@@ -133,9 +132,9 @@ struct DisjointSets {
 }
 
 impl DisjointSets {
-    fn new(n: usize) -> Result<Self> {
+    fn new(n: usize, cancel: &Cancel) -> Result<Self> {
         Ok(Self {
-            parents: collect(0..n as u32)?,
+            parents: collect(0..n as u32, cancel)?,
         })
     }
 
@@ -181,7 +180,7 @@ mod tests {
     fn sets_are_joined_by_their_roots_whichever_elements_are_named() {
         // 3 is no root: joined itself, it would leave 2 behind
         for last in [[0, 3], [3, 0]] {
-            let mut sets = DisjointSets::new(5).unwrap();
+            let mut sets = DisjointSets::new(5, Cancel::never()).unwrap();
             for [a, b] in [[2, 3], [3, 4], last] {
                 sets.join(a, b);
             }

@@ -1,7 +1,7 @@
 //! The point graph as a sparse matrix (method, steps 3 and 4).
 
 use crate::masks::PixelLabels;
-use crate::memory::{collect, collect_parallel, with_room, zeros};
+use crate::memory::{collect, tabulate, with_room, zeros};
 use crate::neighbors::{Adjacency, Neighbors, squared_distance};
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
@@ -77,7 +77,7 @@ impl<T: Real> PointGraph<T> {
         }
         let adjacency = Adjacency {
             order: Vec::new(),
-            points: collect(points.iter().copied())?,
+            points: collect(points.iter().copied(), cancel)?,
             degree: k + 1,
             columns: Arc::new(columns),
         };
@@ -92,7 +92,7 @@ impl<T: Real> PointGraph<T> {
     ) -> Result<Self> {
         let points = &adjacency.points;
         let (count, degree) = (points.len(), adjacency.degree);
-        let mut weights = zeros(count * degree)?;
+        let mut weights = zeros(count * degree, cancel)?;
         let tasks = weights
             .par_chunks_mut(degree * ROWS_A_TASK)
             .zip(adjacency.columns.par_chunks(degree * ROWS_A_TASK))
@@ -213,19 +213,17 @@ impl<T: Real> PointGraph<T> {
                 problem,
             });
         }
-        let scale = |(i, mass): (usize, &T)| {
+        let scale = |i: usize| {
             let edges = &self.weights[self.layout.range(i..i + 1)];
-            let sum = edges.iter().map(|w| w.to_f64()).sum::<f64>() + mass.to_f64();
+            let sum = edges.iter().map(|w| w.to_f64()).sum::<f64>() + labels.mass[i].to_f64();
             // a row without edges stays empty rather than become NaN
             if sum > 0.0 { 1.0 / sum } else { 0.0 }
         };
-        let masses = labels.mass.par_iter().enumerate().with_min_len(ROWS_A_TASK);
-        let scales = collect_parallel(masses.map(scale))?;
-        cancel.check()?;
-        scale_rows(&mut self.weights, &scales, |rows| self.layout.range(rows));
-        cancel.check()?;
+        let scales = tabulate(self.len(), scale, cancel)?;
+        let range = |rows| self.layout.range(rows);
+        scale_rows(&mut self.weights, &scales, range, cancel)?;
         let range = |rows: Range<usize>| labels.offsets[rows.start]..labels.offsets[rows.end];
-        scale_rows(&mut labels.weights, &scales, range);
+        scale_rows(&mut labels.weights, &scales, range, cancel)?;
         labels
             .mass
             .iter_mut()
@@ -272,18 +270,14 @@ impl<T: Real> PointGraph<T> {
     /// Row starts, column indices and weights.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
-    pub fn into_csr(self) -> Result<(Vec<usize>, Vec<u32>, Vec<T>)> {
+    /// [`Error::OutOfMemory`] and [`Error::Cancelled`].
+    pub fn into_csr(self, cancel: &Cancel) -> Result<(Vec<usize>, Vec<u32>, Vec<T>)> {
         let offsets = match self.layout {
             Layout::Varied { offsets } => offsets,
-            Layout::Uniform { count, degree } => {
-                let mut offsets = with_room(count + 1)?;
-                offsets.extend((0..=count).map(|i| i * degree));
-                offsets
-            }
+            Layout::Uniform { count, degree } => tabulate(count + 1, |i| i * degree, cancel)?,
         };
-        let columns =
-            Arc::try_unwrap(self.columns).or_else(|shared| collect(shared.iter().copied()))?;
+        let columns = Arc::try_unwrap(self.columns)
+            .or_else(|shared| collect(shared.iter().copied(), cancel))?;
         Ok((offsets, columns, self.weights))
     }
 }
@@ -293,7 +287,8 @@ fn scale_rows<T: Real>(
     mut values: &mut [T],
     scales: &[f64],
     range: impl Fn(Range<usize>) -> Range<usize> + Sync,
-) {
+    cancel: &Cancel,
+) -> Result<()> {
     let mut tasks = Vec::with_capacity(scales.len().div_ceil(ROWS_A_TASK));
     for (task, scales) in scales.chunks(ROWS_A_TASK).enumerate() {
         let first = task * ROWS_A_TASK;
@@ -301,7 +296,9 @@ fn scale_rows<T: Real>(
         tasks.push((head, first, scales));
         values = tail;
     }
-    tasks.into_par_iter().for_each(|(values, first, scales)| {
+    let tasks = tasks.into_par_iter();
+    tasks.try_for_each(|(values, first, scales)| {
+        cancel.check()?;
         let start = range(first..first).start;
         for (i, &scale) in (first..).zip(scales) {
             let row = range(i..i + 1);
@@ -309,7 +306,8 @@ fn scale_rows<T: Real>(
                 .iter_mut()
                 .for_each(|value| rescale(value, scale));
         }
-    });
+        Ok(())
+    })
 }
 
 fn rescale<T: Real>(value: &mut T, scale: f64) {

@@ -27,7 +27,7 @@ type Histogram = [u32; STEPS];
 /// Turns `heights` of `places` above the smooth surface, in metres, into those above the ground around each.
 pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -> Result<()> {
     let (numbers, cells) = number_cells(places, cancel)?;
-    let mut counts: Vec<Histogram> = zeros(cells.len())?;
+    let mut counts: Vec<Histogram> = zeros(cells.len(), cancel)?;
     for (&number, height) in numbers.iter().zip(heights.iter()) {
         let step = (height + NEAR_M) / STEP_M;
         if (0.0..STEPS as f64).contains(&step) {
@@ -35,7 +35,7 @@ pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -
         }
     }
     cancel.check()?;
-    let mut offsets = zeros(cells.len())?;
+    let mut offsets = zeros(cells.len(), cancel)?;
     for (&cell, &number) in &cells {
         offsets[number] = offset(&around(&counts, &cells, cell));
     }

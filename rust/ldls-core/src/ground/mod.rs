@@ -6,13 +6,9 @@
 mod local;
 mod surface;
 
-use crate::memory::{collect_parallel, filled};
+use crate::memory::{filled, tabulate};
 use crate::{Camera, Cancel, Result};
-use rayon::prelude::*;
 use surface::Surface;
-
-/// Fewest points for a task of the thread pool.
-const POINTS_A_TASK: usize = 4096;
 
 /// Heights between which points belong to the ground, in metres: lower ones lie in a pit or under a surface that is not
 /// the ground, and up to the upper one there are the noise of a lidar and tufts of grass.
@@ -30,14 +26,11 @@ pub fn ground_heights(
     local: bool,
     cancel: &Cancel,
 ) -> Result<Vec<f64>> {
-    let places = points.par_iter().with_min_len(POINTS_A_TASK);
-    let places = collect_parallel(places.map(|point| camera.upright(point)))?;
-    cancel.check()?;
+    let places = tabulate(points.len(), |i| camera.upright(&points[i]), cancel)?;
     let Some(surface) = Surface::fit(&places, cancel)? else {
-        return filled(f64::NAN, points.len());
+        return filled(f64::NAN, points.len(), cancel);
     };
-    let heights = places.par_iter().with_min_len(POINTS_A_TASK);
-    let mut heights = collect_parallel(heights.map(|place| surface.height(place)))?;
+    let mut heights = tabulate(places.len(), |i| surface.height(&places[i]), cancel)?;
     if local {
         local::level(&places, &mut heights, cancel)?;
     }

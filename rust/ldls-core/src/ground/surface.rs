@@ -1,11 +1,9 @@
 //! A smooth ground: a surface of degree 5 through the lowest points of polar cells, fitted so that what stands on the
 //! ground does not count.
 
-use super::POINTS_A_TASK;
-use crate::memory::collect_parallel;
+use crate::memory::tabulate;
 use crate::{Cancel, Result};
 use nalgebra::{SMatrix, SVector};
-use rayon::prelude::*;
 
 /// Degree of the surface in x and y, and how many terms that is.
 const DEGREE: usize = 5;
@@ -57,8 +55,7 @@ impl Surface {
     /// The surface below `places`, relative to where they were seen from; none where too few of the lowest places lie on
     /// one, or where it lies above.
     pub(super) fn fit(places: &[[f64; 3]], cancel: &Cancel) -> Result<Option<Self>> {
-        let cells = lowest(places)?;
-        cancel.check()?;
+        let cells = lowest(places, cancel)?;
         Ok(Self::through(cells))
     }
 
@@ -165,8 +162,8 @@ fn terms_at(place: &[f64; 3]) -> Terms {
 }
 
 /// The lowest place of each cell that has one, in the order of the cells; of equally low ones the first.
-fn lowest(places: &[[f64; 3]]) -> Result<Vec<[f64; 3]>> {
-    let cells = collect_parallel(places.par_iter().with_min_len(POINTS_A_TASK).map(cell))?;
+fn lowest(places: &[[f64; 3]], cancel: &Cancel) -> Result<Vec<[f64; 3]>> {
+    let cells = tabulate(places.len(), |i| cell(&places[i]), cancel)?;
     let mut lowest: Vec<Option<[f64; 3]>> = vec![None; RINGS * SECTORS];
     for (place, cell) in places.iter().zip(cells) {
         let Some(cell) = cell else { continue };

@@ -40,7 +40,7 @@ impl LabelImage {
         let mut image = Self {
             height: masks.height(),
             width: masks.width(),
-            pixels: zeros(masks.height() * masks.width())?,
+            pixels: zeros(masks.height() * masks.width(), cancel)?,
             sets: vec![LabelSet { label: 0, rest: 0 }],
         };
         for (m, mask) in masks.masks().iter().enumerate() {

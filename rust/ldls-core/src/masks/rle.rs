@@ -1,7 +1,8 @@
 //! One mask as run lengths: column by column, runs of zeros and ones in turn, zeros first, as COCO has it.
 
-use crate::memory::zeros;
-use crate::{Error, Result};
+use crate::memory::collect;
+use crate::{Cancel, Error, Result};
+use std::iter::repeat_n;
 use std::ops::Range;
 
 /// Most pixels of an image: what Pillow takes for a decompression bomb.
@@ -222,7 +223,7 @@ impl Rle {
                 problem,
             });
         }
-        let mut pixels = zeros(height * width)?;
+        let mut pixels = collect(repeat_n(false, height * width), Cancel::never())?;
         for (column, rows) in self.column_spans() {
             if (left..left + width).contains(&column) {
                 let rows = rows.start.max(top)..rows.end.min(top + height);

@@ -36,7 +36,7 @@ impl Adjacency {
     ) -> Result<Self> {
         let points = arrange(&tree.order, &{ points }, cancel)?;
         let degree = k.min(points.len().saturating_sub(1)) + 1;
-        let mut columns = zeros(points.len() * degree)?;
+        let mut columns = zeros(points.len() * degree, cancel)?;
         let tasks = columns
             .par_chunks_mut(degree * FAN * LEAVES_A_TASK)
             .enumerate();

@@ -6,7 +6,7 @@
 use super::adjacency::Adjacency;
 use super::candidates::squared_distance;
 use super::kdtree::{KdTree, Leaf, arrange};
-use crate::memory::{with_room, zeros};
+use crate::memory::{collect, with_room, zeros};
 use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -54,13 +54,13 @@ pub(super) fn search(points: &[[f64; 3]], k: usize, cancel: &Cancel) -> Result<A
         order.extend_from_slice(members.of(place));
     }
     first.push(order.len());
-    let mut position = zeros(points.len())?;
+    let mut position = zeros(points.len(), cancel)?;
     for (at, &index) in order.iter().enumerate() {
         position[index as usize] = at as u32;
     }
     cancel.check()?;
 
-    let mut columns = zeros(points.len() * degree)?;
+    let mut columns = zeros(points.len() * degree, cancel)?;
     let mut tasks: Vec<(Range<usize>, &mut [u32])> = Vec::new();
     let mut rest = &mut columns[..];
     for start in (0..nearest.order.len()).step_by(PLACES_A_TASK) {
@@ -150,7 +150,7 @@ struct Members {
 
 impl Members {
     fn new(place_of: &[u32], places: usize, cancel: &Cancel) -> Result<Self> {
-        let mut offsets = zeros(places + 1)?;
+        let mut offsets = zeros(places + 1, cancel)?;
         for &place in place_of {
             offsets[place as usize + 1] += 1;
         }
@@ -158,9 +158,8 @@ impl Members {
             offsets[place] += offsets[place - 1];
         }
         cancel.check()?;
-        let mut next = with_room(places)?;
-        next.extend_from_slice(&offsets[..places]);
-        let mut indices = zeros(place_of.len())?;
+        let mut next = collect(offsets[..places].iter().copied(), cancel)?;
+        let mut indices = zeros(place_of.len(), cancel)?;
         for (index, &place) in place_of.iter().enumerate() {
             indices[next[place as usize]] = index as u32;
             next[place as usize] += 1;

@@ -5,7 +5,7 @@
 //! kept in single precision. [`KdTree::rounding`] says by how much they differ from the points given: not
 //! at all where those came in single precision.
 
-use crate::memory::collect_parallel;
+use crate::memory::tabulate;
 use crate::{Cancel, Result};
 use rayon::prelude::*;
 
@@ -64,16 +64,15 @@ impl KdTree {
             ]
             .map(|c| c as f32)
         };
-        let item = |(index, point): (usize, &[f64; 3])| Item {
-            xyz: local(point),
+        let item = |index: usize| Item {
+            xyz: local(&points[index]),
             index: index as u32,
         };
-        let mut items = collect_parallel(points.par_iter().enumerate().map(item))?;
+        let mut items = tabulate(points.len(), item, cancel)?;
         sort(&mut items, cancel)?;
-        let leaves = collect_parallel(items.par_chunks(FAN).map(Leaf::new))?;
-        cancel.check()?;
+        let leaves = of_fans(&items, Leaf::new, cancel)?;
         let levels = levels(&items, cancel)?;
-        let order = collect_parallel(items.par_iter().map(|item| item.index))?;
+        let order = tabulate(items.len(), |at| items[at].index, cancel)?;
         Ok(Self {
             order,
             leaves,
@@ -95,12 +94,17 @@ pub(crate) fn arrange<T: Copy + Send + Sync>(
     values: &[T],
     cancel: &Cancel,
 ) -> Result<Vec<T>> {
-    // most time goes into fetching values from all over memory: once cancelled, the first one stands for all
-    let place = |&index: &u32| if cancel.check().is_ok() { index } else { 0 };
-    let value = |index: &u32| values[place(index) as usize];
-    let arranged = collect_parallel(order.par_iter().with_min_len(PARALLEL).map(value))?;
-    cancel.check()?;
-    Ok(arranged)
+    tabulate(order.len(), |at| values[order[at] as usize], cancel)
+}
+
+/// What `make` makes of every [`FAN`] values that follow one another.
+fn of_fans<T: Sync, U: Send>(
+    values: &[T],
+    make: impl Fn(&[T]) -> U + Sync,
+    cancel: &Cancel,
+) -> Result<Vec<U>> {
+    let of_fan = |fan: usize| make(&values[fan * FAN..values.len().min((fan + 1) * FAN)]);
+    tabulate(values.len().div_ceil(FAN), of_fan, cancel)
 }
 
 impl Leaf {
@@ -262,13 +266,12 @@ fn levels(items: &[Item], cancel: &Cancel) -> Result<Vec<Vec<Boxes>>> {
         first: item.index,
     };
     let around_leaf = |items: &[Item]| Hull::around(items.iter().map(of_point));
-    let mut hulls = collect_parallel(items.par_chunks(FAN).map(around_leaf))?;
+    let mut hulls = of_fans(items, around_leaf, cancel)?;
     let mut levels = Vec::new();
     loop {
-        cancel.check()?;
-        levels.push(collect_parallel(hulls.par_chunks(FAN).map(Boxes::new))?);
+        levels.push(of_fans(&hulls, Boxes::new, cancel)?);
         let around = |hulls: &[Hull]| Hull::around(hulls.iter().copied());
-        hulls = collect_parallel(hulls.par_chunks(FAN).map(around))?;
+        hulls = of_fans(&hulls, around, cancel)?;
         if hulls.len() <= 1 {
             return Ok(levels);
         }

@@ -14,7 +14,7 @@ pub(crate) use adjacency::Adjacency;
 pub(crate) use candidates::squared_distance;
 pub(crate) use kdtree::arrange;
 
-use crate::memory::{with_room, zeros};
+use crate::memory::{collect, zeros};
 use crate::{Cancel, Error, Result};
 use kdtree::KdTree;
 use rayon::prelude::*;
@@ -38,11 +38,10 @@ impl Neighbors {
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
     pub fn search(points: &[[f64; 3]], k: usize, cancel: &Cancel) -> Result<Self> {
-        let mut copy = with_room(points.len())?;
-        copy.extend_from_slice(points);
+        let copy = collect(points.iter().copied(), cancel)?;
         let adjacency = search(copy, k, cancel)?;
         let (order, k) = (&adjacency.order, adjacency.degree - 1);
-        let mut indices = zeros(points.len() * k)?;
+        let mut indices = zeros(points.len() * k, cancel)?;
         if k > 0 {
             let rows = adjacency.columns.chunks(adjacency.degree);
             for (at, (&index, row)) in order.iter().zip(rows).enumerate() {
@@ -63,7 +62,7 @@ impl Neighbors {
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
     pub fn squared_distances(&self, points: &[[f64; 3]], cancel: &Cancel) -> Result<Vec<f64>> {
-        let mut squared = zeros(self.indices.len())?;
+        let mut squared = zeros(self.indices.len(), cancel)?;
         let entries = self.k.max(1) * POINTS_A_TASK;
         let tasks = squared
             .par_chunks_mut(entries)

@@ -5,11 +5,10 @@ use super::view::View;
 use crate::depth::DepthGroups;
 use crate::ground::{ground_heights, is_ground};
 use crate::masks::PixelLabels;
-use crate::memory::{collect, collect_parallel, filled, push, with_room};
+use crate::memory::{collect, filled, push, tabulate, with_room};
 use crate::neighbors::arrange;
 use crate::projection::{Cloud, InView, Sighting, project};
 use crate::{Cancel, Params, Real, Result};
-use rayon::prelude::*;
 
 /// Slot of points that an image does not see.
 const UNSEEN: u32 = u32::MAX;
@@ -46,9 +45,8 @@ impl<'a> Images<'a> {
         let mut in_view = project(cloud, &images, keep_origin, cancel)?;
         let sightings = std::mem::take(&mut in_view.sightings);
         let points = in_view.indices.len();
-        let slots = sightings.iter().map(|own| slots(own, points));
+        let slots = sightings.iter().map(|own| slots(own, points, cancel));
         let slots = slots.collect::<Result<Vec<_>>>()?;
-        cancel.check()?;
         let shared = |one: usize, other: usize| {
             let slots = slots[one].iter().zip(&slots[other]);
             let both = slots.filter(|(one, other)| **one != UNSEEN && **other != UNSEEN);
@@ -67,7 +65,7 @@ impl<'a> Images<'a> {
             slots,
             sightings,
             objects,
-            heights: filled(f64::NAN, points)?,
+            heights: filled(f64::NAN, points, cancel)?,
             depths: Vec::new(),
         };
         Ok((in_view, images))
@@ -88,13 +86,15 @@ impl<'a> Images<'a> {
         if !params.need_depth() {
             return Ok(());
         }
-        let standing = collect(self.heights.iter().map(|&height| !is_ground(height)))?;
+        let standing = collect(
+            self.heights.iter().map(|&height| !is_ground(height)),
+            cancel,
+        )?;
         let of_view = |(view, sighting): (&View, &Sighting)| {
-            cancel.check()?;
-            let seen = sighting.seen.par_iter().with_min_len(POINTS_A_TASK);
-            let distance = |&point: &u32| view.camera.distance(&points[point as usize]);
-            let distances = collect_parallel(seen.map(distance))?;
-            let standing = arrange(&sighting.seen, &standing, cancel)?;
+            let seen = &sighting.seen;
+            let distance = |at: usize| view.camera.distance(&points[seen[at] as usize]);
+            let distances = tabulate(seen.len(), distance, cancel)?;
+            let standing = arrange(seen, &standing, cancel)?;
             view.masks
                 .depth_groups(&sighting.uv, distances, &standing, params, cancel)
         };
@@ -207,8 +207,8 @@ impl<'a> Images<'a> {
 }
 
 /// Position of each of `n` points in view in a sighting.
-fn slots(sighting: &Sighting, n: usize) -> Result<Vec<u32>> {
-    let mut slots = filled(UNSEEN, n)?;
+fn slots(sighting: &Sighting, n: usize, cancel: &Cancel) -> Result<Vec<u32>> {
+    let mut slots = filled(UNSEEN, n, cancel)?;
     for (slot, &point) in sighting.seen.iter().enumerate() {
         slots[point as usize] = slot as u32;
     }
