@@ -252,62 +252,6 @@ def in_a_process(code, **options):
     )
 
 
-LONG_CALL = """
-import threading, time
-import numpy as np
-import ldls
-points = np.random.default_rng(0).uniform([-4, -3, 9], [4, 3, 11], (1_000_000, 3))
-masks = ldls.InstanceMasks.from_boxes([[20, 20, 40, 40]], (60, 80))
-camera = ldls.Camera(projection=[[100, 0, 40], [0, 100, 30], [0, 0, 1]])
-started = threading.Event()
-def work():
-    started.set()
-    ldls.segment(points, masks, camera)
-threading.Thread(target=work, daemon=True).start()
-started.wait()
-time.sleep(0.05)
-"""
-
-
-def test_an_interpreter_ends_in_the_middle_of_a_call_without_a_crash():
-    ended = in_a_process(LONG_CALL)
-    assert (ended.returncode, ended.stderr) == (0, "")
-
-
-def test_the_package_can_be_imported_again():
-    code = """
-import importlib, sys
-import ldls
-first = ldls.Params()
-importlib.reload(ldls)
-for name in [name for name in sys.modules if name.split(".")[0] == "ldls" and not name.endswith("_ldls")]:
-    del sys.modules[name]
-import ldls
-assert ldls.segment([[0.0, 0, 9]], ldls.InstanceMasks.from_boxes([], (60, 80)),
-    ldls.Camera(projection=[[100, 0, 40], [0, 100, 30], [0, 0, 1]])).labels.tolist() == [0]
-print("well")
-"""
-    ended = in_a_process(code)
-    assert (ended.returncode, ended.stdout) == (0, "well\n"), ended.stderr
-
-
-@pytest.mark.skipif(sys.version_info >= (3, 13), reason="the module has another name")
-def test_a_subinterpreter_works_or_says_why_not():
-    code = """
-import _xxsubinterpreters as interpreters
-import ldls
-one = interpreters.create()
-try:
-    interpreters.run_string(one, "import ldls")
-except interpreters.RunFailedError as error:
-    assert "ImportError" in str(error), error
-interpreters.destroy(one)
-print(ldls.Params().neighbors)
-"""
-    ended = in_a_process(code)
-    assert (ended.returncode, ended.stdout) == (0, "10\n"), ended.stderr
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity")
 def test_one_pool_has_as_many_threads_as_the_process_may_use():
     code = """

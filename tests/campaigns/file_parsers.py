@@ -34,9 +34,12 @@ from ldls.batch.journal import JOURNAL_NAME, Journal
 from ldls.datasets import nuscenes_tables
 from ldls.datasets.folder_description import read_description
 from ldls.datasets.nuscenes_frame import NuScenesFrameSource
+from ldls.datasets.ros_transforms import given_transforms
 from ldls.errors import FileFormatError, LdlsError
 from ldls.io.images import read_image_size
 from ldls.io.labels import read_kitti_objects, read_labeling, write_annotations, write_labeling
+from ldls.io.labels.labeling_npz import read_confidence_npz
+from ldls.io.labels.squeezeseg import read_squeezeseg_ranges
 from ldls.io.ros.bags import Bag, open_bag
 from ldls.io.ros.images import decode_compressed, decode_image
 from ldls.io.ros.messages import (
@@ -59,6 +62,7 @@ from segmenters import graphs
 
 N_POINTS = 12
 T_CAMERA_LIDAR = layouts.T
+CAMERA = pinhole(T_camera_lidar=T_CAMERA_LIDAR)
 BETWEEN_FILES = b"\n<<another file>>\n"
 AS_THEY_ARE = b"".join
 SHARE_AS_A_WHOLE = 0.2
@@ -77,6 +81,7 @@ class Parser:
         text: True if words and lines are changed, not bytes alone.
         gentle: Share of the files that are changed so that they may still be whole.
         allowed: Errors of the system that the reader promises.
+        names_file: True if its errors name the file, or its folder.
     """
 
     files: tuple[str, ...]
@@ -86,6 +91,7 @@ class Parser:
     text: bool = False
     gentle: float = 0.2
     allowed: tuple[type[Exception], ...] = ()
+    names_file: bool = True
 
     def place(self, folder, content):
         """Write `content` below `folder`; the path to read."""
@@ -102,8 +108,11 @@ class Parser:
         path = self.place(folder, content)
         try:
             self.read(path)
-        except (LdlsError, *self.allowed):
+        except self.allowed:
             return "refused"
+        except LdlsError as error:
+            named = not self.names_file or any(name in str(error) for name in (*self.files, folder.name))
+            return "refused" if named else f"{place_of(error)} without the name of the file"
         except MemoryError:
             return "fat"
         except BaseException as error:  # panics of libraries are no Exceptions
@@ -414,6 +423,9 @@ roi: {x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false}
 """
 
 
+TRANSFORMS = f"# lidar to camera\n{layouts.row(layouts.T[:3])}\n"
+
+
 def read_camera(**options):
     return lambda path: ldls.read_camera(path, **options)
 
@@ -639,16 +651,20 @@ PARSERS: dict[str, Parser] = {
     "points .laz layered": Parser(("a.laz",), las(6, 7, packed=True), ldls.read_points),
     "points .csv": Parser(("a.csv",), texts(CSV, SEMICOLONS), ldls.read_points, text=True),
     "points .txt": Parser(("a.txt",), texts(rows_of_text(cloud()), "# made\n1 2 3\n"), ldls.read_points, text=True),
-    "message PointCloud2": Parser(("a.cdr",), message("/points"), read_message("/points")),
+    "message PointCloud2": Parser(("a.cdr",), message("/points"), read_message("/points"), names_file=False),
     "message Image": Parser(
         ("a.cdr",),
         message("/image", lambda: ros_samples.image(ROS2, ros_samples.picture(size=(4, 6))[..., 0], "bayer_rggb8")),
         read_message("/image"),
+        names_file=False,
     ),
     "message CompressedImage": Parser(
-        ("a.cdr",), message("/compressed", lambda: compressed(ROS2, "PNG")), read_message("/compressed")
+        ("a.cdr",),
+        message("/compressed", lambda: compressed(ROS2, "PNG")),
+        read_message("/compressed"),
+        names_file=False,
     ),
-    "message CameraInfo": Parser(("a.cdr",), message("/info"), read_message("/info")),
+    "message CameraInfo": Parser(("a.cdr",), message("/info"), read_message("/info"), names_file=False),
     "bag ROS 1": Parser(("a.bag",), bag_ros1, read_bag),
     "bag .db3": Parser(("a.db3",), bag_ros2("SQLITE3"), read_bag),
     "bag .mcap": Parser(("a.mcap",), bag_ros2("MCAP"), read_bag),
@@ -701,6 +717,19 @@ PARSERS: dict[str, Parser] = {
     "labels .npz": Parser(
         ("a.npz",), members(lambda path: write_labeling(path, LABELING)), read_labeling, packed_members, gentle=0.5
     ),
+    "labels KITTI boxes": Parser(
+        ("a.txt",),
+        texts(OBJECTS),
+        lambda path: read_labeling(path, format="kitti-boxes", points=cloud(), camera=CAMERA),
+        text=True,
+    ),
+    "labels confidence": Parser(
+        ("a.npz",),
+        members(lambda path: np.savez(path, confidence=np.linspace(0, 1, 5, dtype=np.float32))),
+        read_confidence_npz,
+        packed_members,
+        gentle=0.5,
+    ),
     "labels annotations": Parser(
         ("a.txt",),
         written(lambda path: write_annotations(path, LABELING)),
@@ -708,8 +737,14 @@ PARSERS: dict[str, Parser] = {
         text=True,
     ),
     "result .npz": Parser(("a.npz",), members(result(1), result(2)), ldls.read_result, packed_members),
+    "ranges squeezeseg": Parser(
+        ("a.npy",), lambda _: [[npy(np.ones((64, 512, 6), np.float32))]], read_squeezeseg_ranges
+    ),
     "image PNG": Parser(("a.png",), png_parts(*picture("PNG", "RGB", "P", "RGBA")), read_image, packed_png),
     "image JPEG": Parser(("a.jpg",), written(*picture("JPEG", "RGB", "L")), read_image),
+    "transforms .txt": Parser(
+        ("a.txt",), texts(TRANSFORMS), lambda path: given_transforms(path, ["/image"]), text=True
+    ),
     "folder ldls.toml": Parser(("ldls.toml",), texts(layouts.FOLDER_TOML), read_description, text=True),
     "nuScenes tables": Parser(NUSCENES_TABLES, nuscenes, read_tables, BETWEEN_FILES.join, text=True),
     "nuScenes frame.json": Parser(

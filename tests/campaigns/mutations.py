@@ -1,7 +1,17 @@
 """Files changed at random: bytes, numbers that lie, words, lines and parts; the same for the same generator."""
 
+import io
 import re
 import struct
+
+import numpy as np
+
+
+def _npy(array):
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
 
 NUMBERS = (
     0, 1, -1, 2, 3, 127, 128, 255, 256, 32767, 65535, 10**6, 2**28, 2**31 - 1, 2**31, 2**32 - 1, 2**53 + 1, 2**63 - 1,
@@ -16,6 +26,15 @@ WORDS = (
     b"#", b":", b",",
 )  # fmt: skip
 """Words that are no numbers, or no numbers that fit, and signs that text formats are made of."""
+ARRAYS = tuple(
+    _npy(np.array(values))
+    for values in (
+        [], 5, True, 2**63, -(2**40), "", "text", "null", "1" * 5000, "[" * 100_000, '{"a": 1e999}', b"x", 1 + 2j,
+        [np.nan, -np.inf], ["a", "b"], np.zeros((0, 3), np.float32), np.zeros((2, 2)), np.zeros((1, 1, 1, 1, 1)),
+        np.zeros(3, [("a", "<f4")]), np.datetime64("2020-01-01"), np.zeros(2, "U0"),
+    )
+)  # fmt: skip
+"""NumPy files that belong nowhere."""
 WORD = re.compile(rb"[^\s,:;\[\]{}()\"'=]+")
 DIGITS = re.compile(rb"\d+")
 LAYOUTS = ("<B", "<H", "<I", "<Q", ">H", ">I", ">Q")
@@ -179,12 +198,32 @@ def _lines(content, random_, other):
     return b"".join(lines)
 
 
+def _another_array(content, random_, _):
+    """In the place of a NumPy file one of another kind."""
+    return random_.choice(ARRAYS) if content.startswith(b"\x93NUMPY") else content
+
+
 def _ends_early(content, random_, _):
     """Without the last few bytes, as a copy that stopped has it."""
     return content[: len(content) - random_.randrange(1, 9)]
 
 
-BYTE_CHANGES = (_flip, _set, _cut, _delete, _count, _count, _insert, _double, _blank, _move, _splice, _copy_over, _swap)
+BYTE_CHANGES = (
+    _flip,
+    _set,
+    _cut,
+    _delete,
+    _count,
+    _count,
+    _insert,
+    _double,
+    _blank,
+    _move,
+    _splice,
+    _copy_over,
+    _swap,
+    _another_array,
+)
 TEXT_CHANGES = (_another_word, _another_number, _another_digit, _another_digit, _lines, _ends_early, _insert, _splice)
 GENTLE_CHANGES = (_flip, _swap)
 GENTLE_TEXT_CHANGES = (_another_digit, _ends_early, _lines)

@@ -21,7 +21,8 @@ from ldls.errors import CorruptFileError
 
 DEEDS = {
     b"read": lambda: None,
-    b"refuse": lambda: (_ for _ in ()).throw(CorruptFileError("refused")),
+    b"refuse": lambda: (_ for _ in ()).throw(CorruptFileError("a.txt: refused")),
+    b"refuse without a name": lambda: (_ for _ in ()).throw(CorruptFileError("refused")),
     b"lose its way": lambda: {}["key"],
     b"crash": lambda: os.kill(os.getpid(), signal.SIGSEGV),
     b"hang": lambda: time.sleep(1000),
@@ -59,8 +60,15 @@ def test_each_kind_of_fault_is_told_from_the_others(tmp_path, monkeypatch, capsy
     options = Namespace(inputs=len(DEEDS), seconds=1000, seed=3, jobs=1, out=tmp_path / "faults")
     assert parsers.campaign("deeds", options) == len(DEEDS) - 2
     row, *faults = capsys.readouterr().out.splitlines()
-    assert row.split()[:8] == ["deeds", "8", "12.5%", "1", "1", "1", "2", "2"]
+    assert row.split()[:8] == ["deeds", "9", "11.1%", "1", "2", "1", "2", "2"]
     told = {line.partition(" x ")[2].partition(":")[0] for line in faults}
-    assert told == {"KeyError at outside of ldls", "crash, exit code -11", "slow, over 8 s", "slow", "fat"}
-    assert any(line.endswith("--parser deeds --seed 3 --only 3") for line in faults)
-    assert (tmp_path / "faults/deeds-3-3").read_bytes() == b"crash"
+    assert told == {
+        "CorruptFileError at outside of ldls without the name of the file",
+        "KeyError at outside of ldls",
+        "crash, exit code -11",
+        "slow, over 8 s",
+        "slow",
+        "fat",
+    }
+    assert any(line.endswith("--parser deeds --seed 3 --only 4") for line in faults)
+    assert (tmp_path / "faults/deeds-3-4").read_bytes() == b"crash"
