@@ -753,7 +753,7 @@ PARSERS: dict[str, Parser] = {
         read_frame,
         BETWEEN_FILES.join,
         text=True,
-        allowed=(FileNotFoundError,),
+        allowed=(OSError,),
     ),
     "journal": Parser((JOURNAL_NAME,), journals, read_journal, text=True),
     "model .onnx": Parser(("a.onnx",), model, read_onnx),

@@ -40,7 +40,8 @@ def rigid(place: str, matrix: Matrix) -> Matrix:
         CalibrationError: It does something else; the message has the deviation.
     """
     rotation = matrix[:3, :3]
-    deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are no rotation's
+        deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if not deviation <= ROTATION_LIMIT:
         raise CalibrationError(
             f"{place}: R^T R deviates by {deviation:.3g} from the identity, expected a rotation to {ROTATION_LIMIT}"

@@ -36,7 +36,9 @@ def read_yaml(path: str | PathLike[str]) -> Fields:
         if text.lstrip().startswith("<"):
             raise UnsupportedFormatError("got XML, expected YAML; save the calibration as .yml or .yaml")
         try:
-            entries = yaml.load(_without_opencv_directive(text), _loader(yaml))
+            text = _without_opencv_directive(text)
+            _check_growth(yaml, text)
+            entries = yaml.load(text, _loader(yaml))
         except yaml.YAMLError as error:
             raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({getattr(error, 'problem', error)})") from None
         if not isinstance(entries, Mapping):
@@ -49,8 +51,30 @@ def _without_opencv_directive(text: str) -> str:
     return f"#{text}" if text.startswith("%YAML:") else text
 
 
+def _check_growth(yaml: Any, text: str) -> None:  # noqa: ANN401
+    """Refuse what lets content grow beyond its text: aliases, and nesting without end."""
+    depth = 0
+    for event in yaml.parse(text, _safe_loader(yaml)):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if isinstance(event, yaml.AliasEvent):
+            problem = "aliases are not read; write the value out"
+        elif depth > MAX_DEPTH:
+            problem = f"more than {MAX_DEPTH} levels of nesting"
+        else:
+            continue
+        raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+
+
+def _safe_loader(yaml: Any) -> Any:  # noqa: ANN401
+    """The fast one, where the library was built with it."""
+    return getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
 def _loader(yaml: Any) -> Any:  # noqa: ANN401
-    """The bounded loader, which also knows OpenCV's matrices and refuses a key that stands there twice."""
+    """The safe loader, which also knows OpenCV's matrices and refuses a key that stands there twice.
+
+    Digits with colons are text, as in YAML 1.2, not numbers to the base 60, which take long to reckon.
+    """
 
     def mapping(loader: Any, node: Any) -> dict[object, object]:  # noqa: ANN401
         seen: set[str] = set()
@@ -65,36 +89,13 @@ def _loader(yaml: Any) -> Any:  # noqa: ANN401
         entries: dict[object, object] = loader.construct_mapping(node, deep=True)
         return entries
 
-    loader: Any = type("CalibrationLoader", (_bounded_loader(yaml),), {})
-    for tag in (MAPPING, OPENCV_MATRIX):
-        loader.add_constructor(tag, mapping)
-    return loader
-
-
-def _bounded_loader(yaml: Any) -> Any:  # noqa: ANN401
-    """The safe loader without what lets content grow beyond its text.
-
-    There are no aliases, and digits with colons are text, as in YAML 1.2, not numbers to the base 60.
-    """
-
-    def compose_node(loader: Any, parent: Any, index: Any) -> Any:  # noqa: ANN401
-        event = loader.peek_event()
-        if isinstance(event, yaml.AliasEvent):
-            problem = "aliases are not read; write the value out"
-            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
-        if loader.depth == MAX_DEPTH:
-            problem = f"more than {MAX_DEPTH} levels of nesting"
-            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
-        loader.depth += 1
-        node = yaml.SafeLoader.compose_node(loader, parent, index)
-        loader.depth -= 1
-        return node
-
     def number(loader: Any, node: Any) -> object:  # noqa: ANN401
         text = loader.construct_scalar(node)
         return text if ":" in text else yaml.SafeLoader.yaml_constructors[node.tag](loader, node)
 
-    loader: Any = type("BoundedLoader", (yaml.SafeLoader,), {"compose_node": compose_node, "depth": 0})
+    loader: Any = type("CalibrationLoader", (_safe_loader(yaml),), {})
+    for tag in (MAPPING, OPENCV_MATRIX):
+        loader.add_constructor(tag, mapping)
     for tag in NUMBERS:
         loader.add_constructor(tag, number)
     return loader
