@@ -335,4 +335,35 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_series_that_grows_without_end_on_a_ring_of_one_way_is_given_up() {
+        let n = 9;
+        // what a point passes on, more goes one way than the other; few have pixel edges
+        let columns = (0..n).flat_map(|i| [(i + 1) % n, (i + n - 1) % n]);
+        let a = PointGraph::from_csr(
+            (0..=n as usize).map(|i| 2 * i).collect(),
+            columns.collect(),
+            [1.0_f32, 0.958].repeat(n as usize),
+        );
+        let b = PixelLabels {
+            offsets: vec![0, 1, 2, 2, 2, 2, 3, 3, 3, 3],
+            labels: vec![0; 3],
+            weights: vec![0.024, 0.018, 0.004],
+            mass: vec![0.024, 0.018, 0.002, 0.0, 0.0, 0.004, 0.0, 0.0, 0.002],
+        };
+        let (mut a, mut b) = (a.unwrap(), b);
+        a.normalize_rows(&mut b, Cancel::never()).unwrap();
+        assert!(Series::of_graph(&a, None, TOLERANCE_F32).is_some());
+        let [plain, endless] = [Some(MANY), None].map(|iterations| {
+            let found = likelihoods(&a, &b, 1, iterations, Cancel::never());
+            found.unwrap().0
+        });
+        for (endless, plain) in endless.iter().zip(&plain) {
+            assert!((endless - plain).abs() < 0.01, "{endless} for {plain}");
+        }
+    }
+
+    /// Products after which next to nothing changes.
+    const MANY: usize = 20_000;
 }

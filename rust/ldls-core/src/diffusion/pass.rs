@@ -183,7 +183,8 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
                 let value = group[i][*lane].to_f64();
                 sum += value;
                 value >= -SLACK
-            }) && sum <= overlap + SLACK
+            }) && sum.is_finite()
+                && sum <= overlap + SLACK
         };
         let points = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
         self.convergence.error <= LARGEST_ERROR && points.all(row_is_sound)

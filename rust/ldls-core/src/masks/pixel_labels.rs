@@ -198,11 +198,8 @@ impl<T: Real> PixelLabels<T> {
         let overlap = |i: usize| {
             let mass = self.mass[i].to_f64();
             let weights: f64 = self.row(i).map(|(_, weight)| weight.to_f64()).sum();
-            if mass > 0.0 {
-                weights / mass
-            } else {
-                f64::INFINITY
-            }
+            // a point without pixel edges counts for none
+            if weights > 0.0 { weights / mass } else { 0.0 }
         };
         (0..self.rows()).map(overlap).fold(1.0, f64::max)
     }
