@@ -23,6 +23,7 @@ def test_real_frames_get_the_reference_labels(kitti_frame, threads):
     np.testing.assert_allclose(result.confidence[in_view], z.max(axis=1) / z.sum(axis=1), atol=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::ldls.errors.UprightWarning")
 @pytest.mark.parametrize("added", [False, True], ids=["paper", "best"])
 @pytest.mark.parametrize("seed", range(200))
 @pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")

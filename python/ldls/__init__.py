@@ -2,7 +2,7 @@
 
 from ldls import stages
 from ldls._ldls import __version__
-from ldls.camera import Camera, Distortion
+from ldls.camera import Camera, Distortion, extrinsic
 from ldls.errors import (
     CalibrationError,
     CorruptFileError,
@@ -73,6 +73,7 @@ __all__ = [
     "View",
     "__version__",
     "explain",
+    "extrinsic",
     "read_camera",
     "read_image",
     "read_masks",

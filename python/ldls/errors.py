@@ -137,6 +137,10 @@ class NoUsablePoints(LdlsWarning):
     """No point has finite coordinates."""
 
 
+class UprightWarning(LdlsWarning):
+    """What is up to the lidar does not point up in an image."""
+
+
 class NothingInView(LdlsWarning):
     """No point is in view, or none of those in view is on a mask."""
 

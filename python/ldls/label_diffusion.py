@@ -22,11 +22,12 @@ from ldls.errors import (
     ParameterError,
     PrecisionWarning,
     ScaleWarning,
+    UprightWarning,
 )
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Instance, Report, Segmentation
-from ldls.view import SeenView, View
+from ldls.view import SeenView, View, camera_names
 
 COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
@@ -34,6 +35,8 @@ WIDEST_CLOUD_M = 10_000.0
 """Extent beyond which the unit is probably not the metre."""
 EXPECTED_ON_MASKS = 20.0
 """Points that masks of this area would have on them by chance, from which on none at all is no chance."""
+ALONG_Z = 0.7
+"""Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
 SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
@@ -267,9 +270,25 @@ def _warn(result: Segmentation, report: Mapping[str, Any]) -> None:
     if report["only_islands"]:
         message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
         _warning(message, DuplicateWarning)
+    leaning = [name for name, seen in zip(camera_names(result.views), result.views, strict=True) if _leans(seen)]
+    if leaning:
+        _warning(
+            f"T_camera_lidar of {', '.join(leaning)}: z of the lidar does not point up in the image; is it the "
+            "inverse, or is the turn to the optical frame missing (x right, y down, z forward)?",
+            UprightWarning,
+        )
     doubt = nothing_in_view(result)
     if doubt is not None:
         _warning(doubt, NothingInView)
+
+
+def _leans(seen: SeenView) -> bool:
+    """True if z of the lidar points down or to the side in an image, by over 60 degrees.
+
+    It tells nothing where the camera looks along it: up or down, or in clouds that are in the camera's own frame.
+    """
+    x, y, z = seen.view.camera.T_camera_lidar[:3, 2]
+    return bool(abs(z) < ALONG_Z and -y < 0.5 * np.hypot(x, y))
 
 
 def _warning(message: str, category: type[Warning]) -> None:

@@ -131,3 +131,10 @@ def test_a_scaled_projection_sees_the_same():
     other = ldls.stages.project(points, ldls.Camera(projection=4 * matrix), image_size=(60, 80))
     assert one[0].tolist() == other[0].tolist()
     np.testing.assert_allclose(one[1], other[1])
+
+
+@pytest.mark.parametrize("columns", [3, 4])
+def test_a_transposed_intrinsic_matrix_is_refused(columns):
+    transposed = np.hstack([np.array([[720.0, 0, 620], [0, 720, 180], [0, 0, 1]]).T, np.zeros((3, 1))])
+    with pytest.raises(ldls.CalibrationError, match="the last row is .*620.*, expected .0, 0, 1.; is K transposed"):
+        ldls.Camera(projection=transposed[:, :columns])

@@ -1,4 +1,5 @@
 import itertools
+import json
 import os
 import shutil
 import subprocess
@@ -149,3 +150,29 @@ def test_help_fits_the_terminal(width):
     for line, following in itertools.pairwise(paragraph):
         assert len(line) + 1 + len(following.split()[0]) > width - 4
     assert "Examples:" in lines
+
+
+@pytest.mark.parametrize("command", ["segment", "explain"])
+def test_a_camera_of_opencv_and_the_lidar_beside_it_give_the_same(demo, tmp_path, command):
+    folder, _ = demo
+    camera = ldls.read_camera(folder / "input/calib.txt")
+    fx, fy, u, v = camera.projection[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    assert not camera.projection[:, 3].any()
+    (tmp_path / "camera.xml").write_text(
+        f"<?xml version='1.0'?><opencv_storage><K type_id='opencv-matrix'><rows>3</rows><cols>3</cols>"
+        f"<data>{fx} 0. {u} 0. {fy} {v} 0. 0. 1.</data></K><D></D></opencv_storage>"
+    )
+    back = np.linalg.inv(camera.T_camera_lidar)
+    (tmp_path / "lidar.json").write_text(
+        json.dumps({"pose_of": "camera", "translation": back[:3, 3].tolist(), "rotation": back[:3, :3].tolist()})
+    )
+    words = arguments(folder, tmp_path, calib=tmp_path / "camera.xml", extrinsic=tmp_path / "lidar.json")
+    if command == "explain":
+        chosen = ["--points", "--masks", "--calib", "--extrinsic"]
+        pairs = [words[at : at + 2] for at in range(1, len(words), 2) if words[at] in chosen]
+        words = ["explain", "1000", *itertools.chain(*pairs), "--json"]
+    outcome = run(app, words)
+    assert outcome.exit_code == 0, outcome.output
+    if command == "segment":
+        with np.load(folder / "demo.npz") as expected, np.load(tmp_path / "points.npz") as stored:
+            np.testing.assert_array_equal(stored["labels"], expected["labels"])

@@ -198,7 +198,7 @@ def test_files_without_a_result_give_the_same(frame_571, tmp_path):
     assert other.exit_code == 0
     assert other.output != outcome.output
     wrong = explain(point, *files, "--camera", 4)
-    assert "--camera: got '4', expected 0 to 3" in wrong.stderr
+    assert "camera: got 4, expected 0 to 3" in wrong.stderr
 
 
 def test_a_place_takes_the_nearest_point_also_with_a_minus_sign(frame):

@@ -24,7 +24,7 @@ def test_a_description_is_read(tmp_path):
         pytest.param(
             layouts.FOLDER_TOML.replace("50.0", "9" * 400),
             ldls.LdlsError,
-            "OverflowError|projection",
+            "K: ",
             id="huge integer",
         ),
         pytest.param(

@@ -188,11 +188,16 @@ def test_the_template_describes_a_folder(tmp_path):
     layouts.write_points(tmp_path / "labels/a.label", np.full(100, 10, "<u4"))
     layouts.write_image(tmp_path / "front/a.png", (480, 640))
     layouts.write_image(tmp_path / "left/a.png")
+    layouts.write_image(tmp_path / "right/a.png")
+    layouts.write_text(tmp_path / "right.yaml", "K: [50, 0, 40, 0, 50, 30, 0, 0, 1]\nD: []\n")
     shutil.copytree(tmp_path / "kitti/calib", tmp_path / "calib")
     for stamps in ("lidar/stamps.txt", "front/stamps.txt"):
         layouts.write_text(tmp_path / stamps, "a 12.5\n")
     frame = open_source(tmp_path)[0]
-    assert [image.name for image in frame.images] == ["front", "left"]
+    assert [image.name for image in frame.images] == ["front", "left", "right"]
+    # the pose of a body without a turn: its inverse, then the turn to the optical frame
+    back = [[0, -1, 0, -0.2], [0, 0, -1, 0], [1, 0, 0, -0.1], [0, 0, 0, 1]]
+    np.testing.assert_allclose(frame.images[2].camera.T_camera_lidar, back)
     assert frame.images[0].camera.image_size == (480, 640) and frame.images[1].camera.image_size == layouts.SIZE
     assert frame.stamp == frame.images[0].stamp == 12.5 and frame.images[1].stamp is None
     assert frame.truth.counts()["car"] == 100

@@ -3,13 +3,14 @@
 import multiprocessing
 import sys
 import threading
+import warnings
 
 import numpy as np
 import pytest
 
 import ldls
 from conftest import pinhole
-from ldls.errors import DuplicateWarning, NoUsablePoints, PrecisionWarning, ScaleWarning
+from ldls.errors import DuplicateWarning, NoUsablePoints, PrecisionWarning, ScaleWarning, UprightWarning
 
 
 def test_shapes_and_types_of_the_result(small_scene):
@@ -421,3 +422,26 @@ def test_where_two_cameras_see_different_instances_the_first_gives_the_direct_la
     assert [instance.category for instance in ring.instances] == [1, 3, 2]
     np.testing.assert_array_equal(ring.direct_labels, ldls.segment(points, masks, camera).direct_labels)
     assert (ring.direct_labels == 1).sum() > 50
+
+
+@pytest.mark.parametrize(
+    ("turn", "doubtful"),
+    [
+        pytest.param([[0, -1, 0], [0, 0, -1], [1, 0, 0]], False, id="as it should be"),
+        pytest.param([[0, 1, 0], [0, 0, 1], [1, 0, 0]], True, id="upside down"),
+        pytest.param([[0, 0, 1], [0, -1, 0], [1, 0, 0]], True, id="on its side"),
+        pytest.param(np.eye(3), False, id="a cloud in the camera's frame"),
+        pytest.param([[0, -1, 0], [1, 0, 0], [0, 0, 1]], False, id="a camera that looks up"),
+    ],
+)
+def test_a_lidar_that_does_not_stand_upright_in_the_image_is_doubted(turn, doubtful):
+    transform = np.eye(4)
+    transform[:3, :3] = turn
+    camera = pinhole(T_camera_lidar=transform)
+    masks = ldls.InstanceMasks.from_boxes([[30, 20, 50, 40]], (60, 80))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ldls.segment(np.linalg.inv(transform)[:3, :3] @ [0.0, 0, 10] + np.zeros((50, 3)), masks, camera)
+    said = [str(one.message) for one in caught if one.category is UprightWarning]
+    assert bool(said) == doubtful
+    assert all("z of the lidar does not point up in the image" in text for text in said)

@@ -2,5 +2,6 @@
 
 from ldls.camera.camera import Camera
 from ldls.camera.distortion import Distortion
+from ldls.camera.extrinsic import extrinsic
 
-__all__ = ["Camera", "Distortion"]
+__all__ = ["Camera", "Distortion", "extrinsic"]

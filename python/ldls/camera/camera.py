@@ -17,6 +17,15 @@ from ldls.checks import as_image_size, checked_as
 from ldls.errors import CalibrationError, within
 
 
+def _check_not_transposed(projection: NDArray[np.float64]) -> None:
+    """Refuse the transpose of an intrinsic matrix, which has the principal point in its last row."""
+    above = projection[[0, 0, 1], [1, 2, 2]]
+    if not above.any() and not projection[:, 3:].any() and projection[2, :2].any():
+        raise CalibrationError(
+            f"projection: the last row is {projection[2].tolist()}, expected [0, 0, 1]; is K transposed? Pass K.T"
+        )
+
+
 def _identity() -> NDArray[np.float64]:
     return np.eye(4)
 
@@ -49,6 +58,7 @@ class Camera:
 
     def __post_init__(self) -> None:
         projection = as_matrix("projection", self.projection, ((3, 4), (3, 3)))
+        _check_not_transposed(projection)
         if projection.shape == (3, 3):
             projection = np.hstack([projection, np.zeros((3, 1))])
         transform = as_transform("T_camera_lidar", self.T_camera_lidar)
@@ -95,7 +105,7 @@ class Camera:
 
         Args:
             K: (3, 3) `cameraMatrix`, in pixels.
-            D: `distCoeffs` of 4, 5 or 8 numbers, or the 4 of `cv2.fisheye`; none for a rectified image.
+            D: `distCoeffs` of 4, 5, 8, 12 or 14 numbers, or the 4 of `cv2.fisheye`; none for a rectified image.
             R: (3, 3) rotation from lidar to camera coordinates; `cv2.Rodrigues` makes it of a rotation vector.
             t: (3,) translation from lidar to camera coordinates, in metres.
             fisheye: Whether the coefficients are those of `cv2.fisheye`.

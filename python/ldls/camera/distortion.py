@@ -14,10 +14,10 @@ from ldls.errors import CalibrationError
 MODELS: dict[str, tuple[int, ...]] = {
     "none": (0,),
     "plumb_bob": (4, 5),
-    "rational_polynomial": (8,),
+    "rational_polynomial": (8, 12, 14),
     "equidistant": (4,),
 }
-"""Coefficients that each model may have: k1 k2 p1 p2 (k3) (k4 k5 k6), and k1 k2 k3 k4 of the fisheye."""
+"""Coefficients of each: k1 k2 p1 p2 (k3) (k4 k5 k6) (s1 s2 s3 s4) (tx ty), and k1 k2 k3 k4 of the fisheye."""
 
 SPELLINGS = {
     "": "none", "pinhole": "none", "radtan": "plumb_bob", "brown": "plumb_bob", "rational": "rational_polynomial",
@@ -35,7 +35,8 @@ class Distortion:
 
     Attributes:
         model: "none" (a pinhole, or a rectified image), "plumb_bob", "rational_polynomial" or "equidistant" (fisheye).
-        coefficients: k1 k2 p1 p2 k3, or k1 k2 p1 p2 k3 k4 k5 k6, or k1 k2 k3 k4 of the fisheye.
+        coefficients: k1 k2 p1 p2 k3, of the rational polynomial also k4 k5 k6, a thin prism's s1 s2 s3 s4 and a tilted
+            sensor's angles tx ty in radians; or k1 k2 k3 k4 of the fisheye.
 
     Raises:
         CalibrationError: The model is unknown, or has another number of coefficients, or one is not finite.
@@ -55,10 +56,8 @@ class Distortion:
         # an empty D means that there is none, under any model's name
         if len(values) == 0:
             model = "none"
-        if len(values) in (12, 14) and not any(values[8:]):
-            values = values[:8]  # thin prisms and tilted sensors of OpenCV, both absent
-        if model == "plumb_bob" and len(values) == MODELS["rational_polynomial"][0]:
-            model = "rational_polynomial"
+        if model == "plumb_bob" and len(values) in MODELS["rational_polynomial"]:
+            model = "rational_polynomial"  # as OpenCV, which has one model of as many coefficients as there are
         if model != "none" and len(values) not in MODELS[model]:
             expected = " or ".join(map(str, MODELS[model]))
             raise CalibrationError(f"distortion: {model} has {expected} coefficients, got {len(values)}")
@@ -68,10 +67,9 @@ class Distortion:
     @classmethod
     @checked_as(CalibrationError)
     def from_opencv(cls, coefficients: ArrayLike, *, fisheye: bool = False) -> Self:
-        """Distortion from OpenCV's `distCoeffs` of 4, 5 or 8 numbers, or the 4 of `cv2.fisheye`."""
+        """Distortion from OpenCV's `distCoeffs` of 4, 5, 8, 12 or 14 numbers, or the 4 of `cv2.fisheye`."""
         values = _finite(coefficients)
-        rational = len(values) >= MODELS["rational_polynomial"][0]
-        return cls("equidistant" if fisheye else "rational_polynomial" if rational else "plumb_bob", values)
+        return cls("equidistant" if fisheye else "plumb_bob", values)
 
     @property
     def is_none(self) -> bool:
@@ -84,7 +82,7 @@ class Distortion:
             return "none", np.zeros(0)
         if self.model == "equidistant":
             return "equidistant", np.array(self.coefficients)
-        return "rational", np.concatenate([self.coefficients, np.zeros(8 - len(self.coefficients))])
+        return "rational", np.concatenate([self.coefficients, np.zeros(14 - len(self.coefficients))])
 
 
 def _finite(coefficients: ArrayLike) -> tuple[float, ...]:

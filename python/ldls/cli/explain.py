@@ -8,11 +8,21 @@ from typing import Annotated
 
 import typer
 
-from ldls.cli.frame_files import CALIB, COLOUR_CAMERA, EXISTING, IMAGE_ID, MASKS, POINTS, segment_files
+from ldls.cli.frame_files import (
+    CALIB,
+    EXISTING,
+    IMAGE_ID,
+    MASKS,
+    POINTS,
+    ExtrinsicOption,
+    FisheyeOption,
+    RectifiedOption,
+    camera_of,
+)
 from ldls.cli.messages import console, speaks_plainly
-from ldls.errors import InputError, ParameterError
-from ldls.io import read_result
-from ldls.segmentation import Segmentation
+from ldls.errors import InputError
+from ldls.io import read_points, read_result
+from ldls.label_diffusion import segment
 
 
 def refuse_options(word: str) -> str:
@@ -48,10 +58,13 @@ def explain(
         str | None,
         typer.Option(
             help="Whose pixel U,V is, by name or number from 0, in a result of several cameras. With --calib: which "
-            "camera of the calibration, 0 to 3.",
-            show_default=f"with --calib {COLOUR_CAMERA}, the left colour one",
+            "camera of the calibration, as of ldls segment.",
+            show_default=False,
         ),
     ] = None,
+    extrinsic: ExtrinsicOption = None,
+    fisheye: FisheyeOption = None,
+    rectified: RectifiedOption = None,
     image_id: Annotated[int | None, IMAGE_ID] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> None:
@@ -73,13 +86,18 @@ def explain(
     ldls explain 12.5,-3,0.2 --points velodyne/000571.bin --calib calib/000571.txt --masks masks/000571.json
     """
     from ldls.cli.chosen_point import chosen_point
+    from ldls.cli.mask_options import masks_of
     from ldls.explaining import explain as explain_point
 
     if result is not None:
-        _refuse_files(points, calib, masks, image_id)
+        _refuse_files(points, calib, masks, image_id, extrinsic)
         segmentation, view = read_result(result), camera
     else:
-        segmentation, view = _segmented(points, calib, masks, camera, image_id), None
+        if points is None or calib is None or masks is None:
+            raise InputError("RESULT: missing; give an .npz file of ldls, or --points, --calib and --masks, all three")
+        seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
+        instances = masks_of(None, masks=masks, segmenter=None, image_id=image_id)
+        segmentation, view = segment(read_points(points), instances, seen_by), None
     chosen = chosen_point(point, segmentation, view)
     explanation = explain_point(segmentation, chosen.row)
     if as_json:
@@ -95,23 +113,16 @@ def explain(
             screen.print(part, highlight=False, markup=False, soft_wrap=one_line)
 
 
-def _refuse_files(points: Path | None, calib: Path | None, masks: Path | None, image_id: int | None) -> None:
-    options = {"--points": points, "--calib": calib, "--masks": masks, "--image-id": image_id}
+def _refuse_files(
+    points: Path | None, calib: Path | None, masks: Path | None, image_id: int | None, extrinsic: Path | None
+) -> None:
+    options = {
+        "--points": points,
+        "--calib": calib,
+        "--masks": masks,
+        "--image-id": image_id,
+        "--extrinsic": extrinsic,
+    }
     given = [name for name, value in options.items() if value is not None]
     if given:
         raise InputError(f"{given[0]}: given beside RESULT, which has points, camera and masks; leave one of them out")
-
-
-def _segmented(
-    points: Path | None, calib: Path | None, masks: Path | None, camera: str | None, image_id: int | None
-) -> Segmentation:
-    from ldls.cli.mask_options import masks_of
-    from ldls.params import Params
-
-    if points is None or calib is None or masks is None:
-        raise InputError("RESULT: missing; give an .npz file of ldls, or --points, --calib and --masks, all three")
-    number = str(COLOUR_CAMERA) if camera is None else camera
-    if number not in ("0", "1", "2", "3"):
-        raise ParameterError(f"--camera: got {camera!r}, expected 0 to 3, a camera of the calibration")
-    instance_masks = masks_of(None, masks=masks, segmenter=None, image_id=image_id)
-    return segment_files(points, instance_masks, calib, camera=int(number), params=Params())

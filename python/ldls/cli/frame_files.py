@@ -1,21 +1,22 @@
-"""The files of one frame, as commands take them: a lidar sweep, a KITTI calibration and instance masks."""
+"""The files of one frame, as commands take them: a lidar sweep, a calibration and instance masks."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from ldls.io import read_camera, read_points
-from ldls.label_diffusion import segment
-from ldls.masks import InstanceMasks
-from ldls.params import Params
-from ldls.segmentation import Segmentation
+from ldls.camera import Camera
+from ldls.io import read_camera
 
 EXISTING: dict[str, Any] = {"exists": True, "dir_okay": False, "readable": True}
 POINTS = typer.Option(help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, .csv, .txt or .xyz.", **EXISTING)
-CALIB = typer.Option(help="KITTI calibration of the frame.", **EXISTING)
+CALIB = typer.Option(
+    help="Calibration of the camera: KITTI's (of KITTI raw the folder of the day), OpenCV's (YAML or XML), ROS's or "
+    "Kalibr's.",
+    **(EXISTING | {"dir_okay": True}),
+)
 MASKS = typer.Option(
     help="Instance masks: COCO .json, .npz of ldls or the LDLS research code, instance .png, .npy stack, or "
     "KITTI label_2 .txt.",
@@ -23,10 +24,42 @@ MASKS = typer.Option(
     **EXISTING,
 )
 IMAGE_ID = typer.Option(help="Which image of a COCO file that holds several.")
-COLOUR_CAMERA = 2
-"""KITTI's left colour camera."""
+ExtrinsicOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Where the lidar is, for a calibration that does not say: 12 or 16 numbers of T_camera_lidar by rows, or "
+        "YAML, JSON or TOML with translation, quaternion_xyzw (or quaternion_wxyz, roll_pitch_yaw_deg, rotation) and "
+        "pose_of: camera, the camera's pose in the lidar frame, or lidar, the other way round.",
+        show_default=False,
+        **EXISTING,
+    ),
+]
+FisheyeOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--fisheye/--no-fisheye",
+        help="Whether coefficients of OpenCV are those of cv2.fisheye, where the file does not say.",
+        show_default=False,
+    ),
+]
+RectifiedOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--rectified/--raw",
+        help="Whether masks are of the rectified image of a CameraInfo, or of the raw one.",
+        show_default=False,
+    ),
+]
 
 
-def segment_files(points: Path, masks: InstanceMasks, calib: Path, *, camera: int, params: Params) -> Segmentation:
-    """The labels of the points of a sweep by the masks of the image of one of the cameras of a KITTI calibration."""
-    return segment(read_points(points), masks, read_camera(calib, camera=camera), params=params)
+def camera_of(
+    calib: Path,
+    *,
+    camera: str | None,
+    extrinsic: Path | None,
+    fisheye: bool | None,
+    rectified: bool | None,
+) -> Camera:
+    """The camera of a calibration file, by the words of a command line."""
+    which = int(camera) if camera is not None and camera.isdecimal() else camera
+    return read_camera(calib, camera=which, T_camera_lidar=extrinsic, fisheye=fisheye, rectified=rectified)

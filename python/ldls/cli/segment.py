@@ -8,7 +8,17 @@ from typing import Annotated
 
 import typer
 
-from ldls.cli.frame_files import CALIB, COLOUR_CAMERA, EXISTING, IMAGE_ID, MASKS, POINTS, segment_files
+from ldls.cli.frame_files import (
+    CALIB,
+    EXISTING,
+    IMAGE_ID,
+    MASKS,
+    POINTS,
+    ExtrinsicOption,
+    FisheyeOption,
+    RectifiedOption,
+    camera_of,
+)
 from ldls.cli.mask_options import (
     CategoriesOption,
     MinScoreOption,
@@ -19,7 +29,8 @@ from ldls.cli.messages import console, object_table, speaks_plainly, timing_tabl
 from ldls.cli.method_options import takes_params
 from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, PictureOption, write_outputs
 from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
-from ldls.io import read_image, save
+from ldls.io import read_image, read_points, save
+from ldls.label_diffusion import segment as label_points
 from ldls.params import Params
 
 
@@ -43,9 +54,15 @@ def segment(
         typer.Option(help="File for the masks, for --masks of another run: .json, .npz or .png.", dir_okay=False),
     ] = None,
     camera: Annotated[
-        int,
-        typer.Option(min=0, max=3, help="Which camera of the calibration; 2 is the left colour one."),
-    ] = COLOUR_CAMERA,
+        str | None,
+        typer.Option(
+            help="Which camera of the calibration: 0 to 3 of KITTI, cam0 and so on of Kalibr, 1 or 2 of a stereo pair.",
+            show_default="2, KITTI's left colour one; the first of others",
+        ),
+    ] = None,
+    extrinsic: ExtrinsicOption = None,
+    fisheye: FisheyeOption = None,
+    rectified: RectifiedOption = None,
     image_id: Annotated[int | None, IMAGE_ID] = None,
     formats: Annotated[
         list[Output] | None,
@@ -71,6 +88,9 @@ def segment(
 
     ldls segment --points velodyne/000001.bin --calib calib/000001.txt --image image_2/000001.png
     --segmenter boxes:label_2/000001.txt --out results
+
+    ldls segment --points sweep.pcd --calib camera.yaml --extrinsic lidar.yaml --image image.png --masks masks.json
+    --out results
     """
     check_recording(rerun)
     pixels = None if image is None else read_image(image)
@@ -84,7 +104,8 @@ def segment(
     )
     if save_masks is not None:
         save(chosen, save_masks)
-    result = segment_files(points, chosen, calib, camera=camera, params=replace(params, threads=threads))
+    seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
+    result = label_points(read_points(points), chosen, seen_by, params=replace(params, threads=threads))
     name = points.stem.removesuffix(".pcd")
     written = write_outputs(out, name, result, pixels, formats or DEFAULT_OUTPUTS)
     if picture is not None:

@@ -10,12 +10,15 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path, PurePath
 
+import numpy as np
+
 from ldls.camera import Camera
 from ldls.datasets.file_source import FileSource, image_from_file
-from ldls.datasets.folder_description import FILE, CameraDescription, read_description, template
+from ldls.datasets.folder_description import FILE, read_description, template
 from ldls.datasets.frame import CameraImage
-from ldls.errors import CorruptFileError, ParameterError, SourceError
+from ldls.errors import CorruptFileError, ParameterError, SourceError, within
 from ldls.io import read_camera, read_masks
+from ldls.io.cameras.extrinsic_file import as_extrinsic
 from ldls.io.files import read_lines, strictly_below
 from ldls.io.images import read_image_size
 
@@ -63,8 +66,8 @@ class FolderSource(FileSource):
         super().__init__(self.path, parts, self._cameras, truth=truth, columns=self._described.columns)
         self.stamps = self._read_stamps(self._described.stamps)
         self._image_stamps = {name: self._read_stamps(each.stamps) for name, each in self._cameras.items()}
-        for each in self._cameras.values():
-            self._camera(each, self.names[0])
+        for key in self._cameras:
+            self._camera(key, self.names[0])
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
@@ -78,17 +81,26 @@ class FolderSource(FileSource):
     def _image(self, camera: str, index: int) -> CameraImage:
         name, described = self.names[index], self._cameras[camera]
         path = self._parts[f"cameras.{camera}"][name]
-        made = self._camera(described, name)
+        made = self._camera(camera, name)
         made = made if made.image_size is not None else replace(made, image_size=read_image_size(path))
         stored = None if described.masks is None else self._one(described.masks, name)
         masks = None if stored is None or not stored.exists() else read_masks(stored)
         return image_from_file(camera, path, made, stamp=self._image_stamps[camera][index], masks=masks)
 
-    def _camera(self, each: CameraDescription, name: str) -> Camera:
-        if each.inline is not None:
-            return each.inline
-        path = self._one(each.calibration or "", name)
-        return read_camera(path, format="kitti", camera=each.number, image_size=each.image_size)
+    def _camera(self, key: str, name: str) -> Camera:
+        each = self._cameras[key]
+        given = each.T_camera_lidar
+        extrinsic = self._one(given, name) if isinstance(given, str) else given
+        if each.calibration is not None:
+            made = read_camera(self._one(each.calibration, name), T_camera_lidar=extrinsic, **each.options)
+            return replace(made, image_size=each.image_size) if made.image_size is None else made
+        with within(f"{self._file}, cameras.{key}"):
+            return Camera(
+                projection=np.eye(3) if each.K is None else each.K,
+                T_camera_lidar=np.eye(4) if extrinsic is None else as_extrinsic(extrinsic),
+                distortion=each.distortion,
+                image_size=each.image_size,
+            )
 
     def _truth_files(self, name: str) -> Iterable[tuple[Path, str | None]]:
         pattern = self._described.truth

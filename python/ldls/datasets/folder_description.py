@@ -9,22 +9,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ldls.camera import Camera, Distortion
-from ldls.errors import CalibrationError, CorruptFileError, ParameterError
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.camera import Distortion
+from ldls.camera.rigid import as_matrix
+from ldls.errors import CorruptFileError, ParameterError, within
 from ldls.io.files import open_file
 
 FILE = "ldls.toml"
 MAX_BYTES = 1 << 16
 MAX_DOTS = 256
 """Dots on a line: all the numbers of several cameras have fewer."""
-TOP: dict[str, type] = {
-    "points": str, "columns": int, "stamps": str, "truth": str, "truth_format": str, "cameras": dict,
+TOP: dict[str, tuple[type, ...]] = {
+    "points": (str,), "columns": (int,), "stamps": (str,), "truth": (str,), "truth_format": (str,), "cameras": (dict,),
 }  # fmt: skip
-CAMERA: dict[str, type] = {
-    "images": str, "masks": str, "stamps": str, "calibration": str, "calibration_camera": int, "K": list,
-    "T_camera_lidar": list, "image_size": list, "distortion": dict,
+CAMERA: dict[str, tuple[type, ...]] = {
+    "images": (str,), "masks": (str,), "stamps": (str,), "calibration": (str,), "calibration_camera": (int, str),
+    "fisheye": (bool,), "rectified": (bool,), "K": (list,), "T_camera_lidar": (list, str, dict), "image_size": (list,),
+    "distortion": (dict,),
 }  # fmt: skip
-DISTORTION: dict[str, type] = {"model": str, "coefficients": list}
+KINDS = {str: "a text", int: "a whole number", bool: "true or false", list: "a list", dict: "a table"}
+DISTORTION: dict[str, tuple[type, ...]] = {"model": (str,), "coefficients": (list,)}
+
+OPTIONS = {"calibration_camera": "camera", "fisheye": "fisheye", "rectified": "rectified"}
+"""Options of `ldls.read_camera` by key."""
 
 TEMPLATE = """\
 # Where the frames of this folder lie. {frame} stands for the name of a frame; paths are relative to this folder.
@@ -48,14 +57,26 @@ T_camera_lidar = [
     [1.0, 0.0, 0.0, -0.1],
     [0.0, 0.0, 0.0, 1.0],
 ]
-# "plumb_bob" k1 k2 p1 p2 k3, "rational_polynomial" (8 numbers), "equidistant" (4); leave it out for rectified images
+# "plumb_bob" k1 k2 p1 p2 k3, "rational_polynomial" (8, 12 or 14 numbers), "equidistant" (4); leave it out for rectified
+# images
 distortion = { model = "plumb_bob", coefficients = [-0.05, 0.01, 0.0, 0.0, 0.0] }
 
-# ... or by a KITTI file, one for all frames or, with {frame}, one a frame
+# ... or by a file of any format of docs/formats.md, one for all frames or, with {frame}, one a frame
 [cameras.left]
 images = "left/{frame}.png"
 calibration = "calib/{frame}.txt"
-calibration_camera = 2              # which P of the file; 2 by default
+calibration_camera = 2              # which of the file's cameras: KITTI's 2, Kalibr's "cam0", 1 of a pair by default
+
+# ... and where the lidar is beside it: a matrix as above, a file of it, or the camera's pose by its parts
+[cameras.right]
+images = "right/{frame}.png"
+calibration = "right.yaml"
+fisheye = false                     # optional: whether OpenCV's coefficients are those of cv2.fisheye
+[cameras.right.T_camera_lidar]
+pose_of = "camera"                  # "camera": its pose in the lidar frame; "lidar": that of the lidar in the camera's
+translation = [0.1, -0.2, 0.0]
+quaternion_xyzw = [0.0, 0.0, 0.0, 1.0]  # or quaternion_wxyz, roll_pitch_yaw_deg, rotation (3 x 3)
+optical = false                     # the camera's frame has x forward, y left, z up; true by default: x right, y down
 """
 
 
@@ -67,9 +88,11 @@ class CameraDescription:
         images: Pattern of its images.
         masks: Pattern of their masks, if there are any.
         stamps: File of their stamps, if there is one.
-        calibration: Pattern of KITTI calibration files, where the calibration is not inline.
-        number: Number of the camera in those files.
-        inline: The camera, where its calibration is inline.
+        calibration: Pattern of calibration files, where the calibration is not inline.
+        options: Options of `ldls.read_camera` for those files, but for T_camera_lidar.
+        K: The intrinsic matrix, where the calibration is inline.
+        distortion: The distortion beside K.
+        T_camera_lidar: Where the lidar is: a matrix, a table of parts, or a pattern of files.
         image_size: (height, width) in pixels, where it is given.
     """
 
@@ -77,8 +100,10 @@ class CameraDescription:
     masks: str | None
     stamps: str | None
     calibration: str | None
-    number: int
-    inline: Camera | None
+    options: Mapping[str, Any]
+    K: NDArray[np.float64] | None
+    distortion: Distortion
+    T_camera_lidar: list[Any] | dict[str, Any] | str | None
     image_size: tuple[int, int] | None
 
 
@@ -139,8 +164,8 @@ def template() -> str:
 
 def _camera(place: str, content: Any) -> CameraDescription:  # noqa: ANN401
     _check(place, content, CAMERA, needed=("images",))
-    inline = [key for key in ("K", "T_camera_lidar", "distortion") if key in content]
-    by_file = [key for key in ("calibration", "calibration_camera") if key in content]
+    inline = [key for key in ("K", "distortion") if key in content]
+    by_file = [key for key in ("calibration", *OPTIONS) if key in content]
     if inline and by_file:
         raise ParameterError(f"{place}: has {', '.join(inline)} and {', '.join(by_file)}; expected one or the other")
     if "calibration" not in content and not {"K", "T_camera_lidar"} <= content.keys():
@@ -151,24 +176,23 @@ def _camera(place: str, content: Any) -> CameraDescription:  # noqa: ANN401
         masks=content.get("masks"),
         stamps=content.get("stamps"),
         calibration=content.get("calibration"),
-        number=content.get("calibration_camera", 2),
-        inline=_inline(place, content, size) if inline else None,
+        options={option: content[key] for key, option in OPTIONS.items() if key in content},
+        K=_matrix(place, content.get("K")),
+        distortion=_distortion(place, content.get("distortion", {})),
+        T_camera_lidar=content.get("T_camera_lidar"),
         image_size=size,
     )
 
 
-def _inline(place: str, content: Mapping[str, Any], size: tuple[int, int] | None) -> Camera:
-    distortion = content.get("distortion", {})
-    _check(f"{place}.distortion", distortion, DISTORTION, needed=())
-    try:
-        return Camera(
-            projection=content["K"],
-            T_camera_lidar=content["T_camera_lidar"],
-            image_size=size,
-            distortion=Distortion(distortion.get("model", "none"), tuple(distortion.get("coefficients", ()))),
-        )
-    except CalibrationError as error:
-        raise CalibrationError(f"{place}: {error}") from None
+def _matrix(place: str, K: list[Any] | None) -> NDArray[np.float64] | None:
+    with within(place):
+        return None if K is None else as_matrix("K", K, ((3, 3), (3, 4)))
+
+
+def _distortion(place: str, content: Mapping[str, Any]) -> Distortion:
+    _check(f"{place}.distortion", content, DISTORTION, needed=())
+    with within(place):
+        return Distortion(content.get("model", "none"), tuple(content.get("coefficients", ())))
 
 
 def _image_size(place: str, size: list[Any] | None) -> tuple[int, int] | None:
@@ -179,7 +203,7 @@ def _image_size(place: str, size: list[Any] | None) -> tuple[int, int] | None:
     return size[0], size[1]
 
 
-def _check(place: str, content: Any, keys: Mapping[str, type], *, needed: tuple[str, ...]) -> None:  # noqa: ANN401
+def _check(place: str, content: Any, keys: Mapping[str, tuple[type, ...]], *, needed: tuple[str, ...]) -> None:  # noqa: ANN401
     if not isinstance(content, dict):
         raise ParameterError(f"{place}: expected a table, got {content!r}")
     for key, value in content.items():
@@ -187,8 +211,8 @@ def _check(place: str, content: Any, keys: Mapping[str, type], *, needed: tuple[
             close = difflib.get_close_matches(key, keys, n=1)
             hint = f"; did you mean {close[0]}?" if close else ""
             raise ParameterError(f"{place}: unknown key {key!r}, expected {', '.join(keys)}{hint}")
-        if type(value) is not keys[key]:
-            expected = {str: "a text", int: "a whole number", list: "a list", dict: "a table"}[keys[key]]
+        if type(value) not in keys[key]:
+            expected = " or ".join(KINDS[kind] for kind in keys[key])
             raise ParameterError(f"{place}: {key} is {value!r}, expected {expected}")
     missing = [key for key in needed if key not in content]
     if missing:

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion
 from ldls.errors import CalibrationError, ParameterError
-from ldls.io.files import read_lines
+from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
 from ldls.io.ros.messages import Message, nanoseconds
 
 Matrix = NDArray[np.float64]
-MAX_BYTES = 1 << 16
-GivenTransform = ArrayLike | str | PathLike[str]
 
 
 @dataclass
@@ -114,18 +110,18 @@ def _matrix(message: Message, name: str) -> Matrix:
 
 
 def given_transforms(
-    given: GivenTransform | Mapping[str, GivenTransform] | None, image_topics: Sequence[str]
+    given: Extrinsic | Mapping[str, Extrinsic] | None, image_topics: Sequence[str]
 ) -> dict[str, Matrix]:
     """(4, 4) from lidar to camera coordinates by image topic, for those that are given.
 
     Args:
-        given: Arrays (4, 4) or text files of 12 or 16 numbers by rows, where # begins a comment; one for the only
-            camera, or a mapping from image topic.
+        given: Arrays (4, 4) or files, as `ldls.read_camera` takes them; one for the only camera, or a mapping from
+            image topic.
         image_topics: The image topics.
 
     Raises:
         ParameterError: A topic is none of the image topics, or there are several cameras for one transform.
-        CalibrationError: A file has other than 12 or 16 numbers.
+        CalibrationError: It is no transform.
         FileNotFoundError: There is no such file.
     """
     if given is None:
@@ -137,24 +133,4 @@ def given_transforms(
     unknown = sorted(set(given) - set(image_topics))
     if unknown:
         raise ParameterError(f"T_camera_lidar: {', '.join(unknown)} is none of {', '.join(image_topics)}")
-    return {
-        topic: _read_transform(Path(one)) if isinstance(one, str | PathLike) else np.asarray(one, np.float64)
-        for topic, one in given.items()
-    }
-
-
-def _read_transform(path: Path) -> Matrix:
-    words = [
-        word
-        for line in read_lines(path, "transform", limit=MAX_BYTES)
-        for word in line.partition("#")[0].replace(",", " ").split()
-    ]
-    try:
-        numbers = np.array(words, np.float64)
-    except ValueError:
-        raise CalibrationError(f"{path}: expected numbers only, got {[word[:20] for word in words[:5]]}") from None
-    if numbers.size not in (12, 16):
-        raise CalibrationError(f"{path}: expected the 12 or 16 numbers of a transform, got {numbers.size}")
-    transform = np.eye(4)
-    transform.flat[: numbers.size] = numbers
-    return transform
+    return {topic: as_extrinsic(one, f"T_camera_lidar of {topic}") for topic, one in given.items()}

@@ -16,8 +16,9 @@ from ldls.camera.camera_info import MESSAGE_FIELDS
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
 from ldls.datasets.ros_topics import choose_topics
-from ldls.datasets.ros_transforms import GivenTransform, TransformTree, given_transforms
+from ldls.datasets.ros_transforms import TransformTree, given_transforms
 from ldls.errors import CalibrationError, ParameterError, within
+from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
 from ldls.io.ros.images import decode_compressed, decode_image
 from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, Message, seconds
@@ -58,7 +59,7 @@ class RosBag:
         image_topics: Sequence[str] | None = None,
         info_topics: Sequence[str] | None = None,
         max_offset_s: float = 0.05,
-        T_camera_lidar: GivenTransform | Mapping[str, GivenTransform] | None = None,
+        T_camera_lidar: Extrinsic | Mapping[str, Extrinsic] | None = None,
         fields: Mapping[str, str] | None = None,
         recover: bool = False,
     ) -> None:
@@ -71,8 +72,8 @@ class RosBag:
                 default, and () for clouds alone. Names with "image_rect" are those of rectified images.
             info_topics: Topic of the CameraInfo of each image topic; the one beside it by default.
             max_offset_s: Longest time between the stamps of sweep and image, in seconds.
-            T_camera_lidar: (4, 4) from lidar to camera coordinates, or a text file of its 12 or 16 numbers, instead of
-                the bag's transforms; a mapping from image topic to either for several cameras.
+            T_camera_lidar: (4, 4) from lidar to camera coordinates, or a file of it, as `ldls.read_camera` takes them,
+                instead of the bag's transforms; a mapping from image topic to either for several cameras.
             fields: The clouds' own names of x, y, z and intensity, where they differ.
             recover: If true, a truncated bag yields its whole messages and a warning instead of an error.
 

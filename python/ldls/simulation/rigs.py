@@ -129,9 +129,15 @@ def undistorted(points: F64, distortion: Distortion) -> F64:
 
 
 def _parts(points: F64, distortion: Distortion) -> tuple[F64, F64]:
-    """(n, 1) factor along the radius and (n, 2) shift of tangential distortion."""
+    """(n, 1) factor along the radius and (n, 2) shift of tangential distortion.
+
+    Raises:
+        CalibrationError: The lens has a thin prism, or its sensor is tilted.
+    """
     _, coefficients = distortion.as_core()
-    k1, k2, p1, p2, k3, k4, k5, k6 = coefficients if len(coefficients) else np.zeros(8)
+    (k1, k2, p1, p2, k3, k4, k5, k6), beyond = np.split(coefficients if len(coefficients) else np.zeros(14), [8])
+    if beyond.any():
+        raise CalibrationError("distortion: thin prisms and tilted sensors are not simulated, expected 8 coefficients")
     x, y = points.T
     r2 = x * x + y * y
     radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))

@@ -29,10 +29,12 @@ impl Camera {
         let distortion = match model {
             "none" => Distortion::None,
             "rational" => {
-                let c: [f64; 8] = fixed(py, "coefficients", coefficients)?;
+                let c: [f64; 14] = fixed(py, "coefficients", coefficients)?;
                 Distortion::Rational {
                     k: [c[0], c[1], c[4], c[5], c[6], c[7]],
                     p: [c[2], c[3]],
+                    s: [c[8], c[9], c[10], c[11]],
+                    tau: [c[12], c[13]],
                 }
             }
             "equidistant" => Distortion::Equidistant {

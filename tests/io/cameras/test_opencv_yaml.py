@@ -147,19 +147,20 @@ def test_faults_are_named_with_their_file(write, text, message):
 
 def test_files_that_are_no_yaml(tmp_path, monkeypatch):
     path = tmp_path / "camera.xml"
-    path.write_text('<?xml version="1.0"?><opencv_storage/>')
-    with pytest.raises(ldls.UnsupportedFormatError, match="got XML, expected YAML"):
+    path.write_text('<?xml version="1.0"?><plist/>')
+    with pytest.raises(ldls.UnsupportedFormatError, match="expected OpenCV's <opencv_storage>"):
         ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ldls.CorruptFileError, match=r"camera\.xml: not a text file"):
         ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     path.write_bytes(b"#" * (1 << 18) + b"\n")
-    with pytest.raises(ldls.LimitError, match="262,145 bytes, expected at most 262,144"):
+    with pytest.raises(ldls.LimitError, match="262,145 bytes, expected at most 262,144 of a calibration"):
         ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))
     with pytest.raises(ldls.FileFormatError, match="got a folder"):
         ldls.read_camera(tmp_path, format="opencv", T_camera_lidar=np.eye(4))
     with pytest.raises(FileNotFoundError):
         ldls.read_camera(tmp_path / "none.yaml", format="opencv", T_camera_lidar=np.eye(4))
+    path.write_text(OPENCV)
     monkeypatch.setitem(sys.modules, "yaml", None)
     with pytest.raises(ImportError, match=r"ldls\[yaml\]"):
         ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4))

@@ -56,7 +56,14 @@ def test_the_content_tells_the_format(tmp_path, name, text, options):
     [
         pytest.param(OPENCV, {}, ldls.CalibrationError, "pass T_camera_lidar=", id="no lidar"),
         pytest.param("names: 3\n", {}, ldls.UnsupportedFormatError, "found names; expected camera_matrix", id="other"),
-        pytest.param(OPENCV, {"camera": 3}, ldls.ParameterError, "camera: no option of opencv", id="no such option"),
+        pytest.param(
+            OPENCV,
+            {"camera": 3, "T_camera_lidar": np.eye(4)},
+            ldls.ParameterError,
+            "is of one camera",
+            id="of one camera",
+        ),
+        pytest.param(OPENCV, {"T_imu_lidar": np.eye(4)}, ldls.ParameterError, "no option of opencv", id="no option"),
         pytest.param(OPENCV, {"format": "xml"}, ldls.ParameterError, "expected one of kitti, kitti-raw", id="format"),
     ],
 )

@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.camera.fields import Fields
-from ldls.camera.rigid import rigid
+from ldls.camera.rigid import inverse, rigid
 from ldls.errors import CalibrationError, within
 
-LIDAR = ("T_cam_lidar", "T_camera_lidar")
-IMU = ("T_cam_imu",)
+LIDAR = ("T_cam_lidar", "T_camera_lidar"), ("T_lidar_cam", "T_lidar_camera")
+IMU = ("T_cam_imu",), ("T_imu_cam",)
+"""Keys of the transform to the camera, and of the one back."""
 PREVIOUS = "T_cn_cnm1"
 
 
 def camera_of(
     chain: Fields,
     *,
-    camera: str = "cam0",
+    camera: str | int = "cam0",
     T_camera_lidar: NDArray[np.float64] | None = None,
     T_imu_lidar: NDArray[np.float64] | None = None,
 ) -> Camera:
@@ -29,14 +30,16 @@ def camera_of(
 
     Args:
         chain: The file's entries.
-        camera: Key of the camera.
+        camera: Key of the camera, or its number.
         T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates; without it the file must have
             T_cam_lidar at this camera or at one before it in the chain (T_cn_cnm1).
-        T_imu_lidar: (4, 4) rigid transform from lidar to IMU coordinates, to go by the file's T_cam_imu instead.
+        T_imu_lidar: (4, 4) rigid transform from lidar to IMU coordinates, to go by the file's T_cam_imu or T_imu_cam
+            instead.
 
     Raises:
         CalibrationError: A key is missing, the camera is no pinhole, or nothing leads to the lidar.
     """
+    camera = camera if isinstance(camera, str) else f"cam{camera}"
     fields = chain.section(camera)
     model = fields.get("camera_model")
     if model != "pinhole":
@@ -70,21 +73,23 @@ def _from_lidar(chain: Fields, camera: str, T_imu_lidar: NDArray[np.float64] | N
     by_imu = None if T_imu_lidar is None else _extrinsic(chain, camera, IMU)
     if by_imu is None or T_imu_lidar is None:
         raise CalibrationError(
-            f"{chain.place}: {camera}: no {LIDAR[0]}, or {IMU[0]} together with T_imu_lidar=, on the way to the lidar; "
-            "pass T_camera_lidar="
+            f"{chain.place}: {camera}: no {LIDAR[0][0]}, or {IMU[0][0]} or {IMU[1][0]} together with T_imu_lidar=, on "
+            "the way to the lidar; pass T_camera_lidar="
         )
     return by_imu @ rigid("T_imu_lidar", T_imu_lidar)
 
 
-def _extrinsic(chain: Fields, camera: str, keys: tuple[str, ...]) -> NDArray[np.float64] | None:
-    """Transform to `camera` of what `keys` name, by way of the cameras before it where it has none itself."""
+def _extrinsic(chain: Fields, camera: str, keys: tuple[tuple[str, ...], tuple[str, ...]]) -> NDArray[np.float64] | None:
+    """Transform to `camera` of what `keys` name, there or back, by the cameras before it if it has none itself."""
     from_there = np.eye(4)
     for name in _back_from(camera):
         if chain.find(name) is None:
             return None
         fields = chain.section(name)
-        if fields.find(*keys) is not None:
-            return from_there @ rigid(f"{fields.place}: {keys[0]}", fields.matrix((4, 4), *keys))
+        for spellings, turned in zip(keys, (False, True), strict=True):
+            if fields.find(*spellings) is not None:
+                found = rigid(f"{fields.place}: {spellings[0]}", fields.matrix((4, 4), *spellings))
+                return from_there @ (inverse(found) if turned else found)
         if fields.find(PREVIOUS) is None:
             return None
         from_there = from_there @ rigid(f"{fields.place}: {PREVIOUS}", fields.matrix((4, 4), PREVIOUS))

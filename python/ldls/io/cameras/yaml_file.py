@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from os import PathLike
 from typing import Any
 
 from ldls._optional import require
-from ldls.camera.fields import Fields
-from ldls.errors import CalibrationError, UnsupportedFormatError
-from ldls.io.files import open_file
+from ldls.errors import CalibrationError
 
-MAX_BYTES = 1 << 18
 MAX_DEPTH = 32
 """Levels of nesting: calibrations have six."""
 OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
@@ -19,31 +14,20 @@ NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 MAPPING = "tag:yaml.org,2002:map"
 
 
-def read_yaml(path: str | PathLike[str]) -> Fields:
-    """The entries of a YAML file.
+def entries_of(text: str, path: str) -> object:
+    """The first document of a text; `ros2 topic echo` ends each with a line of dashes.
 
     Raises:
-        CalibrationError: It is not YAML with keys and values, or a key stands there twice; the message names the line.
-        UnsupportedFormatError: It is XML.
-        LimitError: It is larger than any calibration.
-        FileFormatError: It is no regular file.
-        FileNotFoundError: There is no such file.
+        CalibrationError: It is not YAML, or a key stands there twice; the message names the line.
         ImportError: The extra `yaml` is not installed.
     """
     yaml = require("yaml", "yaml")
-    with open_file(path, "calibration in YAML", limit=MAX_BYTES) as file:
-        text = file.text()
-        if text.lstrip().startswith("<"):
-            raise UnsupportedFormatError("got XML, expected YAML; save the calibration as .yml or .yaml")
-        try:
-            text = _without_opencv_directive(text)
-            _check_growth(yaml, text)
-            entries = yaml.load(text, _loader(yaml))
-        except yaml.YAMLError as error:
-            raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({getattr(error, 'problem', error)})") from None
-        if not isinstance(entries, Mapping):
-            raise CalibrationError(f"expected keys with values, got {type(entries).__name__}")
-        return Fields(str(path), entries)
+    text = _without_opencv_directive(text)
+    try:
+        _check_growth(yaml, text)
+        return next(iter(yaml.load_all(text, _loader(yaml))), None)
+    except yaml.YAMLError as error:
+        raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({getattr(error, 'problem', error)})") from None
 
 
 def _without_opencv_directive(text: str) -> str:

@@ -2,19 +2,24 @@
 //! and ROS.
 
 use crate::{Error, Result};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// The departure of a lens from a pinhole.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Distortion {
     /// None: a pinhole, or an image that was rectified.
     None,
-    /// Brown and Conrady's model with a rational radial part. OpenCV and ROS call it `plumb_bob` where `k4` to `k6` are
+    /// Brown and Conrady's model with a rational radial part. OpenCV and ROS call it `plumb_bob` where all beyond `k3` are
     /// 0, and `rational_polynomial` otherwise.
     Rational {
         /// Radial coefficients k1 to k6; the last three stand in the denominator.
         k: [f64; 6],
         /// Tangential coefficients p1 and p2.
         p: [f64; 2],
+        /// Coefficients s1 to s4 of a thin prism.
+        s: [f64; 4],
+        /// Angles, in radians, by which the sensor is tilted about x and y.
+        tau: [f64; 2],
     },
     /// Kannala and Brandt's fisheye model: `equidistant` in ROS and Kalibr, `cv::fisheye` in OpenCV.
     Equidistant {
@@ -30,6 +35,8 @@ pub(crate) struct Lens {
     /// Square of the distance from the axis, on the plane z = 1, from which on the model folds back: points out there
     /// would fall on pixels that show something else.
     limit_squared: f64,
+    /// From the image on an upright sensor to that on the tilted one; none where it is upright.
+    tilt: Option<Matrix3<f64>>,
 }
 
 /// Steps in which the angle from the axis is searched for the fold.
@@ -41,7 +48,7 @@ impl Lens {
     pub(crate) fn new(distortion: Distortion) -> Result<Self> {
         let coefficients = match &distortion {
             Distortion::None => Vec::new(),
-            Distortion::Rational { k, p } => [k.as_slice(), p].concat(),
+            Distortion::Rational { k, p, s, tau } => [k.as_slice(), p, s, tau].concat(),
             Distortion::Equidistant { k } => k.to_vec(),
         };
         if let Some(value) = coefficients.iter().find(|c| !c.is_finite()) {
@@ -51,6 +58,7 @@ impl Lens {
         Ok(Self {
             distortion,
             limit_squared: limit * limit,
+            tilt: tilt(&distortion),
         })
     }
 
@@ -66,12 +74,17 @@ impl Lens {
         let holds = r2 < self.limit_squared;
         holds.then(|| match &self.distortion {
             Distortion::None => [x, y],
-            Distortion::Rational { k, p } => {
+            Distortion::Rational { k, p, s, .. } => {
                 let radial = rational(k, r2);
-                [
-                    x * radial + 2.0 * p[0] * x * y + p[1] * (r2 + 2.0 * x * x),
-                    y * radial + p[0] * (r2 + 2.0 * y * y) + 2.0 * p[1] * x * y,
-                ]
+                let prism = [s[0] + s[1] * r2, s[2] + s[3] * r2].map(|s| s * r2);
+                let [x, y] = [
+                    x * radial + 2.0 * p[0] * x * y + p[1] * (r2 + 2.0 * x * x) + prism[0],
+                    y * radial + p[0] * (r2 + 2.0 * y * y) + 2.0 * p[1] * x * y + prism[1],
+                ];
+                self.tilt.map_or([x, y], |tilt| {
+                    let [x, y, w] = (tilt * Vector3::new(x, y, 1.0)).into();
+                    [x / w, y / w]
+                })
             }
             Distortion::Equidistant { k } => {
                 let r = r2.sqrt();
@@ -87,6 +100,23 @@ impl Lens {
     }
 }
 
+/// The tilted sensor of `distortion`: what falls on an upright one goes on along its ray, and is then turned upright.
+fn tilt(distortion: &Distortion) -> Option<Matrix3<f64>> {
+    let Distortion::Rational { tau, .. } = distortion else {
+        return None;
+    };
+    let about = |axis, angle| *Rotation3::from_axis_angle(&axis, angle).matrix();
+    // OpenCV turns about y and x the other way around than about z
+    let turn = about(Vector3::y_axis(), -tau[1]) * about(Vector3::x_axis(), -tau[0]);
+    let (distance, along) = (turn[(2, 2)], [turn[(0, 2)], turn[(1, 2)]]);
+    let upright = Matrix3::new(
+        distance, 0.0, -along[0], 0.0, distance, -along[1], 0.0, 0.0, 1.0,
+    );
+    tau.iter()
+        .any(|&angle| angle != 0.0)
+        .then_some(upright * turn)
+}
+
 fn rational(k: &[f64; 6], r2: f64) -> f64 {
     let polynomial = |a: f64, b: f64, c: f64| 1.0 + r2 * (a + r2 * (b + r2 * c));
     polynomial(k[0], k[1], k[2]) / polynomial(k[3], k[4], k[5])
@@ -98,7 +128,7 @@ fn fisheye(k: &[f64; 4], angle: f64) -> f64 {
 }
 
 /// Distance from the axis on the plane z = 1 at which the distorted distance stops growing; infinite where it never
-/// does. Tangential parts, which are small, are left out.
+/// does. Tangential parts, prisms and tilts, which are small, are left out.
 fn fold(distortion: &Distortion) -> f64 {
     let distance = |angle: f64| match distortion {
         Distortion::None => angle,
@@ -136,9 +166,18 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn rational_of(k: [f64; 6]) -> Distortion {
+        Distortion::Rational {
+            k,
+            p: [0.0; 2],
+            s: [0.0; 4],
+            tau: [0.0; 2],
+        }
+    }
+
     fn radial(k1: f64, k2: f64, k3: f64) -> Lens {
         let k = [k1, k2, k3, 0.0, 0.0, 0.0];
-        Lens::new(Distortion::Rational { k, p: [0.0; 2] }).unwrap()
+        Lens::new(rational_of(k)).unwrap()
     }
 
     #[test]
@@ -177,7 +216,7 @@ mod tests {
         fn no_two_angles_within_the_limit_share_a_pixel(
             k in proptest::array::uniform6(-0.4_f64..0.4), near in 0.0_f64..0.99, far in 0.0_f64..0.99,
         ) {
-            let lens = Lens::new(Distortion::Rational { k, p: [0.0; 2] }).unwrap();
+            let lens = Lens::new(rational_of(k)).unwrap();
             let reach = lens.limit_squared.sqrt().min(50.0);
             let [near, far] = [near.min(far), near.max(far)].map(|share| share * reach);
             prop_assume!(far - near > 1e-3);

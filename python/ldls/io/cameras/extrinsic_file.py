@@ -1,0 +1,111 @@
+"""Extrinsics beside a camera file: the numbers of a matrix, or keys as of `ldls.extrinsic`."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ldls.camera.extrinsic import extrinsic
+from ldls.camera.fields import Fields
+from ldls.camera.rigid import as_transform, inverse, rigid
+from ldls.errors import CalibrationError, within
+from ldls.io.cameras.field_file import read_fields
+from ldls.io.files import open_file
+
+MAX_BYTES = 1 << 16
+PARTS = ("translation", "pose_of", "quaternion_wxyz", "quaternion_xyzw", "roll_pitch_yaw_deg", "rotation", "optical")
+MATRICES = ("T_camera_lidar", "T_lidar_camera")
+
+Extrinsic = ArrayLike | str | PathLike[str] | Mapping[str, Any]
+"""A (4, 4) `T_camera_lidar`, a file of it, or a table of its parts."""
+
+
+def as_extrinsic(given: Extrinsic, place: str = "T_camera_lidar") -> NDArray[np.float64]:
+    """`T_camera_lidar`, (4, 4), as it is given.
+
+    Args:
+        given: A matrix; a table with `T_camera_lidar` or `T_lidar_camera`, or with the arguments of `ldls.extrinsic`;
+            or a file with the 12 or 16 numbers of `T_camera_lidar` by rows, where # begins a comment, or with such a
+            table in YAML, JSON or TOML.
+        place: What to call it in errors.
+
+    Raises:
+        CalibrationError: It is none of these, or no rigid transform.
+        FileNotFoundError: There is no such file.
+    """
+    if isinstance(given, str | PathLike):
+        return _read(Path(given))
+    if isinstance(given, Mapping):
+        return _from_table(Fields(place, given))
+    return as_transform(place, given)
+
+
+def _read(path: Path) -> NDArray[np.float64]:
+    with open_file(path, "transform", limit=MAX_BYTES) as file:
+        text = file.text()
+        words = [word for line in text.splitlines() for word in line.partition("#")[0].replace(",", " ").split()]
+        numbers = _numbers(words)
+        if numbers is not None:
+            return _from_numbers(str(path), numbers)
+        if path.suffix.lower() == ".toml":
+            return _from_table(Fields(str(path), tomllib.loads(text)))
+        if text.lstrip().startswith("{"):
+            return _from_table(Fields(str(path), json.loads(text)))
+    return _from_table(read_fields(path))
+
+
+def _numbers(words: list[str]) -> NDArray[np.float64] | None:
+    try:
+        return np.array(words, np.float64)
+    except ValueError:
+        return None
+
+
+def _from_numbers(place: str, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    if numbers.size not in (12, 16):
+        hint = "; name the parts: translation: [x, y, z], quaternion_xyzw: [...], pose_of: camera"
+        raise CalibrationError(
+            f"{place}: expected the 12 or 16 numbers of T_camera_lidar by rows, got {numbers.size}"
+            f"{hint if numbers.size in (6, 7) else ''}"
+        )
+    transform = np.eye(4)
+    transform.flat[: numbers.size] = numbers
+    return rigid(place, transform)
+
+
+def _from_table(fields: Fields) -> NDArray[np.float64]:
+    matrices = [name for name in MATRICES if fields.find(name) is not None]
+    if matrices:
+        matrix = rigid(f"{fields.place}: {matrices[0]}", fields.matrix((4, 4), matrices[0]))
+        return inverse(matrix) if matrices[0] == "T_lidar_camera" else matrix
+    unknown = [str(key) for key in fields.entries if key not in PARTS]
+    if unknown:
+        raise CalibrationError(
+            f"{fields.place}: unknown key {unknown[0]!r}, expected {' or '.join(MATRICES)}, or {', '.join(PARTS)}"
+        )
+    if fields.find("pose_of") is None:
+        raise CalibrationError(
+            f"{fields.place}: pose_of is missing; write 'camera' where it is the pose of the camera in the lidar "
+            "frame, as in a URDF or /tf, and 'lidar' where it maps lidar to camera coordinates"
+        )
+    parts: dict[str, Any] = dict(fields.entries)
+    parts["translation"] = _xyz(fields.get("translation"))
+    rotation = parts.get("rotation")
+    if isinstance(rotation, Mapping) and rotation.keys() == {"x", "y", "z", "w"}:
+        del parts["rotation"]
+        parts["quaternion_xyzw"] = [rotation[axis] for axis in "xyzw"]
+    with within(fields.place):
+        return extrinsic(**parts)
+
+
+def _xyz(translation: object) -> Any:  # noqa: ANN401
+    """A list, or the names that ROS has."""
+    named = isinstance(translation, Mapping) and translation.keys() == {"x", "y", "z"}
+    return [translation[axis] for axis in "xyz"] if named else translation  # type: ignore[index]

@@ -1,0 +1,65 @@
+import json
+
+import numpy as np
+import pytest
+
+import ldls
+from datasets import layouts
+from ldls.io.cameras.extrinsic_file import as_extrinsic
+
+T = np.array(layouts.T, float)
+ROWS = "\n".join(" ".join(map(str, row)) for row in T.tolist())
+# the pose of the camera in the lidar frame by its parts
+BACK = np.linalg.inv(T)
+PARTS = {"pose_of": "camera", "translation": BACK[:3, 3].tolist(), "rotation": BACK[:3, :3].tolist()}
+QUATERNION = {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}
+ROS = {"pose_of": "camera", "translation": dict(zip("xyz", PARTS["translation"], strict=True)), "rotation": QUATERNION}
+FILES = [
+    pytest.param("a.txt", f"# lidar to camera\n{ROWS}\n", id="sixteen numbers"),
+    pytest.param("a.txt", ROWS.rsplit("\n", 1)[0].replace(" ", ", "), id="twelve numbers with commas"),
+    pytest.param("a.json", json.dumps(PARTS), id="JSON"),
+    pytest.param("a.json", json.dumps({"T_lidar_camera": BACK.tolist()}), id="the matrix back"),
+    pytest.param(
+        "a.yaml", "".join(f"{key}: {json.dumps(value)}\n" for key, value in ROS.items()), id="YAML, as ROS names them"
+    ),
+    pytest.param(
+        "a.toml",
+        f'pose_of = "camera"\ntranslation = {PARTS["translation"]}\nquaternion_xyzw = {list(QUATERNION.values())}\n',
+        id="TOML",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "text"), FILES)
+def test_a_transform_is_read_from_a_file(tmp_path, name, text):
+    if name == "a.yaml":
+        pytest.importorskip("yaml", reason="the extra yaml is not installed")
+    (tmp_path / name).write_text(text)
+    np.testing.assert_allclose(as_extrinsic(tmp_path / name), T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        pytest.param("a.txt", "1 2 3 0 0 0 1", "expected the 12 or 16 .* got 7; name the parts", id="seven numbers"),
+        pytest.param("a.json", json.dumps(PARTS | {"pose_of": None}), "pose_of is missing; write 'camera'", id="whose"),
+        pytest.param(
+            "a.json", json.dumps(PARTS | {"quat": 1}), "unknown key 'quat', expected T_camera_lidar", id="key"
+        ),
+        pytest.param("a.json", json.dumps(PARTS | {"optical": 3}), "optical: ", id="optical"),
+        pytest.param("a.txt", ROWS.replace("-1.0", "1.0", 1), "deviates|a mirror", id="mirror"),
+    ],
+)
+def test_faults_are_named_with_their_file(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ldls.LdlsError, match=rf"{name}.*({message})"):
+        as_extrinsic(tmp_path / name)
+
+
+def test_a_camera_takes_the_file_beside_it(tmp_path):
+    pytest.importorskip("yaml", reason="the extra yaml is not installed")
+    (tmp_path / "camera.yaml").write_text("K: [50, 0, 40, 0, 50, 30, 0, 0, 1]\nD: []\n")
+    (tmp_path / "lidar.json").write_text(json.dumps(PARTS))
+    for extrinsic in (tmp_path / "lidar.json", PARTS):
+        camera = ldls.read_camera(tmp_path / "camera.yaml", T_camera_lidar=extrinsic)
+        np.testing.assert_allclose(camera.T_camera_lidar, T, atol=1e-12)
