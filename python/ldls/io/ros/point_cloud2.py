@@ -48,8 +48,9 @@ class PointCloud:
         wide = any(self.fields.dtype[called[name]] == np.float64 for name in POSITION)
         shape = (len(self.fields), len(chosen))
         points: Points = np.empty(shape, np.float64) if wide else np.empty(shape, np.float32)
-        for column, name in enumerate(chosen):
-            points[:, column] = self.fields[name]
+        with np.errstate(over="ignore"):  # what is too large for single precision is infinite
+            for column, name in enumerate(chosen):
+                points[:, column] = self.fields[name]
         return points
 
     def _is_number(self, name: str) -> bool:
