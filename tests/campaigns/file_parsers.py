@@ -36,6 +36,7 @@ from ldls.datasets.folder_description import read_description
 from ldls.datasets.nuscenes_frame import NuScenesFrameSource
 from ldls.datasets.ros_transforms import given_transforms
 from ldls.errors import FileFormatError, LdlsError
+from ldls.io.cameras.extrinsic_file import as_extrinsic
 from ldls.io.images import read_image_size
 from ldls.io.labels import read_kitti_objects, read_labeling, write_annotations, write_labeling
 from ldls.io.labels.labeling_npz import read_confidence_npz
@@ -423,6 +424,20 @@ roi: {x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false}
 """
 
 
+XML = """<?xml version="1.0"?>
+<opencv_storage>
+<image_width>80</image_width>
+<image_height>60</image_height>
+<camera_matrix type_id="opencv-matrix">
+  <rows>3</rows><cols>3</cols><dt>d</dt>
+  <data>72.5 0. 40.25 0. 71.5 30.75 0. 0. 1.</data></camera_matrix>
+<distortion_coefficients type_id="opencv-matrix">
+  <rows>1</rows><cols>5</cols><dt>d</dt><data>-0.28 7e-02 1e-3 -8e-04 0.</data></distortion_coefficients>
+<views><_>1</_><_>2</_></views>
+</opencv_storage>
+"""
+EXTRINSIC = "pose_of: camera\ntranslation: [0.1, 0, -0.2]\nroll_pitch_yaw_deg: [1, 2, 3]\noptical: false\n"
+EXTRINSIC_JSON = '{"pose_of": "lidar", "translation": {"x": 1, "y": 2, "z": 3}, "quaternion_wxyz": [1, 0, 0, 0]}'
 TRANSFORMS = f"# lidar to camera\n{layouts.row(layouts.T[:3])}\n"
 
 
@@ -450,6 +465,43 @@ def coco(folder):
     lists = {"size": [60, 80], "counts": [3, 4, 60 * 80 - 7]}
     polygons["annotations"].append(polygons["annotations"][0] | {"id": 9, "segmentation": lists, "iscrowd": 1})
     return [[(folder / name).read_bytes()] for name in ("a.json", "b.json")] + [[json.dumps(polygons).encode()]]
+
+
+LABELME = json.dumps(
+    {
+        "shapes": [
+            {"label": "car", "points": [[1, 2], [9, 3.5], [4, 8]], "shape_type": "polygon", "group_id": None},
+            {"label": "van", "points": [[1, 2], [9, 3.5]], "shape_type": "rectangle", "group_id": 2},
+            {"label": "van", "points": [[30, 20], [35, 20]], "shape_type": "circle", "group_id": 2},
+        ],
+        "imageHeight": 60,
+        "imageWidth": 80,
+    }
+)
+YOLO = "2 0.25 0.25 0.5 0.25 0.5 0.5\n0 0.1 0.1 0.2 0.1 0.2 0.3 0.1 0.3 0.75\n"
+
+
+def sam(_):
+    records = MASKS[0].to_coco()["annotations"]
+    kept = [{"segmentation": record["segmentation"], "predicted_iou": 0.9} for record in records]
+    return [[json.dumps(kept).encode()], [json.dumps({"image": {}, "annotations": kept}).encode()]]
+
+
+def cityscapes(_):
+    file = io.BytesIO()
+    Image.fromarray(np.array([[0, 26001], [7, 24002]], np.uint16)).save(file, "PNG")
+    return [[file.getvalue()]]
+
+
+def panoptic_masks(_):
+    file = io.BytesIO()
+    Image.fromarray(np.array([[[5, 1, 0], [9, 0, 0]]], np.uint8)).save(file, "PNG")
+    content = {
+        "images": [{"id": 1, "height": 1, "width": 2}],
+        "annotations": [{"image_id": 1, "file_name": "a.png", "segments_info": [{"id": 261, "category_id": 3}]}],
+        "categories": [{"id": 3, "name": "car", "isthing": 1}],
+    }
+    return [[json.dumps(content).encode(), file.getvalue()]]
 
 
 def members(*paths_of):
@@ -681,6 +733,19 @@ PARSERS: dict[str, Parser] = {
         ("a.yaml",), texts(CAMERA_INFO_YAML), read_camera(T_camera_lidar=T_CAMERA_LIDAR), text=True
     ),
     "masks .json": Parser(("a.json",), coco, ldls.read_masks, text=True, gentle=0.5),
+    "masks labelme": Parser(("a.json",), texts(LABELME), ldls.read_masks, text=True, gentle=0.5),
+    "masks panoptic": Parser(
+        ("a.json", "a.png"),
+        panoptic_masks,
+        lambda folder: ldls.read_masks(folder / "a.json"),
+        BETWEEN_FILES.join,
+        allowed=(OSError,),
+    ),
+    "masks SAM": Parser(("a.json",), sam, ldls.read_masks, text=True, gentle=0.5),
+    "masks YOLO": Parser(("a.txt",), texts(YOLO), lambda path: ldls.read_masks(path, image_size=(60, 80)), text=True),
+    "masks Cityscapes": Parser(("a_instanceIds.png",), cityscapes, ldls.read_masks),
+    "camera OpenCV XML": Parser(("a.xml",), texts(XML), read_camera(T_camera_lidar=T_CAMERA_LIDAR), text=True),
+    "extrinsic": Parser(("a.json",), texts(EXTRINSIC, EXTRINSIC_JSON), as_extrinsic, text=True),
     "masks .npz": Parser(
         ("a.npz",),
         members(*(lambda path, m=m: ldls.save(m, path) for m in MASKS)),

@@ -173,7 +173,6 @@ RLE = {"size": [HEIGHT, WIDTH], "counts": [HEIGHT * WIDTH]}
         pytest.param(coco_document(RLE, score=float("nan")), "score is nan", id="score NaN"),
         pytest.param(coco_document([[0, 0, 1]]), "3 numbers", id="half a polygon"),
         pytest.param(coco_document([[0, 0, 1, 1, 1e12, 0]]), "1000000000000", id="far polygon"),
-        pytest.param(coco_document([]), "lists of numbers", id="no polygon"),
         pytest.param(coco_document(None), "a box alone is no mask", id="no segmentation"),
     ],
 )

@@ -110,8 +110,9 @@ class _Crop:
     def apply(self, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
         """`matrix`, (3, 3) or (3, 4), to pixels of what is left of the full image."""
         cropped = matrix.copy()
-        # a pixel of a binned image has its centre in the middle of those it is made of
-        cropped[:2] += (0.5 - self.offset[:, None]) * matrix[2]
-        cropped[:2] /= self.binning[:, None]
-        cropped[:2] -= 0.5 * matrix[2]
+        with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is then not finite
+            # a pixel of a binned image has its centre in the middle of those it is made of
+            cropped[:2] += (0.5 - self.offset[:, None]) * matrix[2]
+            cropped[:2] /= self.binning[:, None]
+            cropped[:2] -= 0.5 * matrix[2]
         return cropped

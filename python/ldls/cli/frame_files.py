@@ -18,10 +18,10 @@ CALIB = typer.Option(
     **(EXISTING | {"dir_okay": True}),
 )
 MASKS = typer.Option(
-    help="Instance masks: COCO .json, .npz of ldls or the LDLS research code, instance .png, .npy stack, or "
-    "KITTI label_2 .txt.",
+    help="Instance masks: .json of COCO, labelme or Segment Anything, .txt of YOLO's polygons or KITTI's boxes, "
+    "instance .png, .npz of ldls or the LDLS research code, .npy stack, or a folder of one .png an instance.",
     show_default=False,
-    **EXISTING,
+    **(EXISTING | {"dir_okay": True}),
 )
 IMAGE_ID = typer.Option(help="Which image of a COCO file that holds several.")
 ExtrinsicOption = Annotated[

@@ -6,6 +6,7 @@ Ids of annotations only serve messages, so they may repeat; those of images and 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES
-from ldls.errors import CorruptFileError, MaskError, within
+from ldls.errors import CorruptFileError, LeftOutWarning, MaskError, within
 from ldls.masks.instance_mask import InstanceMask
 from ldls.masks.pixels import checked_size
 
@@ -39,8 +40,17 @@ def arguments(
     """
     annotations, images, own_names = _parts(content)
     names = own_names or names or COCO_NAMES
-    image_id = _choose_image(annotations, images, image_id)
+    image_id = chosen_image(annotations, images, image_id)
     chosen = [a for a in annotations if image_id is None or a.get("image_id") in (None, image_id)]
+    drawn = [a for a in chosen if a.get("segmentation") != []]
+    if len(drawn) < len(chosen):
+        warnings.warn(
+            f"{len(chosen) - len(drawn)} of {len(chosen)} annotations have an empty segmentation and are left out; "
+            "boxes alone are no masks",
+            LeftOutWarning,
+            stacklevel=2,
+        )
+        chosen = drawn
     size = _size_of(images, image_id, chosen, image_size)
     labels = [f"annotation {a.get('id', i)}" for i, a in enumerate(chosen)]
     scores = _scores(labels, chosen)
@@ -99,11 +109,17 @@ def _records(name: str, values: object) -> list[dict[str, Any]]:
     return list(values)
 
 
-def _choose_image(
+def chosen_image(
     annotations: list[dict[str, Any]],
     images: Mapping[Any, dict[str, Any]],
     image_id: int | str | None,
 ) -> int | str | None:
+    """The image that is chosen, or the only one there is; None where annotations do not say.
+
+    Raises:
+        MaskError: There is no such image, or several and none was chosen.
+        CorruptFileError: An annotation has an id that is none.
+    """
     for i, annotation in enumerate(annotations):
         own = annotation.get("image_id")
         if type(own) not in (int, str, type(None)):

@@ -13,6 +13,8 @@ from ldls.checks import as_array
 from ldls.errors import MaskError, ParameterError
 from ldls.masks.pixels import check_pixels
 
+CITYSCAPES_DIVISOR = 1000
+
 
 def arguments(
     image: ArrayLike,
@@ -30,7 +32,7 @@ def arguments(
         scores: As `categories`; all 1 without them.
         names: Name of each category id.
         class_divisor: Where numbers hold the class as well, what to divide them by: the quotient is the category, and
-            a remainder of 0 is background. KITTI's images have 256, Cityscapes' 1000.
+            a remainder of 0 is background. KITTI's images have 256, Cityscapes' 1000, below which is background.
 
     Raises:
         MaskError: Another shape, or values that are no instance numbers.
@@ -43,9 +45,12 @@ def arguments(
                 f"class_divisor: got {class_divisor}, expected 2 or more, and no categories beside it; "
                 "the quotient is the category"
             )
+        # below Cityscapes' divisor there are stuff and groups
+        least = 1 if class_divisor == CITYSCAPES_DIVISOR else 0
         pairs = [divmod(int(number), class_divisor) for number in numbers]
-        rles = [rle for rle, (_, instance) in zip(rles, pairs, strict=True) if instance]
-        categories = [category for category, instance in pairs if instance]
+        things = [category >= least and instance > 0 for category, instance in pairs]
+        rles = [rle for rle, is_thing in zip(rles, things, strict=True) if is_thing]
+        categories = [category for (category, _), is_thing in zip(pairs, things, strict=True) if is_thing]
         names = {category: f"class {category}" for category in categories} | dict(names or {})
     height, width = np.shape(image)
     size = (height, width)

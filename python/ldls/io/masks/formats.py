@@ -11,17 +11,17 @@ from numpy.typing import ArrayLike
 
 from ldls.checks import checked
 from ldls.errors import MaskError, UnsupportedFormatError
-from ldls.io.masks import coco_json, instance_png, kitti_boxes, npz, numpy_stack
+from ldls.io.masks import coco_json, instance_png, json_file, npz, numpy_stack, png_folder, text
 from ldls.io.options import check_options
 from ldls.masks import InstanceMasks
 from ldls.masks.pixels import checked_size
 
 READERS: dict[str, Callable[..., InstanceMasks]] = {
-    ".json": coco_json.read,
+    ".json": json_file.read,
     ".png": instance_png.read,
     ".npz": npz.read,
     ".npy": numpy_stack.read,
-    ".txt": kitti_boxes.read,
+    ".txt": text.read,
 }
 
 WRITERS: dict[str, Callable[..., None]] = {
@@ -49,8 +49,10 @@ def read_masks(
     """Instance masks of a file; its suffix tells the format.
 
     Args:
-        path: `.json` (COCO), `.png` (instance numbers), `.npz` (of ldls, or of the LDLS research code), `.npy` (stack
-            of masks) or `.txt` (KITTI label_2, whose boxes become masks).
+        path: `.json` (COCO, COCO panoptic beside its PNG, labelme, Segment Anything), `.png` (instance numbers; those
+            of Cityscapes by the name _instanceIds.png), `.npz` (of ldls, or of the LDLS research code), `.npy` (stack
+            of masks), `.txt` (polygons of YOLO, or KITTI label_2, whose boxes become masks), or a folder of one PNG
+            an instance.
         image_size: (height, width) in pixels; `.txt` needs it, and others must agree with it.
         image_id: Which image of a `.json` with several.
         instance_axis: Axis of a `.npy` that counts the masks, 0 or -1, where sizes do not tell.
@@ -68,7 +70,8 @@ def read_masks(
         FileNotFoundError: There is no such file.
     """
     path = Path(path)
-    reader = _of_suffix(path, READERS, "read")
+    is_folder = path.is_dir() and path.suffix.lower() not in READERS
+    reader: Callable[..., InstanceMasks] = png_folder.read if is_folder else _of_suffix(path, READERS, "read")
     options = {
         "image_id": image_id,
         "instance_axis": instance_axis,

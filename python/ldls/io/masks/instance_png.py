@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,19 @@ from PIL import Image
 from PIL.PngImagePlugin import PngImageFile, PngInfo
 
 import ldls._ldls as _ldls
-from ldls.errors import CorruptFileError, LimitError, ParameterError, UnsupportedFormatError
+from ldls.categories import COCO_NAMES, category_ids
+from ldls.errors import CorruptFileError, LimitError, MaskError, ParameterError, UnsupportedFormatError
 from ldls.io.files import InputFile, open_file, parsing, whole_file
 from ldls.io.images import MAX_BYTES, check_pixels
 from ldls.masks import InstanceMasks, instance_image
 
+CITYSCAPES = "_instanceIds.png"
+"""How the names of Cityscapes' files end."""
+CITYSCAPES_NAMES = {
+    24: "person", 25: "rider", 26: "car", 27: "truck", 28: "bus", 29: "caravan", 30: "trailer", 31: "train",
+    32: "motorcycle", 33: "bicycle",
+}  # fmt: skip
+"""Its classes that have instances."""
 CHUNK = "ldls:instances"
 """Keyword of the text chunk."""
 VERSION = 1
@@ -58,6 +67,8 @@ def read(
     given = {"categories": categories, "scores": scores, "names": names, "class_divisor": class_divisor}
     with open_file(path, "PNG image", limit=MAX_BYTES) as file:
         values, texts = _open(file)
+        if CHUNK not in texts and Path(path).name.endswith(CITYSCAPES) and class_divisor in (None, 1000):
+            return _cityscapes(values, scores, names)
         if CHUNK not in texts:
             return InstanceMasks(**instance_image.arguments(values, **given))  # type: ignore[arg-type]
         idle = [name for name, value in given.items() if value is not None]
@@ -65,6 +76,17 @@ def read(
             raise ParameterError(f"{idle[0]}: the file holds its own; leave it out")
         with parsing(f"text chunk {CHUNK}"):
             return _from_chunk(values, json.loads(texts[CHUNK]))
+
+
+def _cityscapes(values: NDArray[Any], scores: ArrayLike | None, names: Mapping[int, str] | None) -> InstanceMasks:
+    """Things of Cityscapes, by the ids of COCO where it has the class."""
+    arguments = instance_image.arguments(values, scores=scores, class_divisor=1000)
+    ids, own = category_ids(CITYSCAPES_NAMES | dict(names or {}))
+    unknown = sorted(set(arguments["categories"]) - ids.keys())
+    if unknown:
+        raise MaskError(f"class {unknown[0]} is none of Cityscapes'; pass names={{{unknown[0]}: '...'}}")
+    categories = np.array([ids[each] for each in arguments["categories"]], np.int64)
+    return InstanceMasks(**(arguments | {"categories": categories, "names": COCO_NAMES | own}))
 
 
 def write(path: str | PathLike[str], masks: InstanceMasks) -> None:

@@ -1,0 +1,61 @@
+"""JSON files of masks: the content tells COCO, COCO panoptic, labelme and Segment Anything apart."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ldls.io.files import open_file
+from ldls.io.masks import panoptic_png
+from ldls.io.masks.coco_json import MAX_FILE_BYTES
+from ldls.masks import InstanceMasks, adapters, coco, labelme
+
+
+def read(
+    path: str | PathLike[str],
+    *,
+    image_id: int | str | None = None,
+    image_size: tuple[int, int] | None = None,
+    names: Mapping[int, str] | None = None,
+) -> InstanceMasks:
+    """The masks of one image of a file.
+
+    Args:
+        path: `.json` file.
+        image_id: Which image, where there are several.
+        image_size: (height, width) in pixels, where the file does not say.
+        names: Name of each category id, where the file does not say; COCO's own list without them.
+
+    Raises:
+        MaskError: An annotation cannot be used.
+        CorruptFileError: The file is not JSON, or of none of these.
+        LimitError: The file is too large.
+    """
+    with open_file(path, "JSON file", limit=MAX_FILE_BYTES) as file:
+        content = json.loads(file.text(), parse_constant=_refuse_constant)
+        if isinstance(content, dict) and "shapes" in content:
+            return InstanceMasks(**labelme.arguments(content, names=names))
+        if isinstance(content, dict) and panoptic_png.is_panoptic(content):
+            return panoptic_png.read(Path(path), content, image_id=image_id)
+        if _is_sam(_records(content)):
+            return InstanceMasks(**adapters.from_sam(_records(content), names=names, image_size=image_size))
+        return InstanceMasks(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
+
+
+def _records(content: Any) -> list[Any]:  # noqa: ANN401
+    found = content.get("annotations") if isinstance(content, dict) else content
+    return found if isinstance(found, list) else []
+
+
+def _is_sam(records: list[Any]) -> bool:
+    """True for records with a predicted IoU and no category."""
+    return bool(records) and all(
+        isinstance(record, dict) and "predicted_iou" in record and "category_id" not in record for record in records
+    )
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no JSON number")

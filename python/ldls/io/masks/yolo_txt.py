@@ -1,0 +1,85 @@
+"""Polygons of YOLO: a line an instance, the class and x y of each corner as shares of width and height.
+
+A network's results may have the score behind the corners. Source: https://docs.ultralytics.com/datasets/segment/.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+import ldls._ldls as _ldls
+from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids
+from ldls.errors import CorruptFileError, MaskError
+from ldls.io.files import read_lines
+from ldls.masks import InstanceMasks
+
+LEAST_WORDS = 7
+"""A class and the corners of a triangle."""
+CONTIGUOUS_NAMES = {index: COCO_NAMES[category] for index, category in enumerate(CONTIGUOUS_IDS)}
+
+
+def is_yolo(lines: Sequence[str]) -> bool:
+    """True for lines that begin with a class number; KITTI's begin with a name."""
+    words = [line.split() for line in lines if line.strip()]
+    return bool(words) and all(line[0].isdecimal() for line in words)
+
+
+def read(
+    path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
+) -> InstanceMasks:
+    """One mask for each line.
+
+    Args:
+        path: `.txt` file.
+        image_size: (height, width) of the image in pixels, which the file does not say.
+        names: Name of each class by its number, as in a data.yaml; COCO's 80 without them. Names of COCO get COCO's
+            ids, others 100 and the number.
+
+    Raises:
+        MaskError: No image size, boxes instead of polygons, or a class without a name.
+        CorruptFileError: A line that is none of YOLO's.
+    """
+    if image_size is None:
+        raise MaskError(f"{path}: says nothing of the image's size; pass image_size=(height, width)")
+    ids, names_of_ids = category_ids(CONTIGUOUS_NAMES if names is None else names)
+    rles, categories, scores = [], [], []
+    for number, line in enumerate(read_lines(path, "polygons"), start=1):
+        if not line.strip():
+            continue
+        place = f"{path}, line {number}"
+        category, corners, score = _parsed(place, line.split())
+        if category not in ids:
+            raise MaskError(
+                f"{place}: class {category} has no name; pass names={{{category}: '...'}}, all of those in data.yaml"
+            )
+        # shares count from the outer edges of the image, as COCO's polygons do
+        polygon = (corners * image_size[::-1]).ravel().tolist()
+        rles.append(_ldls.Rle.from_polygons(*image_size, [polygon]))
+        categories.append(ids[category])
+        scores.append(score)
+    return InstanceMasks(
+        rles, image_size, categories=np.array(categories, np.int64), scores=scores, names=COCO_NAMES | names_of_ids
+    )
+
+
+def _parsed(place: str, words: list[str]) -> tuple[int, Any, float]:
+    try:
+        category, numbers = int(words[0]), np.array(words[1:], np.float64)
+    except ValueError:
+        raise CorruptFileError(f"{place}: expected a class and numbers, got {' '.join(words)[:60]!r}") from None
+    if len(words) in (5, 6):
+        raise MaskError(
+            f"{place}: a box, expected a polygon of three corners or more; segment with a -seg model, or pass the "
+            "boxes to InstanceMasks.from_boxes"
+        )
+    corners, score = (numbers[:-1], float(numbers[-1])) if len(numbers) % 2 else (numbers, 1.0)
+    shares = np.append(corners, score)
+    if len(words) < LEAST_WORDS or not ((shares >= -1e-6) & (shares <= 1 + 1e-6)).all():
+        raise CorruptFileError(
+            f"{place}: expected a class and x y of three corners or more, as shares of the image from 0 to 1"
+        )
+    return category, corners.reshape(-1, 2), min(max(score, 0.0), 1.0)

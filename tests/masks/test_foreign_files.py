@@ -1,0 +1,151 @@
+"""Mask files of other programs, beside what their own documentation says of them."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import ldls
+from ldls.errors import LeftOutWarning
+
+SQUARE = np.zeros((60, 80), bool)
+SQUARE[15:30, 20:40] = True
+# its corners, as shares of width and height
+YOLO = "0.25 0.25 0.5 0.25 0.5 0.5 0.25 0.5"
+
+
+def pixels(masks):
+    return [mask.to_array() for mask in masks]
+
+
+def test_polygons_of_yolo(tmp_path):
+    (tmp_path / "a.txt").write_text(f"2 {YOLO}\n0 {YOLO} 0.75\n")
+    masks = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))
+    np.testing.assert_array_equal(pixels(masks), [SQUARE, SQUARE])
+    # COCO's 80 classes, by the ids of its list of 91
+    assert masks.categories.tolist() == [3, 1] and masks.scores.tolist() == [1, 0.75]
+    own = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80), names={0: "forklift", 2: "person"})
+    assert own.categories.tolist() == [1, 100] and own.names[100] == "forklift"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        pytest.param(f"2 {YOLO}", {"image_size": None}, "pass image_size", id="no size"),
+        pytest.param("2 0.5 0.5 0.1 0.2", {}, r"line 1: a box, expected a polygon", id="boxes"),
+        pytest.param(f"80 {YOLO}", {}, "class 80 has no name; pass names=", id="unknown class"),
+        pytest.param("2 10 10 20 10 20 20", {}, "as shares of the image from 0 to 1", id="pixels"),
+        pytest.param("2 0.1 0.2 0.3 0.4 0.5 x", {}, "expected a class and numbers", id="word"),
+    ],
+)
+def test_faults_of_yolo_are_named(tmp_path, text, options, message):
+    (tmp_path / "a.txt").write_text(text)
+    with pytest.raises((ldls.MaskError, ldls.CorruptFileError), match=rf"a\.txt.*{message}"):
+        ldls.read_masks(tmp_path / "a.txt", **{"image_size": (60, 80), **options})
+
+
+def test_shapes_of_labelme(tmp_path):
+    corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
+    shapes = [
+        {"label": "person", "points": corners, "shape_type": "polygon", "group_id": None},
+        {"label": "cart", "points": [[20, 15], [30, 30]], "shape_type": "rectangle", "group_id": 7},
+        {"label": "cart", "points": [[40, 30], [30, 15]], "shape_type": "rectangle", "group_id": 7},
+    ]
+    content = {"shapes": shapes, "imageHeight": 60, "imageWidth": 80, "imageData": None}
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    masks = ldls.read_masks(tmp_path / "a.json")
+    np.testing.assert_array_equal(pixels(masks), [SQUARE, SQUARE])
+    assert [masks.names[each] for each in masks.categories.tolist()] == ["person", "cart"]
+    assert masks.categories[0] == 1
+    content["shapes"][0]["shape_type"] = "linestrip"
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.raises(ldls.MaskError, match=r"a\.json: shape 0: linestrip of 4 points, expected a polygon"):
+        ldls.read_masks(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize("wrapped", [False, True], ids=["list", "SA-1B"])
+def test_records_of_segment_anything(tmp_path, wrapped):
+    rle = ldls.InstanceMasks.from_array(SQUARE[None]).to_coco()["annotations"][0]["segmentation"]
+    records = [{"segmentation": rle, "predicted_iou": 0.5, "stability_score": 0.9, "area": 300}]
+    (tmp_path / "a.json").write_text(
+        json.dumps({"image": {"image_id": 1}, "annotations": records} if wrapped else records)
+    )
+    masks = ldls.read_masks(tmp_path / "a.json")
+    np.testing.assert_array_equal(pixels(masks), [SQUARE])
+    assert (masks.categories.tolist(), masks.scores.tolist(), masks.names[1]) == ([1], [0.5], "object")
+
+
+def test_a_folder_of_one_png_an_instance(tmp_path):
+    for number in (10, 2):
+        Image.fromarray(np.where(SQUARE, 255, 0).astype(np.uint8)[:, :: -1 if number == 2 else 1]).save(
+            tmp_path / f"{number}.png"
+        )
+    masks = ldls.read_masks(tmp_path)
+    np.testing.assert_array_equal(pixels(masks), [SQUARE[:, ::-1], SQUARE])
+    with pytest.raises(ldls.MaskError, match="a folder without .png"):
+        (tmp_path / "empty").mkdir()
+        ldls.read_masks(tmp_path / "empty")
+
+
+@pytest.mark.parametrize("folder", ["", "panoptic"])
+def test_coco_panoptic(tmp_path, folder):
+    colours = np.zeros((60, 80, 3), np.uint8)
+    colours[SQUARE], colours[~SQUARE] = [44, 1, 2], [9, 0, 0]
+    (tmp_path / folder).mkdir(exist_ok=True)
+    Image.fromarray(colours).save(tmp_path / folder / "a.png")
+    segments = [{"id": 44 + 256 + 2 * 65536, "category_id": 3}, {"id": 9, "category_id": 7}]
+    content = {
+        "images": [{"id": 5, "height": 60, "width": 80, "file_name": "a.jpg"}],
+        "annotations": [{"image_id": 5, "file_name": "a.png", "segments_info": segments}],
+        "categories": [{"id": 3, "name": "car", "isthing": 1}, {"id": 7, "name": "road", "isthing": 0}],
+    }
+    (tmp_path / "panoptic.json").write_text(json.dumps(content))
+    masks = ldls.read_masks(tmp_path / "panoptic.json")
+    np.testing.assert_array_equal(pixels(masks), [SQUARE])
+    assert masks.categories.tolist() == [3]
+    segments[0]["id"] = 1
+    (tmp_path / "panoptic.json").write_text(json.dumps(content))
+    with pytest.raises(ldls.CorruptFileError, match=r"panoptic\.json: segment 1 has no pixel"):
+        ldls.read_masks(tmp_path / "panoptic.json")
+
+
+def test_stuff_and_groups_of_cityscapes_are_background(tmp_path):
+    values = np.where(SQUARE, 26001, 26).astype(np.uint16)
+    values[0], values[1] = 25002, 7
+    Image.fromarray(values).save(tmp_path / "city_000001_gtFine_instanceIds.png")
+    masks = ldls.read_masks(tmp_path / "city_000001_gtFine_instanceIds.png")
+    assert [masks.names[each] for each in masks.categories.tolist()] == ["rider", "car"]
+    np.testing.assert_array_equal(masks[1].to_array(), SQUARE)
+
+
+def test_an_empty_segmentation_is_left_out(tmp_path):
+    content = ldls.InstanceMasks.from_array(SQUARE[None], categories=[1]).to_coco()
+    content["annotations"].append(content["annotations"][0] | {"id": 9, "segmentation": []})
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.warns(LeftOutWarning, match="1 of 2 annotations have an empty segmentation"):
+        assert len(ldls.read_masks(tmp_path / "a.json")) == 1
+
+
+@pytest.mark.filterwarnings("ignore::ldls.errors.LeftOutWarning")
+@pytest.mark.parametrize(
+    ("name", "options", "names"),
+    [
+        pytest.param("labelme.json", {}, None, id="labelme"),
+        pytest.param("sa1b.json", {}, ["object"], id="SA-1B"),
+        pytest.param("sam_amg.json", {}, ["object"], id="Segment Anything"),
+        pytest.param("yolo_seg.txt", {"image_size": (60, 80)}, ["person", "car"], id="YOLO"),
+        pytest.param("defaultcity_000001_000031_gtFine_instanceIds.png", {}, ["bus?"], id="Cityscapes"),
+        pytest.param("panoptic.json", {}, [], id="panoptic, stuff alone"),
+    ],
+)
+def test_files_of_others_are_read(data_folder, name, options, names):
+    masks = ldls.read_masks(data_folder / "real/masks" / name, **options)
+    found = [masks.names[each] for each in masks.categories.tolist()]
+    if name == "labelme.json":
+        shapes = json.loads((data_folder / "real/masks" / name).read_text())["shapes"]
+        assert found == [shape["label"] for shape in shapes] and len(masks) > 0
+    elif name.startswith("defaultcity"):
+        assert found == ["truck", "truck"]
+    else:
+        assert found == names
