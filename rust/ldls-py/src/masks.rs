@@ -9,7 +9,7 @@ use numpy::{
 };
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyType};
 
 /// One mask as column-major run lengths.
 #[pyclass(frozen, module = "ldls._ldls", skip_from_py_object)]
@@ -60,6 +60,15 @@ impl Rle {
         let [height, width] = [pixels.shape()[0], pixels.shape()[1]];
         let pixels = slice(py, "mask", &pixels)?;
         run_here(py, || ldls_core::Rle::from_pixels(height, width, pixels)).map(Self)
+    }
+
+    /// For pickling and copying.
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (usize, usize, Py<PyArray1<u32>>))> {
+        let make = slf.get_type().getattr("from_runs")?;
+        let rle = slf.get();
+        Ok((make, (rle.height(), rle.width(), rle.runs(slf.py()))))
     }
 
     #[getter]
@@ -137,6 +146,13 @@ impl Masks {
     ) -> PyResult<Self> {
         let masks = masks.iter().map(|mask| mask.0.clone()).collect();
         run_here(py, || ldls_core::InstanceMasks::new(height, width, masks)).map(Self)
+    }
+
+    /// For pickling and copying.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (usize, usize, Vec<Rle>)) {
+        let masks = &slf.get().0;
+        let rles = masks.masks().iter().cloned().map(Rle).collect();
+        (slf.get_type(), (masks.height(), masks.width(), rles))
     }
 
     #[getter]
