@@ -336,3 +336,22 @@ def test_masks_grow_and_shrink_by_a_disk(radius):
 def test_a_radius_that_is_none_is_refused(radius):
     with pytest.raises(ldls.ParameterError, match="radius"):
         three_masks().grow(radius)
+
+
+def test_an_array_with_the_masks_last_is_refused_until_it_says_so():
+    pixels = np.zeros((120, 160, 2), bool)
+    pixels[5:9, 5:9, 1] = True
+    with pytest.raises(
+        ldls.MaskError, match=r"looks like 2 masks of 120 x 160; pass instance_axis=-1, or 0 if it is 120"
+    ):
+        ldls.InstanceMasks.from_array(pixels)
+    assert ldls.InstanceMasks.from_array(pixels, instance_axis=-1).image_size == (120, 160)
+    assert ldls.InstanceMasks.from_array(pixels, instance_axis=0).image_size == (160, 2)
+    assert len(ldls.InstanceMasks.from_array(np.zeros((200, 60, 80), bool))) == 200
+
+
+def test_categories_may_be_names():
+    pixels = np.zeros((2, 60, 80), bool)
+    assert ldls.InstanceMasks.from_array(pixels, categories=["car", "person"]).categories.tolist() == [3, 1]
+    with pytest.raises(ldls.ParameterError, match="categories: 'caar' is unknown; did you mean 'car'"):
+        ldls.InstanceMasks.from_array(pixels, categories=["caar", "person"])

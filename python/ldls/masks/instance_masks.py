@@ -18,6 +18,10 @@ from ldls.masks.pixels import checked_size, encode, rectangles
 
 MAX_INSTANCES = 65_535
 """Most masks of an image: labels of pixels have 16 bits."""
+STRIP = 4
+"""An array whose last axis is so many times shorter than the others is taken for (H, W, M)."""
+LEAST_SIDE = 100
+"""Images are larger, in pixels, where nobody says which axis counts the masks."""
 MAX_RADIUS = 10_000
 """Farthest that masks grow or shrink, in pixels."""
 
@@ -50,7 +54,7 @@ class InstanceMasks:
         if categories is None:
             categories, names = np.ones(len(rles), np.int32), names or {1: "object"}
         self.names = dict(COCO_NAMES if names is None else names)
-        self.categories = _per_mask("categories", categories, len(rles), np.int32)
+        self.categories = _per_mask("categories", _ids(categories, self.names), len(rles), np.int32)
         self.scores = _per_mask("scores", 1.0 if scores is None else scores, len(rles), np.float32)
         self._check()
 
@@ -64,18 +68,19 @@ class InstanceMasks:
         scores: ArrayLike | None = None,
         names: Mapping[int, str] | None = None,
         image_size: tuple[int, int] | None = None,
-        instance_axis: int = 0,
+        instance_axis: int | None = None,
     ) -> Self:
         """Masks from pixels.
 
         Args:
             masks: (M, H, W) array, or M arrays of (H, W): bool, 0 and 1, 0 and 255, or probabilities (at least 0.5
                 is the object).
-            categories: (M,) category ids; without them all are category 1, "object".
+            categories: (M,) category ids, or names; without them all are category 1, "object".
             scores: (M,) scores from 0 to 1; all 1 without them.
             names: Name of each category id; COCO's 91-entry list without them.
             image_size: (H, W) of the image; only needed where M may be 0.
-            instance_axis: The axis of an array that counts the masks: 0, or -1 for (H, W, M).
+            instance_axis: The axis of an array that counts the masks: 0, the default, or -1 for (H, W, M). An array
+                that looks like (H, W, M) is refused without it.
 
         Raises:
             MaskError: Masks of different sizes, values that are no mask, an unknown category or a bad score.
@@ -363,6 +368,14 @@ def _image_size(masks: object, rles: Sequence[_ldls.Rle]) -> tuple[int, int]:
     raise MaskError("masks: none given; pass image_size=(height, width) or an array of (0, H, W)")
 
 
+def _ids(categories: ArrayLike, names: Mapping[int, str]) -> ArrayLike:
+    """Category ids of category names, which must be among `names`; numbers as they are."""
+    if not isinstance(categories, Sequence) or not any(isinstance(each, str) for each in categories):
+        return categories
+    with within("masks"):
+        return [find_categories([each], names)[0] for each in categories]
+
+
 def _per_mask(name: str, values: ArrayLike, count: int, dtype: type[np.generic]) -> NDArray[Any]:
     array = as_array(name, values, MaskError)
     if array.ndim == 0:
@@ -375,10 +388,13 @@ def _per_mask(name: str, values: ArrayLike, count: int, dtype: type[np.generic])
     return array
 
 
-def _one_by_one(masks: ArrayLike | Iterable[ArrayLike], instance_axis: int) -> Iterable[ArrayLike]:
+def _one_by_one(masks: ArrayLike | Iterable[ArrayLike], instance_axis: int | None) -> Iterable[ArrayLike]:
     """The masks of an array or list, or of what yields one after another."""
-    if instance_axis not in (0, -1):
+    if instance_axis not in (0, -1, None):
         raise ParameterError(f"instance_axis: got {instance_axis!r}, expected 0 or -1")
+    if instance_axis is None:
+        _refuse_last_axis(np.shape(masks) if isinstance(masks, np.ndarray) else ())
+        instance_axis = 0
     if isinstance(masks, np.ndarray) or instance_axis or not isinstance(masks, Iterable):
         array = as_array("masks", masks, MaskError)
         if array.ndim == 0 or (instance_axis and array.ndim != 3):
@@ -388,6 +404,16 @@ def _one_by_one(masks: ArrayLike | Iterable[ArrayLike], instance_axis: int) -> I
     if isinstance(masks, Sized) and len(masks) > MAX_INSTANCES:
         raise LimitError(f"masks: {len(masks)} instances exceed the limit of {MAX_INSTANCES}")
     return masks
+
+
+def _refuse_last_axis(shape: tuple[int, ...]) -> None:
+    """Refuse (H, W, M) where (M, H, W) is expected: images are no strips, and masks not as many as rows."""
+    if len(shape) == 3 and max(LEAST_SIDE, STRIP * shape[2]) < min(shape[:2]):
+        height, width, n_masks = shape
+        raise MaskError(
+            f"masks: shape {shape} looks like {n_masks} masks of {height} x {width}; pass instance_axis=-1, or 0 if it "
+            f"is {height} masks of {width} x {n_masks}"
+        )
 
 
 def _as_index(indices: ArrayLike, count: int) -> NDArray[Any]:

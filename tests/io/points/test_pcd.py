@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 import ldls
 
@@ -163,3 +164,44 @@ def test_numbers_that_a_field_of_whole_numbers_cannot_hold_are_named(tmp_path, v
     content = header(WIDTH="2", POINTS="2", DATA="ascii", SIZE="4 4 4 1", TYPE="F F F U")
     with pytest.raises(ldls.CorruptFileError, match="intensity of point 1 is .*, expected whole numbers 0 to 255"):
         ldls.read_points(write(tmp_path, content + f"1 2 3 255\n1 2 3 {value}\n".encode()))
+
+
+def test_zeros_that_make_a_page_with_the_header_are_padding(tmp_path):
+    cloud = np.arange(12, dtype=np.float32).reshape(4, 3)
+    head = b"VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 4\nHEIGHT 1\nPOINTS 4\nDATA binary\n"
+    path = tmp_path / "a.pcd"
+    path.write_bytes(head + cloud.tobytes() + bytes(4096 - len(head)))
+    np.testing.assert_array_equal(ldls.read_points(path), cloud)
+    path.write_bytes(head + cloud.tobytes() + bytes(4095 - len(head)) + b"\1")
+    with pytest.raises(ldls.CorruptFileError, match="mend the header"):
+        ldls.read_points(path)
+
+
+def test_text_with_commas_and_the_digits_of_utm(tmp_path):
+    head = "VERSION .7\nFIELDS x y z i\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 2\nWIDTH 2\nPOINTS 2\nDATA ascii\n"
+    path = tmp_path / "a.pcd"
+    path.write_text(f"{head}289814.15,4320978.61,170.76,1,2\n289814.64,4320978.84,170.76,3,4\n")
+    points = ldls.read_points(path)
+    # a field of several values is no intensity
+    assert points.dtype == np.float64 and points.tolist() == [
+        [289814.15, 4320978.61, 170.76],
+        [289814.64, 4320978.84, 170.76],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "n_points"),
+    [("padded_pcl.pcd", 110), ("padded_intensity.pcd", 213), ("commas.pcd", 10), ("count_4.pcd", 8)],
+)
+def test_files_of_others(data_folder, name, n_points):
+    points = ldls.read_points(data_folder / "real/clouds" / name)
+    assert len(points) == n_points and np.isfinite(points[:, :3]).all()
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_sweeps_of_others_hold_the_boards_cut_out_of_them(data_folder, number):
+    sweep, board = (ldls.read_points(data_folder / f"real/boards/{name}{number}.pcd") for name in ("", "plane"))
+    kept = sweep[np.isfinite(sweep).all(axis=1), :3]
+    # the cut-out was written as text
+    distances, _ = KDTree(kept).query(board[:, :3])
+    assert len(board) > 100 and distances.max() < 1e-7

@@ -28,6 +28,9 @@ TYPES = {
 }  # fmt: skip
 COUNTS = ("POINTS", "WIDTH", "HEIGHT")
 MAX_POINT_BYTES = 1 << 16
+PAGE_BYTES = 4096
+MOST_LOST_M = 5e-4
+"""What coordinates in text may lose in single precision; UTM's lose more, and are kept in doubles."""
 LZF_RATIO = 88
 """No stream of LZF unpacks to more than this many times its size: three bytes stand for at most 264."""
 
@@ -61,7 +64,9 @@ class Header:
 
 
 def read(path: Path) -> Points:
-    """(N, 3 or 4) points: x y z and, where there is one, intensity; float32 unless the file has doubles.
+    """(N, 3 or 4) points: x y z and, where there is one, intensity; float32 unless more is needed.
+
+    Doubles need more, and text with digits that single precision loses.
 
     Points of a cloud with rows stay in the order of the file; those that are NaN stay, too.
 
@@ -73,16 +78,19 @@ def read(path: Path) -> Points:
         ImportError: binary_compressed needs the extra `pcd`.
     """
     with open_file(path, "PCD file") as file:
-        lines, body = split_header(file.read(), "DATA")
+        content = file.read()
+        lines, body = split_header(content, "DATA")
         header = _parse(lines)
         columns = NamedColumns.find("FIELDS", [field.name for field in header.fields])
-        for field in (header.fields[position] for position in columns.positions):
+        for field in (header.fields[position] for position in columns.positions[:3]):
             if field.count != 1:
                 raise CorruptFileError(f"COUNT of {field.name} is {field.count}, expected 1")
+        # several values are no intensity
+        columns = NamedColumns(tuple(at for at in columns.positions if header.fields[at].count == 1))
         if header.encoding == "ascii":
             return _read_ascii(header, columns, as_text(body), len(lines))
         if header.encoding == "binary":
-            return _read_binary(header, columns, body)
+            return _read_binary(header, columns, _without_padding(header, body, len(content) - len(body)))
         return _read_compressed(header, columns, body)
 
 
@@ -90,9 +98,26 @@ def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines
     rows = text_rows(text, n_header_lines)
     _check_amount(header, "lines", header.n_points, len(rows), slack=0)
     first_cells = np.cumsum([0, *(field.count for field in header.fields)])
-    cells = read_rows(rows, [int(first_cells[position]) for position in columns.positions])
+    delimiter = "," if rows and "," in rows[0][1] else None
+    cells = read_rows(rows, [int(first_cells[position]) for position in columns.positions], delimiter)
     fields = [header.fields[position] for position in columns.positions]
-    return columns.stack([of_kind(f.name, column, f.kind) for f, column in zip(fields, cells.T, strict=True)])
+    stacked = [of_kind(f.name, column, f.kind) for f, column in zip(fields, cells.T, strict=True)]
+    if any(_lost_m(cells[:, axis], stacked[axis]) > MOST_LOST_M for axis in range(3)):
+        stacked[:3] = cells.T[:3]
+    return columns.stack(stacked)
+
+
+def _lost_m(written: NDArray[np.float64], kept: NDArray[np.number]) -> float:
+    """What a column of text loses in the type that the header gives it."""
+    finite = np.isfinite(written) & np.isfinite(kept)
+    return float(np.abs(written[finite] - kept[finite]).max(initial=0))
+
+
+def _without_padding(header: Header, body: bytes, n_header_bytes: int) -> bytes:
+    """`body` without the zeros with which older writers of PCL fill as many bytes as make a page with the header."""
+    size = header.n_points * header.point_bytes
+    padding = body[size:]
+    return body[:size] if (n_header_bytes + len(padding)) % PAGE_BYTES == 0 and not any(padding) else body
 
 
 def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
