@@ -24,6 +24,7 @@ from ldls.errors import (
     within,
 )
 from ldls.io.files import opened, parsing
+from ldls.io.ros.known_types import KnownTypes
 from ldls.io.ros.messages import Message, RawMessage, Topic, Types, seconds, standard_types
 from ldls.io.ros.salvage import NO_LIMIT, Salvage, check_database_size, open_bag_file, salvage
 
@@ -176,10 +177,16 @@ def storage_files(path: Path) -> list[Path]:
 def _indexed(path: Path) -> Bag:
     """A whole bag, read through its index."""
     with _plain_errors(path):
-        reader = require("rosbags.highlevel", "ros").AnyReader(
-            [_BagPath(path)], default_typestore=standard_types(ros2=path.suffix != ".bag")
-        )
-        reader.open()
+        highlevel = require("rosbags.highlevel", "ros")
+        types = standard_types(ros2=path.suffix != ".bag")
+        reader = highlevel.AnyReader([_BagPath(path)], default_typestore=types)
+        try:
+            reader.open()
+        except highlevel.AnyReaderError:
+            # a type that nobody may ask for must not cost the others
+            reader = highlevel.AnyReader([_BagPath(path)], default_typestore=types)
+            reader.readers = [KnownTypes(each) for each in reader.readers]
+            reader.open()
         topics = {
             name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
             for name, info in reader.topics.items()
