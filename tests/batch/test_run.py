@@ -506,3 +506,21 @@ def test_records_reach_the_journal_while_the_run_lasts(few, tmp_path, monkeypatc
     run(few, tmp_path / "out", on_progress=lambda *_: seen.append(journal.read_text().count("\n")))
     assert seen == sorted(seen)
     assert seen[5] >= 6
+
+
+@pytest.mark.parametrize("by", ["command", "call"])
+def test_options_of_the_source_choose_and_belong_to_the_run(tmp_path, by):
+    source = layouts.many_frames(tmp_path / "source", 2, cameras=(2, 3))
+    for number in (2, 3):
+        out, masks = tmp_path / f"out {number}", source / f"masks/image_{number}"
+        if by == "call":
+            batch.run(source, out, batch.RunSettings(masks=str(masks)), options={"camera": number})
+        else:
+            outcome = command("run", source, "--masks", masks, "--option", f"camera={number}", "--out", out)
+            assert outcome.exit_code == 0, outcome.output
+        frame = open_source(source, camera=number)[0]
+        one = ldls.segment(frame.points, ldls.read_masks(masks / "000000.json"), frame.images[0].camera)
+        ldls.save(one, tmp_path / "one.label")
+        assert (out / "000000.label").read_bytes() == (tmp_path / "one.label").read_bytes()
+    with pytest.raises(BatchError, match="options"):
+        batch.run(source, out, batch.RunSettings(masks=str(masks)), options={"camera": 2})

@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
@@ -35,6 +36,7 @@ def run(
     settings: RunSettings,
     *,
     frames: slice = slice(None),
+    options: Mapping[str, Any] | None = None,
     workers: int | None = None,
     engine: str | Engine = "local",
     ray_address: str | None = None,
@@ -52,6 +54,8 @@ def run(
         out: Folder for the results; made if need be.
         settings: How frames are treated.
         frames: Which frames of the source.
+        options: Options of the source's kind, for `ldls.datasets.open_source`. Of a source that is open already, those
+            that it was opened with: a run goes on only with the same ones.
         workers: Frames segmented at a time; as many as the process, or the cluster, may use cores by default.
         engine: Where they are segmented: "local", "ray", or an engine of your own.
         ray_address: Address of the Ray cluster to join; by default one is started on this machine.
@@ -68,7 +72,8 @@ def run(
         ImportError: The engine needs an extra that is not installed.
         OSError: The results cannot be written, as on a full disk; what is written stays, and the run can go on.
     """
-    opened = open_source(source, truth=False) if isinstance(source, str | PathLike) else source
+    options = dict(options or {})
+    opened = open_source(source, truth=False, **options) if isinstance(source, str | PathLike) else source
     runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
     chosen = list(zip(range(len(opened))[frames], opened.names[frames], strict=True))
     names = [name for _, name in chosen]
@@ -80,7 +85,7 @@ def run(
         work = FrameWork(opened, settings, folder)
         header = {
             "settings": settings.record(),
-            "source": source_record(opened.kind, str(Path(opened.path).resolve()), names),
+            "source": source_record(opened.kind, str(Path(opened.path).resolve()), names, options),
         }
         journal = Journal(folder, header)
         try:

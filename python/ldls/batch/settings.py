@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -82,7 +82,8 @@ def fill(pattern: str, frame: str, camera: str) -> str:
     return pattern.replace("{frame}", frame).replace("{camera}", camera)
 
 
-def source_record(kind: str, path: str, names: Sequence[str]) -> dict[str, Any]:
-    """A source as a journal stores it: its path and its frames."""
+def source_record(kind: str, path: str, names: Sequence[str], options: Mapping[str, Any]) -> dict[str, Any]:
+    """A source as a journal stores it: its path, its frames and the options that it was opened with."""
     digest = hashlib.sha256("\n".join(names).encode()).hexdigest()
-    return {"kind": kind, "path": path, "frames": len(names), "names_sha256": digest}
+    given = {name: str(value) for name, value in sorted(options.items())}
+    return {"kind": kind, "path": path, "frames": len(names), "names_sha256": digest, "options": given}

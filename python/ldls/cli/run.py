@@ -12,7 +12,7 @@ from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
 from ldls.cli.options import FRAMES_FAILED, STOPPED, words
 from ldls.cli.progress import frame_progress
-from ldls.cli.source_options import DatasetOption, SourceArgument, StoredMasksOption
+from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption, StoredMasksOption, parse_options
 from ldls.params import Params
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def run(
         typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
     ] = None,
     dataset: DatasetOption = None,
+    option: SourceOption = None,
     workers: Annotated[
         int | None, typer.Option(help="Frames at a time, one a core.", min=1, show_default="all cores")
     ] = None,
@@ -75,7 +76,8 @@ def run(
         params=params,
         formats=words(formats),
     )
-    opened = open_source(source, kind=dataset, truth=False)
+    options = parse_options(option or [])
+    opened = open_source(source, kind=dataset, truth=False, **options)
     finished = failed = 0
     with frame_progress("labelling") as show_progress:
 
@@ -90,6 +92,7 @@ def run(
                 out,
                 settings,
                 frames=parse_frames(frames),
+                options=options,
                 workers=workers,
                 engine=engine,
                 ray_address=ray_address,

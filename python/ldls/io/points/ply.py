@@ -25,7 +25,7 @@ TYPES = {
     "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float32": "f4", "float64": "f8",
 }  # fmt: skip
-TYPE_NAMES = {"<f4": "float", "<f8": "double", "<u4": "uint", "|u1": "uchar"}
+TYPE_NAMES = {"<f4": "float", "<f8": "double", "<i4": "int", "|u1": "uchar"}
 
 
 @dataclass
@@ -158,7 +158,8 @@ def write(path: Path, result: Segmentation) -> None:
     }
     real = "<f4" if result.points.dtype == np.float32 else "<f8"
     kinds = dict.fromkeys(position, real) | dict.fromkeys(CHANNELS, "|u1")
-    kinds |= {"label": "<u4", "instance": "<u4", "confidence": "<f4"}
+    # signed, for Open3D passes over unsigned properties of 32 bits
+    kinds |= {"label": "<i4", "instance": "<i4", "confidence": "<f4"}
     vertices = np.empty(len(result.labels), list(kinds.items()))
     for name, column in columns.items():
         vertices[name] = column
