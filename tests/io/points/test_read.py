@@ -78,3 +78,15 @@ def las_header(compressed):
 def packed_pcd():
     header = b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 1\nDATA binary_compressed\n"
     return header + np.array([2, 12], "<u4").tobytes() + b"ab"
+
+
+@pytest.mark.parametrize("columns", [6, 8])
+def test_rows_of_more_columns_are_not_taken_for_four(tmp_path, columns):
+    cloud = np.zeros((120, columns), np.float32)
+    cloud[:, :4] = np.random.default_rng(0).uniform(-40, 40, (120, 4))
+    # a time in double precision fills two of them
+    cloud[:, columns - 2 :] = (1.7e9 + np.linspace(0, 977, 120))[:, None].view(np.float32)
+    cloud.tofile(tmp_path / "a.bin")
+    with pytest.raises(ldls.FileFormatError, match=rf"a\.bin: guessed 4 floats a point, .*; pass columns={columns} "):
+        ldls.read_points(tmp_path / "a.bin")
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / "a.bin", columns=columns)[:, :4], cloud[:, :4])

@@ -14,6 +14,10 @@ from ldls.io.files import open_file
 
 FLOAT_BYTES = 4
 MAX_RINGS = 256
+FARTHEST_M = 1e7
+SMALLEST_M = 1e-20
+MOST_TRIED = 16
+"""Columns that a file of another layout is tried with."""
 
 
 def read(path: Path, *, columns: int | None = None, recover: bool = False) -> NDArray[np.float32]:
@@ -51,8 +55,30 @@ def _rows(path: Path, content: bytes, columns: int, *, guessed: bool, recover: b
         warnings.warn(f"{path}: {message}", RecoveredFileWarning, stacklevel=4)
     values = np.frombuffer(content, "<f4", count=whole // FLOAT_BYTES)
     if guessed:
+        _check_positions(values, columns)
         _check_guess(values, columns)
     return values.reshape(-1, columns).astype(np.float32, copy=False)
+
+
+def _check_positions(values: NDArray[np.float32], columns: int) -> None:
+    """Refuse a guess by which points lie where no lidar reaches, if with another number of columns none does."""
+    if _are_positions(values, columns):
+        return
+    fitting = [
+        other for other in range(3, MOST_TRIED + 1) if values.size % other == 0 and _are_positions(values, other)
+    ]
+    if fitting:
+        raise FileFormatError(
+            f"guessed {columns} floats a point, but then points lie farther than {FARTHEST_M:.0e} m; pass "
+            f"columns={fitting[0]} (or columns={columns} to insist)"
+        )
+
+
+def _are_positions(values: NDArray[np.float32], columns: int) -> bool:
+    """True if the first three of so many columns are coordinates: none is huge, or all but zero."""
+    positions = np.abs(values.reshape(-1, columns)[:, :3])
+    with np.errstate(invalid="ignore"):
+        return not ((positions > FARTHEST_M) | ((positions > 0) & (positions < SMALLEST_M))).any()
 
 
 def _check_guess(values: NDArray[np.float32], columns: int) -> None:
