@@ -26,6 +26,8 @@ WORDS = (
     b"#", b":", b",",
 )  # fmt: skip
 """Words that are no numbers, or no numbers that fit, and signs that text formats are made of."""
+LARGEST_BYTES = 1 << 24
+"""Lines doubled again and again end here."""
 ARRAYS = tuple(
     _npy(np.array(values))
     for values in (
@@ -55,7 +57,8 @@ def mutated(seeds, random_, *, text=False, gentle=0.0):
     for _ in range(n_changes):
         at = random_.randrange(len(parts))
         other = random_.choice(seeds)
-        parts[at] = random_.choice(changes)(parts[at], random_, other[min(at, len(other) - 1)])
+        changed = random_.choice(changes)(parts[at], random_, other[min(at, len(other) - 1)])
+        parts[at] = changed[:LARGEST_BYTES]
     return parts
 
 
