@@ -375,3 +375,8 @@ def _filled(boxes):
     names = {1: "pedestrian", 2: "truck", 3: "other"}
     categories = [{"pedestrian": 1, "truck": 2}.get(box.category, 3) for box in boxes]
     return ldls.InstanceMasks.from_array(pixels, categories=categories, scores=np.ones(len(boxes)), names=names)
+
+
+def test_frames_come_one_after_the_other(tmp_path):
+    source = open_source(layouts.many_frames(tmp_path / "source", 3))
+    assert [frame.name for frame in source] == list(source.names)

@@ -200,3 +200,11 @@ def test_no_reader_goes_by_another_way():
     # a run's journal and lock are its own files, which grow while they are read
     others = {name for name, text in modules.items() if BY_OTHER_WAYS.search(text) and not name.startswith("batch/")}
     assert others == FROM_THE_DOOR
+
+
+def test_a_folder_to_write_to_that_is_not_there_is_named(tmp_path):
+    with (
+        pytest.raises(FileNotFoundError, match="no such folder to write to; make it first: .*nowhere'"),
+        whole_file(tmp_path / "nowhere/a.json"),
+    ):
+        pass

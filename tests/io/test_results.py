@@ -41,7 +41,7 @@ def test_ply_files_hold_points_labels_and_colours(result, tmp_path):
     header, _, body = (tmp_path / "a.ply").read_bytes().partition(b"end_header\n")
     lines = header.decode().splitlines()
     assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
-    types = {"float": "<f4", "uint": "<u4", "uchar": "u1"}
+    types = {"float": "<f4", "int": "<i4", "uchar": "u1"}
     properties = [line.split()[1:] for line in lines if line.startswith("property")]
     vertices = np.frombuffer(body, [(name, types[kind]) for kind, name in properties])
     assert f"element vertex {len(result.labels)}" in lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -67,6 +67,10 @@ class FileSource:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames one after the other."""
+        return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""

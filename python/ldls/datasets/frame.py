@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -76,6 +76,10 @@ class Source(Protocol):
 
     def __len__(self) -> int:
         """Number of frames."""
+        ...
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames one after the other."""
         ...
 
     def files(self, index: int) -> tuple[Path, ...]:

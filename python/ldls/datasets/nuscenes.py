@@ -6,7 +6,7 @@ FOLDER/lidarseg with their tables.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 
@@ -96,6 +96,10 @@ class NuScenesSource:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames one after the other."""
+        return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""

@@ -8,7 +8,7 @@ It has the `timestamp` in seconds; `lidar` with `file` and `columns`; `cameras` 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -91,6 +91,10 @@ class NuScenesFrameSource:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames one after the other."""
+        return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""

@@ -183,6 +183,8 @@ def names_file(path: str | PathLike[str]) -> Iterator[None]:
 def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails."""
     target = Path(path)
+    if not target.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such folder to write to; make it first", str(target.parent))
     # beside the target, for only within one file system is a file renamed at a stroke; without its name, which may be
     # as long as names can be
     temporary = target.with_name(f".{secrets.token_hex(8)}{UNFINISHED}")
