@@ -80,6 +80,9 @@ def kitti_odometry(folder, n_frames=3):
     return sequence
 
 
+MODALITIES = {"LIDAR": "lidar", "CAM": "camera", "RADAR": "radar"}
+
+
 def nuscenes(folder, scenes=("scene-0001",), n_frames=2, version="v1.0-mini", channels=NUSCENES_CHANNELS):
     """Each scene drives along global x at 10 m/s; images are 20 ms earlier than their sweep."""
     made = {name: [] for name in ("scene", "sample", "sample_data", "calibrated_sensor", "ego_pose", "sensor")}
@@ -88,7 +91,13 @@ def nuscenes(folder, scenes=("scene-0001",), n_frames=2, version="v1.0-mini", ch
         is_camera = channel.startswith("CAM")
         # w x y z of the turn from a camera's axes (right, down, forward) to the car's
         turn = [0.5, -0.5, 0.5, -0.5] if is_camera else [1.0, 0, 0, 0]
-        made["sensor"].append({"token": f"sensor {channel}", "channel": channel, "modality": "any"})
+        made["sensor"].append(
+            {
+                "token": f"sensor {channel}",
+                "channel": channel,
+                "modality": MODALITIES[channel.partition("_")[0]],
+            }
+        )
         made["calibrated_sensor"].append(
             {
                 "token": f"calibrated {channel}",
@@ -133,7 +142,7 @@ def _sample(folder, made, scene, number, stamp_us, channels):
         made["sample_data"] += [taken, between]
         if is_camera:
             write_image(folder / name)
-        elif channel == "LIDAR_TOP":
+        elif channel.startswith("LIDAR"):
             points = cloud(5)
             points[:, 4] = np.arange(100) % 32
             write_points(folder / name, points)

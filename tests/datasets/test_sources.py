@@ -255,7 +255,7 @@ def replaced(path, old, new):
                      id="nuscenes without a camera's files"),
         pytest.param("nuscenes", with_text("v1.0-mini/sample.json", '[{"token": "a"}'), ldls.CorruptFileError,
                      "row 1: lacks scene_token, timestamp", id="nuscenes with another sample table"),
-        pytest.param("nuscenes", with_text("v1.0-mini/sensor.json", "[]x"), ldls.SourceError, "none of",
+        pytest.param("nuscenes", with_text("v1.0-mini/sensor.json", "[]x"), ldls.SourceError, "has no lidar",
                      id="nuscenes without sensors"),
         pytest.param("nuscenes", replaced("v1.0-mini/sample_data.json", "samples/CAM_BACK/", "../CAM_BACK/"),
                      ldls.UnsafePathError, "leads out of", id="nuscenes with a path that climbs out"),
@@ -380,3 +380,18 @@ def _filled(boxes):
 def test_frames_come_one_after_the_other(tmp_path):
     source = open_source(layouts.many_frames(tmp_path / "source", 3))
     assert [frame.name for frame in source] == list(source.names)
+
+
+def test_other_cameras_in_the_layout_of_nuscenes(tmp_path):
+    layouts.nuscenes(tmp_path, n_frames=1, channels=("LIDAR_CONCAT", "CAM_SIDE", "CAM_BACK"))
+    source = open_source(tmp_path)
+    assert source.camera_names == ("CAM_BACK", "CAM_SIDE")
+    assert [image.name for image in source[0].images] == ["CAM_BACK", "CAM_SIDE"]
+
+
+def test_a_data_set_of_others_in_the_layout_of_nuscenes(data_folder):
+    source = open_source(data_folder / "real/t4")
+    assert (len(source), source.camera_names) == (3, ("CAM_FRONT", "CAM_BACK"))
+    frame = source[0]
+    assert len(frame.points) > 0 and frame.images[0].camera.distortion.model == "plumb_bob"
+    np.testing.assert_allclose(np.linalg.inv(frame.images[0].camera.T_camera_lidar)[:3, 3], [1.5, 0, -0.2], atol=1e-9)

@@ -1,4 +1,4 @@
-"""nuScenes: key frames of six cameras and a lidar, by the tables of the data set.
+"""nuScenes, and data sets in its layout: key frames of cameras and a lidar, by the tables of the data set.
 
 FOLDER/v1.0-mini/*.json, FOLDER/samples/LIDAR_TOP, FOLDER/samples/CAM_FRONT and so on; for truth FOLDER/panoptic or
 FOLDER/lidarseg with their tables.
@@ -6,7 +6,7 @@ FOLDER/lidarseg with their tables.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import numpy as np
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets import nuscenes_tables as tables
-from ldls.datasets.file_source import check_truth, counts_of, image_from_file, warn_left_out
+from ldls.datasets.file_source import check_truth, choose, counts_of, image_from_file, warn_left_out
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.nuscenes_tables import Reading
 from ldls.errors import SourceError
@@ -39,6 +39,7 @@ class NuScenesSource:
     Attributes:
         kind: "nuscenes".
         path: Folder of the data set.
+        camera_names: The cameras of the tables, nuScenes' own in its order first.
         names: Scene and number of each frame in it, as "scene-0061_007"; scenes in the order of their time.
         stamps: Times of the sweeps in seconds since 1970.
         left_out: Parts that incomplete frames lack, by name of the frame.
@@ -46,7 +47,6 @@ class NuScenesSource:
 
     kind = "nuscenes"
     looks_for = "v1.0-*/sample_data.json"
-    camera_names = CAMERAS
 
     def __init__(
         self,
@@ -54,6 +54,7 @@ class NuScenesSource:
         *,
         scene: str | None = None,
         version: str | None = None,
+        lidar: str | None = None,
         truth: bool = True,
     ) -> None:
         """Read the tables, a row at a time; what is kept is some 6 kB a frame.
@@ -62,6 +63,7 @@ class NuScenesSource:
             path: Folder of the data set.
             scene: Name of a scene, as "scene-0061"; all of them without it.
             version: Name of the tables' folder, as "v1.0-mini", if there are several.
+            lidar: Channel of the lidar; LIDAR_TOP, or the only one there is, without it.
             truth: Give frames their truth, where it is there.
 
         Raises:
@@ -74,9 +76,16 @@ class NuScenesSource:
         self.path = Path(path)
         folder = tables.find_tables(self.path, version)
         samples = tables.read_sample_names(folder, scene)
-        self._sensors = tables.read_sensors(folder, (LIDAR, *CAMERAS))
+        lidars, cameras = tables.read_channels(folder)
+        if not lidars or not cameras:
+            raise SourceError(f"{folder / 'sensor.json'}: has no {'camera' if lidars else 'lidar'}")
+        self._lidar = choose(folder, "lidar", lidars, LIDAR if lidar is None and LIDAR in lidars else lidar)
+        # nuScenes' own cameras in its order
+        self.camera_names = tuple(sorted(cameras, key=lambda c: CAMERAS.index(c) if c in CAMERAS else len(CAMERAS)))
+        channels = (self._lidar, *self.camera_names)
+        self._sensors = tables.read_sensors(folder, channels)
         readings = tables.read_readings(folder, samples, self._sensors)
-        missing = _missing(self.path, readings)
+        missing = _missing(self.path, readings, channels)
         self.left_out = {samples[token]: f"no {' and no '.join(what)}" for token, what in missing.items()}
         self.names = tuple(name for token, name in samples.items() if token not in missing)
         if not self.names:
@@ -84,9 +93,9 @@ class NuScenesSource:
             raise SourceError(f"{self.path}: none of {len(samples)} key frames has all its files: {why}")
         warn_left_out(self.path, self.left_out.values(), len(samples))
         self._frames = tuple(readings[token] for token in samples if token not in missing)
-        self.stamps: tuple[float | None, ...] = tuple(frame[LIDAR].stamp_us / 1e6 for frame in self._frames)
+        self.stamps: tuple[float | None, ...] = tuple(frame[self._lidar].stamp_us / 1e6 for frame in self._frames)
         self._poses = tables.read_poses(folder, {taken.pose for frame in self._frames for taken in frame.values()})
-        sweeps = {frame[LIDAR].token for frame in self._frames} if truth else set()
+        sweeps = {frame[self._lidar].token for frame in self._frames} if truth else set()
         self._truths = {name: tables.read_truth_files(folder, name, sweeps) for name in TRUTHS}
 
     @classmethod
@@ -107,13 +116,13 @@ class NuScenesSource:
 
     def __getitem__(self, index: int) -> Frame:
         frame = self._frames[index]
-        sweep = frame[LIDAR]
+        sweep = frame[self._lidar]
         points = read_points(self._file(sweep.filename), columns=COLUMNS)
         return Frame(
             name=self.names[index],
             points=points,
             stamp=self.stamps[index],
-            images=tuple(self._image(channel, frame[channel], sweep) for channel in CAMERAS),
+            images=tuple(self._image(channel, frame[channel], sweep) for channel in self.camera_names),
             truth=self._read_truth(sweep.token, points),
         )
 
@@ -125,6 +134,7 @@ class NuScenesSource:
             projection=sensor.intrinsic,
             T_camera_lidar=np.linalg.inv(T_global_camera) @ T_global_lidar,
             image_size=taken.size,
+            distortion=sensor.distortion,
         )
         return image_from_file(channel, self._file(taken.filename), camera, stamp=taken.stamp_us / 1e6)
 
@@ -139,12 +149,14 @@ class NuScenesSource:
         return below(self.path, name, place=f"{self.path}, tables")
 
 
-def _missing(path: Path, readings: Mapping[str, Mapping[str, Reading]]) -> dict[str, list[str]]:
+def _missing(
+    path: Path, readings: Mapping[str, Mapping[str, Reading]], channels: Sequence[str]
+) -> dict[str, list[str]]:
     """Channels that a sample lacks, by its token; folders are listed once, for there may be 240,000 files."""
     names = {taken.filename for frame in readings.values() for taken in frame.values()}
     there = _listed(path, {str(Path(name).parent) for name in names})
     lacks = {
-        token: [c for c in (LIDAR, *CAMERAS) if c not in frame or str(Path(frame[c].filename)) not in there]
+        token: [c for c in channels if c not in frame or str(Path(frame[c].filename)) not in there]
         for token, frame in readings.items()
     }
     return {token: channels for token, channels in lacks.items() if channels}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.camera import Distortion
 from ldls.camera.rigid import from_parts, from_quaternion
 from ldls.datasets.file_source import choose
 from ldls.errors import CalibrationError, CorruptFileError, SourceError, some, within
@@ -56,11 +57,13 @@ class CalibratedSensor:
         channel: Its name, as "CAM_FRONT".
         T_ego_sensor: (4, 4) from the sensor's frame to the car's.
         intrinsic: (3, 3) matrix K of a camera; empty for others.
+        distortion: Of the camera's images; none in nuScenes, whose images are rectified.
     """
 
     channel: str
     T_ego_sensor: NDArray[np.float64]
     intrinsic: NDArray[np.float64]
+    distortion: Distortion
 
 
 def find_tables(path: Path, version: str | None) -> Path:
@@ -100,6 +103,19 @@ def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
     return {token: f"{name}_{number:03d}" for own, name in in_order for number, (_, token) in enumerate(own)}
 
 
+def read_channels(tables: Path) -> tuple[list[str], list[str]]:
+    """Channels of the lidars and of the cameras, in the order of the table.
+
+    Raises:
+        CorruptFileError: The table is broken.
+    """
+    channels: dict[str, list[str]] = {"lidar": [], "camera": []}
+    for row in _rows(tables, "sensor", {"token": str, "channel": str, "modality": str}):
+        if row["modality"] in channels and row["channel"] not in channels[row["modality"]]:
+            channels[row["modality"]].append(row["channel"])
+    return channels["lidar"], channels["camera"]
+
+
 def read_sensors(tables: Path, channels: tuple[str, ...]) -> dict[str, CalibratedSensor]:
     """The calibrated sensors of the wanted channels, by token.
 
@@ -115,6 +131,7 @@ def read_sensors(tables: Path, channels: tuple[str, ...]) -> dict[str, Calibrate
             named[row["sensor_token"]],
             _transform(f"{path}, {row['token']}", row),
             _numbers(f"{path}, {row['token']}", row["camera_intrinsic"]),
+            _distortion(f"{path}, {row['token']}", row.get("camera_distortion") or []),
         )
         for row in _rows(tables, "calibrated_sensor", columns)
         if named.get(row["sensor_token"]) in channels
@@ -187,6 +204,11 @@ def _transform(place: str, row: Mapping[str, Any]) -> NDArray[np.float64]:
     if quaternion.shape != (4,):
         raise CalibrationError(f"{place}: rotation {row['rotation']}, expected a quaternion w x y z")
     return from_parts(from_quaternion(place, quaternion), translation)
+
+
+def _distortion(place: str, coefficients: list[Any]) -> Distortion:
+    with within(place):
+        return Distortion.from_opencv(_numbers(place, coefficients))
 
 
 def _numbers(place: str, values: list[Any]) -> NDArray[np.float64]:
