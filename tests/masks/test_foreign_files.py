@@ -149,3 +149,23 @@ def test_files_of_others_are_read(data_folder, name, options, names):
         assert found == ["truck", "truck"]
     else:
         assert found == names
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        pytest.param("classes.txt", "forklift\npallet\nperson\n", id="labelling tools"),
+        pytest.param("data.yaml", "path: x\nnames: [forklift, pallet, person]\n", id="list"),
+        pytest.param("data.yaml", "names:\n  0: forklift\n  2: person\n", id="numbers"),
+    ],
+)
+@pytest.mark.parametrize("above", [0, 2])
+def test_names_of_yolo_lie_beside_its_labels(tmp_path, name, text, above):
+    if name == "data.yaml":
+        pytest.importorskip("yaml", reason="the extra yaml is not installed")
+    labels = tmp_path / "labels/train"
+    labels.mkdir(parents=True)
+    (labels / "a.txt").write_text(f"0 {YOLO}\n2 {YOLO}\n")
+    (labels.parents[above - 1] / name if above else labels / name).write_text(text)
+    masks = ldls.read_masks(labels / "a.txt", image_size=(60, 80))
+    assert [masks.names[each] for each in masks.categories.tolist()] == ["forklift", "person"]

@@ -11,6 +11,9 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 
+/// Height, width and runs.
+type RunLengths = (usize, usize, Py<PyArray1<u32>>);
+
 /// One mask as column-major run lengths.
 #[pyclass(frozen, module = "ldls._ldls", skip_from_py_object)]
 #[derive(Clone)]
@@ -63,9 +66,7 @@ impl Rle {
     }
 
     /// For pickling and copying.
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (usize, usize, Py<PyArray1<u32>>))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, RunLengths)> {
         let make = slf.get_type().getattr("from_runs")?;
         let rle = slf.get();
         Ok((make, (rle.height(), rle.width(), rle.runs(slf.py()))))

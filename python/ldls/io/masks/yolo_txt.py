@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,12 @@ import numpy as np
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids
 from ldls.errors import CorruptFileError, MaskError
+from ldls.io.cameras.field_file import read_fields
 from ldls.io.files import read_lines
 from ldls.masks import InstanceMasks
 
+CLASSES, DATA = "classes.txt", "data.yaml"
+"""Files of class names: of labelling tools, a line each, and of ultralytics."""
 LEAST_WORDS = 7
 """A class and the corners of a triangle."""
 CONTIGUOUS_NAMES = {index: COCO_NAMES[category] for index, category in enumerate(CONTIGUOUS_IDS)}
@@ -36,8 +40,9 @@ def read(
     Args:
         path: `.txt` file.
         image_size: (height, width) of the image in pixels, which the file does not say.
-        names: Name of each class by its number, as in a data.yaml; COCO's 80 without them. Names of COCO get COCO's
-            ids, others 100 and the number.
+        names: Name of each class by its number. Without them those of a data.yaml or classes.txt in the folder of the
+            file or one of the two above it, and else COCO's 80. Names of COCO get COCO's ids, others 100 and the
+            number.
 
     Raises:
         MaskError: No image size, boxes instead of polygons, or a class without a name.
@@ -45,7 +50,9 @@ def read(
     """
     if image_size is None:
         raise MaskError(f"{path}: says nothing of the image's size; pass image_size=(height, width)")
-    ids, names_of_ids = category_ids(CONTIGUOUS_NAMES if names is None else names)
+    if names is None:
+        names = _names_beside(Path(path)) or CONTIGUOUS_NAMES
+    ids, names_of_ids = category_ids(names)
     rles, categories, scores = [], [], []
     for number, line in enumerate(read_lines(path, "polygons"), start=1):
         if not line.strip():
@@ -64,6 +71,25 @@ def read(
     return InstanceMasks(
         rles, image_size, categories=np.array(categories, np.int64), scores=scores, names=COCO_NAMES | names_of_ids
     )
+
+
+def _names_beside(path: Path) -> dict[int, str]:
+    """The names of the classes that the nearest file of names has; none where there is no such file."""
+    for folder in path.absolute().parents[:3]:
+        if (folder / CLASSES).is_file():
+            return dict(enumerate(line.strip() for line in read_lines(folder / CLASSES, "class names")))
+        if (folder / DATA).is_file():
+            return _names_in(folder / DATA)
+    return {}
+
+
+def _names_in(path: Path) -> dict[int, str]:
+    """The names of a data.yaml: a list, or a mapping from number."""
+    found = read_fields(path).find("names")
+    names = dict(enumerate(found)) if isinstance(found, list) else found
+    if not isinstance(names, dict) or not all(type(key) is int for key in names):
+        raise CorruptFileError(f"{path}: names: expected a list, or numbers with names")
+    return {key: str(name) for key, name in names.items()}
 
 
 def _parsed(place: str, words: list[str]) -> tuple[int, Any, float]:
