@@ -16,7 +16,7 @@ from ldls.camera.extrinsic import extrinsic
 from ldls.camera.fields import Fields
 from ldls.camera.rigid import as_transform, inverse, rigid
 from ldls.errors import CalibrationError, within
-from ldls.io.cameras.field_file import read_fields
+from ldls.io.cameras.field_file import fields_of
 from ldls.io.files import open_file
 
 MAX_BYTES = 1 << 16
@@ -58,7 +58,7 @@ def _read(path: Path) -> NDArray[np.float64]:
             return _from_table(Fields(str(path), tomllib.loads(text)))
         if text.lstrip().startswith("{"):
             return _from_table(Fields(str(path), json.loads(text)))
-    return _from_table(read_fields(path))
+        return _from_table(fields_of(text, str(path)))
 
 
 def _numbers(words: list[str]) -> NDArray[np.float64] | None:

@@ -25,8 +25,12 @@ def read_fields(path: str | PathLike[str]) -> Fields:
         ImportError: It is YAML, and the extra `yaml` is not installed.
     """
     with open_file(path, "calibration", limit=MAX_BYTES) as file:
-        text = file.text()
-        entries = xml_file.entries_of(text) if text.lstrip().startswith("<") else yaml_file.entries_of(text, str(path))
-        if not isinstance(entries, Mapping):
-            raise CalibrationError(f"expected keys with values, got {type(entries).__name__}")
-        return Fields(str(path), entries)
+        return fields_of(file.text(), str(path))
+
+
+def fields_of(text: str, path: str) -> Fields:
+    """The entries of the text of a file; errors as of `read_fields`, those of YAML with the file and line."""
+    entries = xml_file.entries_of(text) if text.lstrip().startswith("<") else yaml_file.entries_of(text, path)
+    if not isinstance(entries, Mapping):
+        raise CalibrationError(f"expected keys with values, got {type(entries).__name__}")
+    return Fields(path, entries)
