@@ -10,8 +10,6 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path, PurePath
 
-import numpy as np
-
 from ldls.camera import Camera
 from ldls.datasets.file_source import FileSource, image_from_file
 from ldls.datasets.folder_description import FILE, read_description, template
@@ -94,10 +92,13 @@ class FolderSource(FileSource):
         if each.calibration is not None:
             made = read_camera(self._one(each.calibration, name), T_camera_lidar=extrinsic, **each.options)
             return replace(made, image_size=each.image_size) if made.image_size is None else made
+        # the description has both where there is no file
+        assert each.K is not None
+        assert extrinsic is not None
         with within(f"{self._file}, cameras.{key}"):
             return Camera(
-                projection=np.eye(3) if each.K is None else each.K,
-                T_camera_lidar=np.eye(4) if extrinsic is None else as_extrinsic(extrinsic),
+                projection=each.K,
+                T_camera_lidar=as_extrinsic(extrinsic),
                 distortion=each.distortion,
                 image_size=each.image_size,
             )

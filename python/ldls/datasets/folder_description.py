@@ -72,6 +72,7 @@ calibration_camera = 2              # which of the file's cameras: KITTI's 2, Ka
 images = "right/{frame}.png"
 calibration = "right.yaml"
 fisheye = false                     # optional: whether OpenCV's coefficients are those of cv2.fisheye
+# rectified = true                  # of a CameraInfo: masks are of the rectified image
 [cameras.right.T_camera_lidar]
 pose_of = "camera"                  # "camera": its pose in the lidar frame; "lidar": that of the lidar in the camera's
 translation = [0.1, -0.2, 0.0]
