@@ -3,9 +3,8 @@
 from pathlib import Path
 
 import ldls
-from ldls.cli.outputs import Output
+from ldls.batch.formats import ENDINGS
 from ldls.io.points import READERS
-from ldls.io.results import WRITERS
 
 PAGE = (Path(__file__).parents[1] / "docs/formats.md").read_text()
 POINTS, RESULTS, CAMERAS = PAGE.split("\n## ")[1:]
@@ -13,8 +12,9 @@ POINTS, RESULTS, CAMERAS = PAGE.split("\n## ")[1:]
 
 def test_every_format_has_its_row():
     assert [suffix for suffix in READERS if f"`{suffix}`" not in POINTS] == []
-    assert [ending for ending in WRITERS if f"`{ending}`" not in RESULTS] == []
-    assert [output for output in Output if f"`{output}`" not in RESULTS] == []
+    assert [
+        word for word, ending in ENDINGS.items() if f"`{word}`" not in RESULTS or f"`{ending}`" not in RESULTS
+    ] == []
 
 
 def test_every_source_of_a_camera_has_its_row():

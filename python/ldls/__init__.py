@@ -1,85 +1,108 @@
-"""LDLS: 2D instance masks become instance labels of lidar points, by label diffusion."""
+"""LDLS: 2D instance masks become instance labels of lidar points, by label diffusion.
 
-from ldls import stages
-from ldls._ldls import __version__
-from ldls.camera import Camera, Distortion, extrinsic
-from ldls.errors import (
-    CalibrationError,
-    CorruptFileError,
-    DtypeError,
-    FileFormatError,
-    InputError,
-    InternalError,
-    LdlsError,
-    LimitError,
-    MaskError,
-    NonFiniteError,
-    ParameterError,
-    ShapeError,
-    SourceError,
-    TruncatedFileError,
-    UnsafeFileError,
-    UnsafePathError,
-    UnsupportedFormatError,
-)
-from ldls.explaining import Explanation, explain
-from ldls.io import read_camera, read_image, read_masks, read_points, read_result, save
-from ldls.label_diffusion import LabelDiffusion, segment
-from ldls.masks import InstanceMasks
-from ldls.params import Params
-from ldls.segmentation import Instance, OrientedBox, Report, Segmentation, SegmentedObject
-from ldls.view import SeenView, View
+Names and rooms are imported when they are first used, so that the command line answers at once.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ldls import stages as stages
+    from ldls._ldls import __version__ as __version__
+    from ldls.camera import Camera as Camera, Distortion as Distortion, extrinsic as extrinsic  # type: ignore[no-redef]
+    from ldls.errors import (
+        CalibrationError as CalibrationError,
+        CorruptFileError as CorruptFileError,
+        DtypeError as DtypeError,
+        FileFormatError as FileFormatError,
+        InputError as InputError,
+        InternalError as InternalError,
+        LdlsError as LdlsError,
+        LimitError as LimitError,
+        MaskError as MaskError,
+        NonFiniteError as NonFiniteError,
+        ParameterError as ParameterError,
+        ShapeError as ShapeError,
+        SourceError as SourceError,
+        TruncatedFileError as TruncatedFileError,
+        UnsafeFileError as UnsafeFileError,
+        UnsafePathError as UnsafePathError,
+        UnsupportedFormatError as UnsupportedFormatError,
+    )
+    from ldls.explaining import Explanation as Explanation, explain as explain  # type: ignore[no-redef]
+    from ldls.io import (
+        read_camera as read_camera,
+        read_image as read_image,
+        read_masks as read_masks,
+        read_points as read_points,
+        read_result as read_result,
+        save as save,
+    )
+    from ldls.label_diffusion import LabelDiffusion as LabelDiffusion, segment as segment
+    from ldls.masks import InstanceMasks as InstanceMasks
+    from ldls.params import Params as Params
+    from ldls.segmentation import (
+        Instance as Instance,
+        OrientedBox as OrientedBox,
+        Report as Report,
+        Segmentation as Segmentation,
+        SegmentedObject as SegmentedObject,
+    )
+    from ldls.view import SeenView as SeenView, View as View
+
+_NAMES = {
+    "ldls._ldls": ("__version__",),
+    "ldls.camera": ("Camera", "Distortion", "extrinsic"),
+    "ldls.errors": (
+        "CalibrationError",
+        "CorruptFileError",
+        "DtypeError",
+        "FileFormatError",
+        "InputError",
+        "InternalError",
+        "LdlsError",
+        "LimitError",
+        "MaskError",
+        "NonFiniteError",
+        "ParameterError",
+        "ShapeError",
+        "SourceError",
+        "TruncatedFileError",
+        "UnsafeFileError",
+        "UnsafePathError",
+        "UnsupportedFormatError",
+    ),
+    "ldls.explaining": ("Explanation", "explain"),
+    "ldls.io": ("read_camera", "read_image", "read_masks", "read_points", "read_result", "save"),
+    "ldls.label_diffusion": ("LabelDiffusion", "segment"),
+    "ldls.masks": ("InstanceMasks",),
+    "ldls.params": ("Params",),
+    "ldls.segmentation": ("Instance", "OrientedBox", "Report", "Segmentation", "SegmentedObject"),
+    "ldls.view": ("SeenView", "View"),
+}
+"""The public names, by the module that they come from."""
+_ROOMS = ("batch", "datasets", "evaluation", "segmenters", "simulation", "stages", "viewing")
+"""Modules that need no import of their own."""
+_HOMES = {name: module for module, names in _NAMES.items() for name in names}
+
+__all__ = sorted([*_HOMES, "stages"])
 
 
-def _html_of(result: Segmentation) -> str:
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public name
+    if name in _ROOMS:
+        return import_module(f"ldls.{name}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'ldls' has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_ROOMS})
+
+
+def _html_of(result: "Segmentation") -> str:
+    """HTML of a result for notebooks: pictures lie above the nouns, which know nothing of them."""
     from ldls.viewing.notebook import html_of
 
     return html_of(result)
-
-
-# pictures lie above the nouns, which know nothing of them, and are imported when one is shown
-Segmentation._repr_html_ = _html_of
-
-__all__ = [
-    "CalibrationError",
-    "Camera",
-    "CorruptFileError",
-    "Distortion",
-    "DtypeError",
-    "Explanation",
-    "FileFormatError",
-    "InputError",
-    "Instance",
-    "InstanceMasks",
-    "InternalError",
-    "LabelDiffusion",
-    "LdlsError",
-    "LimitError",
-    "MaskError",
-    "NonFiniteError",
-    "OrientedBox",
-    "ParameterError",
-    "Params",
-    "Report",
-    "SeenView",
-    "Segmentation",
-    "SegmentedObject",
-    "ShapeError",
-    "SourceError",
-    "TruncatedFileError",
-    "UnsafeFileError",
-    "UnsafePathError",
-    "UnsupportedFormatError",
-    "View",
-    "__version__",
-    "explain",
-    "extrinsic",
-    "read_camera",
-    "read_image",
-    "read_masks",
-    "read_points",
-    "read_result",
-    "save",
-    "segment",
-    "stages",
-]

@@ -101,5 +101,7 @@ def test_the_journal_holds_the_digests_of_the_files(few, tmp_path):
     for path, (size, _, digest) in [*record["inputs"].items()]:
         content = Path(path).read_bytes()
         assert (size, digest) in {(len(content), hashlib.sha256(content).hexdigest()), (len(content), None)}
-    content = (tmp_path / "out/000004.label").read_bytes()
-    assert record["files"] == {"000004.label": [len(content), hashlib.sha256(content).hexdigest()]}
+    contents = {name: (tmp_path / "out" / name).read_bytes() for name in ("000004.npz", "000004.label")}
+    assert record["files"] == {
+        name: [len(content), hashlib.sha256(content).hexdigest()] for name, content in contents.items()
+    }

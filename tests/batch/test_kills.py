@@ -55,7 +55,7 @@ def test_killed_twice_at_random_moments(source, undisturbed, tmp_path, seed):
 
 def test_interrupted_by_ctrl_c(source, undisturbed, tmp_path):
     words = runs.arguments(source, tmp_path)
-    with runs.process([*words, "--workers", "1"], program=("-c", runs.SLOWLY)) as running:
+    with runs.process([*words, "--cores", "1"], program=("-c", runs.SLOWLY)) as running:
         assert runs.has_done_some(running, tmp_path)
         running.send_signal(signal.SIGINT)
         _, complaint = running.communicate()

@@ -18,7 +18,7 @@ from ldls.batch.ray_worker import RayWorker
 from ldls.datasets import open_source
 from ldls.errors import BatchError, ParameterError
 
-WORKERS = ("--engine", "ray", "--workers", 2)
+WORKERS = ("--engine", "ray", "--cores", 2)
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,8 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import ldls
+from ldls.batch.formats import ENDINGS
 from ldls.cli import app
-from ldls.cli.outputs import Output
-from ldls.io.results import WRITERS
 
 run = CliRunner().invoke
 
@@ -60,7 +59,7 @@ def test_formats_can_be_chosen_and_an_image_is_not_needed(demo, tmp_path):
     words = arguments(demo[0], tmp_path)
     at = words.index("--image")
     del words[at : at + 2]
-    outcome = run(app, [*words, "--format", "label", "--format", "png"])
+    outcome = run(app, [*words, "--formats", "label,png"])
     assert outcome.exit_code == 0, outcome.output
     assert {path.name for path in tmp_path.iterdir()} == {"points.label", "points.png"}
 
@@ -133,10 +132,10 @@ def test_version():
 
 
 def test_every_format_can_be_asked_for(demo, tmp_path):
-    words = [word for output in Output for word in ("--format", output.value)]
+    words = ["--formats", ",".join(ENDINGS)]
     outcome = run(app, [*arguments(demo[0], tmp_path), *words])
     assert outcome.exit_code == 0, outcome.output
-    endings = {*WRITERS, ".png"}
+    endings = ENDINGS.values()
     assert {path.name for path in tmp_path.iterdir()} == {f"points{ending}" for ending in endings}
 
 

@@ -214,7 +214,7 @@ def test_real_frames_against_their_boxes(data_folder, tmp_path):
             app,
             ["segment", "--points", str(training / f"velodyne/{name}.bin"),
              "--calib", str(training / f"calib/{name}.txt"), "--masks", str(training / f"masks/{name}.json"),
-             "--out", str(out), "--format", "npz"],
+             "--out", str(out), "--formats", "npz"],
         )  # fmt: skip
         assert outcome.exit_code == 0, outcome.output
     outcome = run(

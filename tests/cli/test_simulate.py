@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 import ldls
 from ldls.cli import app
 
-SMALL = ["--lidar", "vlp-16", "--camera", "robot", "--processes", "1"]
+SMALL = ["--lidar", "vlp-16", "--rig", "robot", "--cores", "1"]
 
 
 def run(*arguments):
@@ -14,17 +14,17 @@ def run(*arguments):
 
 
 def test_frames_are_written_and_counted(tmp_path):
-    result = run(tmp_path / "out", "--frames", 2, "--scene", "campus", "--seed", 4, *SMALL)
+    result = run(tmp_path / "out", "--count", 2, "--scene", "campus", "--seed", 4, *SMALL)
     assert result.exit_code == 0, result.output
     assert "person" in result.output and "Cyclist" in result.output and "2 frames" in result.output
     training = tmp_path / "out/training"
     assert sorted(p.name for p in (training / "velodyne").iterdir()) == ["000000.bin", "000001.bin"]
     assert ldls.read_masks(training / "masks/000001.json").image_size == (480, 640)
-    assert "kept 2" in run(tmp_path / "out", "--frames", 2, "--scene", "campus", "--seed", 4, *SMALL).output
+    assert "kept 2" in run(tmp_path / "out", "--count", 2, "--scene", "campus", "--seed", 4, *SMALL).output
 
 
 def test_no_errors_means_perfect_masks_and_calibration(tmp_path):
-    assert run(tmp_path, "--frames", 1, "--no-errors", *SMALL).exit_code == 0
+    assert run(tmp_path, "--count", 1, "--no-errors", *SMALL).exit_code == 0
     masks = ldls.read_masks(tmp_path / "training/masks/000000.json")
     assert (masks.scores == 1).all()
     rotation = ldls.read_camera(tmp_path / "training/calib/000000.txt").T_camera_lidar[:3, :3]
@@ -35,10 +35,10 @@ def test_no_errors_means_perfect_masks_and_calibration(tmp_path):
     "arguments",
     [
         pytest.param(["--lidar", "hdl-65"], id="no such lidar"),
-        pytest.param(["--frames", "0"], id="no frames"),
+        pytest.param(["--count", "0"], id="no frames"),
         pytest.param(["--suite", "tuning", "--no-errors"], id="a suite without its errors"),
         pytest.param(["--suite", "tuning", "--layout", "kitti-raw"], id="a suite as a drive"),
-        pytest.param(["--camera", "ring", "--layout", "kitti-raw"], id="a drive with a ring"),
+        pytest.param(["--rig", "ring", "--layout", "kitti-raw"], id="a drive with a ring"),
         pytest.param(["--suite", "tuning", "--layout", "mcap"], id="a suite as a bag"),
     ],
 )
@@ -48,20 +48,20 @@ def test_what_cannot_be_made_is_refused(tmp_path, arguments):
 
 
 def test_a_drive_is_written_in_the_raw_layout(tmp_path):
-    result = run(tmp_path, "--frames", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL)
+    result = run(tmp_path, "--count", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL)
     assert result.exit_code == 0, result.output
     (drive,) = tmp_path.glob("2026_01_06/2026_01_06_drive_0005_sync")
     assert len(list((drive / "velodyne_points/data").iterdir())) == 2
     assert len((drive / "image_02/timestamps.txt").read_text().splitlines()) == 2
-    assert "kept 2" in run(tmp_path, "--frames", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL).output
+    assert "kept 2" in run(tmp_path, "--count", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL).output
 
 
 @pytest.mark.parametrize(("layout", "name"), [("rosbag1", "drive.bag"), ("mcap", "drive/drive.mcap")])
 def test_a_drive_is_a_bag_with_masks_beside_it(tmp_path, layout, name):
     pytest.importorskip("rosbags")
-    result = run(tmp_path / "out", "--frames", 1, "--layout", layout)
+    result = run(tmp_path / "out", "--count", 1, "--layout", layout)
     assert result.exit_code == 0, result.output
     assert "wrote 1 sweeps" in result.output
     assert (tmp_path / "out" / name).is_file()
     assert [p.name for p in (tmp_path / "out/masks").iterdir()] == ["1700000000000000000.json"]
-    assert run(tmp_path / "out", "--frames", 1, "--layout", layout).exit_code != 0
+    assert run(tmp_path / "out", "--count", 1, "--layout", layout).exit_code != 0

@@ -1,8 +1,7 @@
 """Nearest stamps."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from ldls.datasets.ros_stamps import StampedMessage, nearest
 from ldls.io.ros.messages import Header

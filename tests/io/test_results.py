@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.io.results import WRITERS
+from ldls.io.results import FORMATS
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def test_unknown_suffixes_are_refused(result, tmp_path):
 
 def test_nothing_is_left_behind_where_writing_fails(result, tmp_path, monkeypatch):
     monkeypatch.setattr("os.fsync", lambda _: (_ for _ in ()).throw(OSError(28, "No space left")))
-    for ending in WRITERS:
+    for ending, _ in FORMATS.values():
         with pytest.raises(OSError, match="No space left"):
             ldls.save(result, tmp_path / f"a{ending}")
     assert list(tmp_path.iterdir()) == []

@@ -19,11 +19,11 @@ from ldls.simulation import (
     make_frames,
     make_rig,
     scene_frame,
+    suite as make_whole_suite,
     suite_folder,
     suite_orders,
     write_kitti,
 )
-from ldls.simulation import suite as make_whole_suite
 from ldls.simulation.scene_object import CLASS_NAMES, CYCLIST
 from ldls.stages import project
 

@@ -14,19 +14,18 @@ from typing import Any
 
 import numpy as np
 
+from ldls.batch.formats import PICTURE, file_name, write_formats
 from ldls.batch.mask_files import MaskFiles
-from ldls.batch.plan import file_name
-from ldls.batch.settings import PICTURE, RunSettings, fill
+from ldls.batch.settings import RunSettings, fill
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.errors import BatchError
-from ldls.io import read_masks, save
+from ldls.io import read_masks
 from ldls.io.files import digest_of
 from ldls.label_diffusion import LabelDiffusion, nothing_in_view
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
 from ldls.view import View
-from ldls.viewing import overlay, save_picture
 
 LARGEST_DIGESTED_BYTES = 1 << 26
 """Larger inputs hold many frames, as bags do, and are known by size and time of change alone."""
@@ -163,14 +162,9 @@ class FrameWork:
         with _stage(work, "write"):
             # times differ from run to run; files must not
             quiet = replace(result, timings={})
-            written = {}
-            for ending in self._settings.formats:
-                path = self.out / file_name(work.name, ending)
-                if ending == PICTURE:
-                    save_picture(path, overlay(result, [image.read() for image in work.images]))
-                else:
-                    save(quiet, path)
-                written[path.name] = [path.stat().st_size, digest_of(path)]
+            images = [image.read() for image in work.images] if PICTURE in self._settings.formats else []
+            paths = write_formats(quiet, self.out, work.name, self._settings.formats, images)
+            written = {path.name: [path.stat().st_size, digest_of(path)] for path in paths}
             work.record = {
                 "frame": work.name,
                 "files": written,
@@ -205,7 +199,7 @@ class FrameWork:
                     f"{self.out}: {path}, of which frame {record['frame']} was made, was changed since; choose another "
                     "folder"
                 )
-        names = [file_name(record["frame"], ending) for ending in self._settings.formats]
+        names = [file_name(record["frame"], word) for word in self._settings.formats]
         there = [name for name in names if (self.out / name).is_file()]
         if any(not _is_written(self.out / name, record["files"].get(name)) for name in there):
             return Earlier.CHANGED

@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 from pathlib import PureWindowsPath
 
+from ldls.batch.formats import file_name
 from ldls.errors import ParameterError, UnsafePathError
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
@@ -35,7 +36,7 @@ def check_names(names: Sequence[str], formats: Sequence[str]) -> None:
 
     Args:
         names: Names of the frames.
-        formats: Endings of the files of each.
+        formats: Files of each, by the words that choose them.
 
     Raises:
         UnsafePathError: A name is no plain file name, or two are the same on some file systems.
@@ -46,19 +47,14 @@ def check_names(names: Sequence[str], formats: Sequence[str]) -> None:
             raise UnsafePathError(
                 f"frame {name!r}: expected a plain file name without separators, '..', drive or control characters"
             )
-        for ending in formats:
+        for word in formats:
             # some file systems take upper and lower case, or an accent and its letter written in two ways, for one
-            file = unicodedata.normalize("NFC", file_name(name, ending).casefold())
+            file = unicodedata.normalize("NFC", file_name(name, word).casefold())
             if file in seen:
                 raise UnsafePathError(
                     f"frames {seen[file]!r} and {name!r}: would be written to one file; rename one of them"
                 )
             seen[file] = name
-
-
-def file_name(frame: str, ending: str) -> str:
-    """Name of the file of a frame with this ending: 000001.label, 000001_lidarseg.bin."""
-    return f"{frame}{ending}" if ending.startswith("_") else f"{frame}.{ending}"
 
 
 def _is_plain(name: str) -> bool:

@@ -6,20 +6,14 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import ldls._ldls as _ldls
+from ldls.batch.formats import check_formats
 from ldls.errors import ParameterError
-from ldls.io.results import WRITERS
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
-
-DEFAULT_FORMATS = ("label",)
-PICTURE = "png"
-"""Ending of the image with masks and points."""
-KNOWN_FORMATS = (*(ending.removeprefix(".") for ending in WRITERS), PICTURE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +26,8 @@ class RunSettings:
         min_score: Lowest score of a mask that counts; the segmenter's own, or 0 of stored masks, without one.
         categories: Categories that count, by name or id; all without them.
         params: Parameters of the method; their number of threads does not matter to the result.
-        formats: Endings of the files written for each frame: those of `ldls.save`, and png for the image with
-            masks and points.
+        formats: Files written for each frame, by the words of `ldls.batch.formats`: npz, label, ply and so on, and png
+            for the image with masks and points.
         same_object: See `ldls.segment`.
 
     Raises:
@@ -45,20 +39,14 @@ class RunSettings:
     min_score: float | None = None
     categories: tuple[int | str, ...] | None = None
     params: Params = field(default_factory=Params)
-    formats: tuple[str, ...] = DEFAULT_FORMATS
+    formats: tuple[str, ...] = ("npz", "label")
     same_object: float = SAME_OBJECT
 
     def __post_init__(self) -> None:
         if (self.masks is None) == (self.segmenter is None):
             given = "neither" if self.masks is None else "both"
             raise ParameterError(f"masks, segmenter: give one of them, got {given}")
-        if not self.formats:
-            raise ParameterError("formats: expected at least one, as label")
-        for ending in self.formats:
-            if ending not in KNOWN_FORMATS:
-                near = get_close_matches(ending.lstrip("."), KNOWN_FORMATS, n=1)
-                hint = f"did you mean {near[0]}?" if near else f"expected some of {', '.join(KNOWN_FORMATS)}"
-                raise ParameterError(f"formats: {ending!r} is unknown; {hint}")
+        check_formats(self.formats)
 
     def segmenter_file(self, frame: str, camera: str) -> Path | None:
         """The file that the segmenter of an image is made of, as a model or boxes; None where there is none."""

@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from ldls.cli import annotate, demo, evaluate, explain, info, masks, reproduce, run, segment, simulate, view
+from ldls.cli.options import Command
 
 
 class Commands(TyperGroup):
@@ -28,22 +29,22 @@ app = typer.Typer(
     name="ldls",
     help="Instance labels for lidar points from 2D masks, by label diffusion.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-app.command(name="segment")(segment.segment)
+app.command(name="segment", cls=Command)(segment.segment)
 # -3.2,1,0.5 is a place and no option
-app.command(name="explain", context_settings={"ignore_unknown_options": True})(explain.explain)
-app.command(name="info")(info.info)
-app.command(name="run")(run.run)
+app.command(name="explain", cls=Command, context_settings={"ignore_unknown_options": True})(explain.explain)
+app.command(name="info", cls=Command)(info.info)
+app.command(name="run", cls=Command)(run.run)
 app.add_typer(masks.app, name="masks")
-app.command(name="view")(view.view)
-app.command(name="demo")(demo.demo)
-app.command(name="simulate")(simulate.simulate)
-app.command(name="annotate")(annotate.annotate)
-app.command(name="evaluate")(evaluate.evaluate)
-app.command(name="reproduce")(reproduce.reproduce)
+app.command(name="view", cls=Command)(view.view)
+app.command(name="demo", cls=Command)(demo.demo)
+app.command(name="simulate", cls=Command)(simulate.simulate)
+app.command(name="annotate", cls=Command)(annotate.annotate)
+app.command(name="evaluate", cls=Command)(evaluate.evaluate)
+app.command(name="reproduce", cls=Command)(reproduce.reproduce)
 
 
 @app.callback(invoke_without_command=True)

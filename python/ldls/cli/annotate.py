@@ -21,12 +21,15 @@ def annotate(
     training: Annotated[
         Path,
         typer.Argument(
+            metavar="TRAINING",
             help="Folder of KITTI object data: label_2, velodyne, calib and, for their size, image_2.",
             exists=True,
             file_okay=False,
         ),
     ],
-    out: Annotated[Path, typer.Argument(help="Folder for the annotations; made if need be.", file_okay=False)],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="Folder for the annotations; made if need be.", file_okay=False)
+    ],
     clean: Annotated[bool, typer.Option("--clean/--no-clean", help="Does the ground under an object leave it?")] = True,
 ) -> None:
     """Start point annotations from KITTI's 3D boxes.

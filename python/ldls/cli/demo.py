@@ -5,29 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.table import Table
 
-import ldls
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
-from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, write_outputs
+from ldls.cli.options import OutOption
 from ldls.cli.recording_options import ONLY_CAMERA, RerunOption, check_recording, record
-from ldls.io import save
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ldls.cloud import Points
     from ldls.datasets.frame import CameraImage
+    from ldls.segmentation import Segmentation
 
 
 @speaks_plainly
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)] = Path(
-        "ldls-demo"
-    ),
+    out: OutOption = Path("ldls-demo"),
     seed: Annotated[
-        int | None, typer.Option(help="Simulate another street, that of this number; needs the extra `sim`.", min=0)
+        int | None,
+        typer.Option(metavar="N", help="Simulate another street, that of this number; needs the extra `sim`.", min=0),
     ] = None,
     rerun: RerunOption = None,
 ) -> None:
@@ -37,7 +36,11 @@ def demo(
     network would find in its image, segments the sweep, and holds direct projection and the method against the true
     labels. Writes the results as `ldls segment` does, pictures (the image, the bird's-eye view, and the comparison
     with direct projection), and the frame itself so that you can run that command on it.
+
+    Example: ldls demo --out demo
     """
+    import ldls
+    from ldls.batch.formats import write_formats
     from ldls.simulation import sample_frame, scene_frame
     from ldls.viewing import save_pictures
 
@@ -47,8 +50,8 @@ def demo(
     assert image.masks is not None and frame.truth is not None
     rgb = image.read()
     result = ldls.segment(frame.points, image.masks, image.camera)
-    outputs = [output for output in DEFAULT_OUTPUTS if output is not Output.PNG]
-    written = write_outputs(out, "demo", result, rgb, outputs)
+    out.mkdir(parents=True, exist_ok=True)
+    written = write_formats(result, out, "demo", ("npz", "label", "ply"), [rgb])
     written += save_pictures(out / "demo.png", result, rgb)
     command = write_inputs(out, frame.points, image)
 
@@ -63,11 +66,13 @@ def demo(
         screen.print(said, highlight=False, soft_wrap=True)
 
 
-def accuracy_table(result: ldls.Segmentation, truth: NDArray[np.int32]) -> Table:
+def accuracy_table(result: Segmentation, truth: NDArray[np.int32]) -> Table:
     """Intersection over union with the truth, (N,) instances, of each mask's object, by direct projection and by ldls.
 
     A mask is of the object that most of its points in direct projection belong to.
     """
+    import numpy as np
+
     seen = result.in_view
     truth, direct, labels = truth[seen], result.direct_labels[seen], result.labels[seen]
     rows, ious = [], []
@@ -90,8 +95,10 @@ def accuracy_table(result: ldls.Segmentation, truth: NDArray[np.int32]) -> Table
 
 def write_inputs(out: Path, points: Points, image: CameraImage) -> str:
     """Write the frame as files that `ldls segment` reads; the command that does so."""
+    import numpy as np
     from PIL import Image
 
+    from ldls.io import save
     from ldls.simulation.kitti_layout import calibration_lines, write_lines
 
     folder = out / "input"

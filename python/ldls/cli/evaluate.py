@@ -77,8 +77,7 @@ def evaluate(
     Example: ldls evaluate results label_2 --truth-format kitti-boxes --points velodyne --calib calib --out tables
     """
     from ldls.cli.label_pairs import FrameFolders, read_bounds, read_pairs
-    from ldls.evaluation import ClassSet
-    from ldls.evaluation import evaluate as score_pairs
+    from ldls.evaluation import ClassSet, evaluate as score_pairs
     from ldls.evaluation.methods import BOUND
     from ldls.io.labels.label_formats import pair_files
 

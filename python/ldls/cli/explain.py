@@ -21,8 +21,6 @@ from ldls.cli.frame_files import (
 )
 from ldls.cli.messages import console, speaks_plainly
 from ldls.errors import InputError
-from ldls.io import read_points, read_result
-from ldls.label_diffusion import segment
 
 
 def refuse_options(word: str) -> str:
@@ -57,6 +55,7 @@ def explain(
     camera: Annotated[
         str | None,
         typer.Option(
+            metavar="NAME",
             help="Whose pixel U,V is, by name or number from 0, in a result of several cameras. With --calib: which "
             "camera of the calibration, as of ldls segment.",
             show_default=False,
@@ -88,6 +87,8 @@ def explain(
     from ldls.cli.chosen_point import chosen_point
     from ldls.cli.mask_options import masks_of
     from ldls.explaining import explain as explain_point
+    from ldls.io import read_points, read_result
+    from ldls.label_diffusion import segment
 
     if result is not None:
         _refuse_files(points, calib, masks, image_id, extrinsic)

@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ldls.camera import Camera
-from ldls.io import read_camera
+if TYPE_CHECKING:
+    from ldls.camera import Camera
 
 EXISTING: dict[str, Any] = {"exists": True, "dir_okay": False, "readable": True}
-POINTS = typer.Option(help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, .csv, .txt or .xyz.", **EXISTING)
+POINTS = typer.Option(
+    metavar="FILE", help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, .csv, .txt or .xyz.", **EXISTING
+)
 CALIB = typer.Option(
+    metavar="PATH",
     help="Calibration of the camera: KITTI's (of KITTI raw the folder of the day), OpenCV's (YAML or XML), ROS's or "
     "Kalibr's.",
     **(EXISTING | {"dir_okay": True}),
 )
 MASKS = typer.Option(
+    metavar="PATH",
     help="Instance masks: .json of COCO, labelme or Segment Anything, .txt of YOLO's polygons or KITTI's boxes, "
     "instance .png, .npz of ldls or the LDLS research code, .npy stack, or a folder of one .png an instance.",
     show_default=False,
     **(EXISTING | {"dir_okay": True}),
 )
-IMAGE_ID = typer.Option(help="Which image of a COCO file that holds several.")
+IMAGE_ID = typer.Option(metavar="N", help="Which image of a COCO file that holds several.")
 ExtrinsicOption = Annotated[
     Path | None,
     typer.Option(
+        metavar="FILE",
         help="Where the lidar is, for a calibration that does not say: 12 or 16 numbers of T_camera_lidar by rows, or "
         "YAML, JSON or TOML with translation, quaternion_xyzw (or quaternion_wxyz, roll_pitch_yaw_deg, rotation) and "
         "pose_of: camera, the camera's pose in the lidar frame, or lidar, the other way round.",
@@ -61,5 +66,7 @@ def camera_of(
     rectified: bool | None,
 ) -> Camera:
     """The camera of a calibration file, by the words of a command line."""
+    from ldls.io import read_camera
+
     which = int(camera) if camera is not None and camera.isdecimal() else camera
     return read_camera(calib, camera=which, T_camera_lidar=extrinsic, fisheye=fisheye, rectified=rectified)

@@ -10,7 +10,7 @@ import typer
 
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.progress import progress
-from ldls.cli.source_options import DatasetOption, SourceOption, parse_options
+from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption, parse_options
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -27,15 +27,21 @@ SHOWN = 30
 
 @speaks_plainly
 def info(
-    source: Annotated[Path, typer.Argument(help="Folder or file of frames.", exists=True)],
+    source: SourceArgument,
     dataset: DatasetOption = None,
     option: SourceOption = None,
     every: Annotated[bool, typer.Option("--all", help="Look at every frame, not only at some.")] = False,
     picture: Annotated[
         Path | None,
-        typer.Option(help="Write a picture: one frame's points, coloured by depth, over its images.", dir_okay=False),
+        typer.Option(
+            metavar="FILE.png",
+            help="Write a picture: one frame's points, coloured by depth, over its images.",
+            dir_okay=False,
+        ),
     ] = None,
-    frame: Annotated[str | None, typer.Option(help="Which frame to draw.", show_default="the first")] = None,
+    frame: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Which frame to draw.", show_default="the first")
+    ] = None,
 ) -> None:
     """Say what a source of frames holds and check some of its frames, or all.
 

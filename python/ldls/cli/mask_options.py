@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from ldls.cli.options import words
 from ldls.errors import InputError
-from ldls.io import read_masks
-from ldls.masks import InstanceMasks
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ldls.masks import InstanceMasks
 
 SEGMENTER_HELP = (
     "What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt."
 )
-SegmenterOption = Annotated[str | None, typer.Option(help=SEGMENTER_HELP, show_default=False)]
+SegmenterOption = Annotated[str | None, typer.Option(metavar="NAME[:FILE]", help=SEGMENTER_HELP, show_default=False)]
 MinScoreOption = Annotated[
     float | None,
-    typer.Option(help="Lowest score of a mask that counts.", show_default="0.5 of a network, 0 of a file"),
+    typer.Option(metavar="X", help="Lowest score of a mask that counts.", show_default="0.5 of a network, 0 of a file"),
 ]
 CategoriesOption = Annotated[
     str | None,
-    typer.Option(help="Categories that count, by name or id: car,person.", show_default="all"),
+    typer.Option(metavar="WORDS", help="Categories that count, by name or id: car,person.", show_default="all"),
 ]
 
 
@@ -47,6 +49,8 @@ def masks_of(
         given = "neither" if masks is None else "both"
         raise InputError(f"give --masks FILE or --segmenter NAME, got {given}; see --help for the segmenters")
     if masks is not None:
+        from ldls.io import read_masks
+
         size = None if image is None else (image.shape[0], image.shape[1])
         stored = read_masks(masks, image_id=image_id, image_size=size)
         return wanted(stored, min_score=min_score, categories=categories)

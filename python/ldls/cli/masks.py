@@ -4,25 +4,32 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 from rich.table import Table
 
+from ldls.cli.frame_files import IMAGE_ID
 from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of, wanted
 from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import Command
 from ldls.errors import ParameterError
-from ldls.io import read_image, read_masks, save
-from ldls.masks import InstanceMasks
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ldls.masks import InstanceMasks
 
 app = typer.Typer(help="Make, show and convert instance masks.", no_args_is_help=True)
 EXISTING = {"exists": True, "dir_okay": False, "readable": True}
 SUFFIXES = "COCO .json, .npz, instance .png, .npy stack"
 
+PictureOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.png", help="Picture of the masks on the image.", show_default=False, dir_okay=False),
+]
 MasksArgument = Annotated[Path, typer.Argument(metavar="MASKS", help=f"{SUFFIXES}, or KITTI label_2 .txt.", **EXISTING)]
 OutArgument = Annotated[Path, typer.Argument(metavar="OUT", help=f"{SUFFIXES}: the suffix chooses.", dir_okay=False)]
-ImageIdOption = Annotated[int | None, typer.Option(help="Which image of a COCO file that holds several.")]
 
 
 class Priority(StrEnum):
@@ -59,34 +66,41 @@ class Axis(StrEnum):
 AXES = {None: None, Axis.FIRST: 0, Axis.LAST: -1}
 
 
-@app.command()
+@app.command(cls=Command)
 @speaks_plainly
 def convert(
     masks: MasksArgument,
     out: OutArgument,
-    image_id: ImageIdOption = None,
+    image_id: Annotated[int | None, IMAGE_ID] = None,
     image_size: Annotated[
         str | None,
         typer.Option(metavar="HEIGHTxWIDTH", help="Size of the image, where the file does not say: 375x1242."),
     ] = None,
     instance_axis: Annotated[
         Axis | None,
-        typer.Option(help="Axis of the instances in a .npy stack.", show_default="the one that is not the image's"),
+        typer.Option(
+            metavar="|".join(Axis),
+            help="Axis of the instances in a .npy stack.",
+            show_default="the one that is not the image's",
+        ),
     ] = None,
     class_divisor: Annotated[
         int | None,
         typer.Option(
-            help="Of a .png with class * DIVISOR + instance: 256 of KITTI, 1000 of Cityscapes.", show_default=False
+            metavar="N",
+            help="Of a .png with class * DIVISOR + instance: 256 of KITTI, 1000 of Cityscapes.",
+            show_default=False,
         ),
     ] = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
-    min_area: Annotated[int, typer.Option(help="Fewest pixels of a mask that is kept.", min=0)] = 0,
-    shrink: Annotated[int, typer.Option(help="Take this many pixels off the edges of masks.", min=0)] = 0,
-    grow: Annotated[int, typer.Option(help="Add this many pixels to the edges of masks.", min=0)] = 0,
+    min_area: Annotated[int, typer.Option(metavar="N", help="Fewest pixels of a mask that is kept.", min=0)] = 0,
+    shrink: Annotated[int, typer.Option(metavar="N", help="Take this many pixels off the edges of masks.", min=0)] = 0,
+    grow: Annotated[int, typer.Option(metavar="N", help="Add this many pixels to the edges of masks.", min=0)] = 0,
     resolve: Annotated[
         Priority | None,
         typer.Option(
+            metavar="|".join(Priority),
             help="Leave each pixel to one mask: of the highest score, the smallest area, or the first in order.",
             show_default="masks may overlap",
         ),
@@ -94,6 +108,7 @@ def convert(
     variant: Annotated[
         Variant | None,
         typer.Option(
+            metavar="|".join(Variant),
             help="Write a bare list of results (.json), the arrays of the LDLS research code (.npz), or pixels without "
             "categories and scores (.npy).",
             show_default=False,
@@ -106,6 +121,8 @@ def convert(
 
     Example: ldls masks convert masks/000571.json masks/000571.png --resolve score --min-score 0.7
     """
+    from ldls.io import read_masks, save
+
     read = read_masks(
         masks,
         image_id=image_id,
@@ -124,25 +141,25 @@ def convert(
     console().print(f"wrote {len(kept)} of {len(read)} masks to {out}", highlight=False, soft_wrap=True)
 
 
-@app.command()
+@app.command(cls=Command)
 @speaks_plainly
 def make(
     image: Annotated[Path, typer.Argument(metavar="IMAGE", help="Camera image.", **EXISTING)],
     out: OutArgument,
     segmenter: Annotated[
         str,
-        typer.Option(help=SEGMENTER_HELP, show_default=False),
+        typer.Option(metavar="NAME[:FILE]", help=SEGMENTER_HELP, show_default=False),
     ],
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="File for a picture of the masks on the image (.png).", dir_okay=False)
-    ] = None,
+    picture: PictureOption = None,
 ) -> None:
     """Make masks of an image with a segmenter.
 
     Example: ldls masks make image_2/000571.png masks/000571.json --segmenter onnx:yolo11n-seg.onnx
     """
+    from ldls.io import read_image, save
+
     pixels = read_image(image)
     made = masks_of(pixels, masks=None, segmenter=segmenter, min_score=min_score, categories=categories)
     save(made, out)
@@ -150,15 +167,15 @@ def make(
     console().print(f"wrote {out}", highlight=False, soft_wrap=True)
 
 
-@app.command()
+@app.command(cls=Command)
 @speaks_plainly
 def show(
     masks: MasksArgument,
-    image: Annotated[Path | None, typer.Option(help="The image they are of.", show_default=False, **EXISTING)] = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="File for a picture of the masks on the image (.png).", dir_okay=False)
+    image: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The image they are of.", show_default=False, **EXISTING)
     ] = None,
-    image_id: ImageIdOption = None,
+    picture: PictureOption = None,
+    image_id: Annotated[int | None, IMAGE_ID] = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
 ) -> None:
@@ -166,6 +183,8 @@ def show(
 
     Example: ldls masks show masks/000571.json --image image_2/000571.png --picture masks.png
     """
+    from ldls.io import read_image
+
     pixels = None if image is None else read_image(image)
     shown = masks_of(pixels, masks=masks, segmenter=None, image_id=image_id, min_score=min_score, categories=categories)
     _show(shown, pixels, picture)

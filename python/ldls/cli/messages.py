@@ -6,14 +6,16 @@ import functools
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from ldls.errors import LdlsError
-from ldls.segmentation import SegmentedObject
+
+if TYPE_CHECKING:
+    from ldls.segmentation import SegmentedObject
 
 P = ParamSpec("P")
 R = TypeVar("R")

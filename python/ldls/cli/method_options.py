@@ -36,6 +36,7 @@ SWITCHES = {
     "local_ground": "--local-ground/--smooth-ground",
     "calibrated": "--calibrated/--shares",
 }
+METAVARS = {int: "N", float: "X"}
 PANEL = "Method"
 
 
@@ -79,7 +80,7 @@ def _parameter_option(name: str) -> inspect.Parameter:
         option = typer.Option(SWITCHES[name], help=HELP[name], show_default=shown, rich_help_panel=PANEL)
     else:
         shown = f"{best:g}" if best == published else f"{best:g}, the paper's {published:g}"
-        option = typer.Option(help=HELP[name], show_default=shown, rich_help_panel=PANEL)
+        option = typer.Option(metavar=METAVARS[type(best)], help=HELP[name], show_default=shown, rich_help_panel=PANEL)
     return _keyword(name, Annotated[type(best) | None, option], None)
 
 

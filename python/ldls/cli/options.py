@@ -4,8 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
 
 from ldls.errors import ParameterError
+
+
+class Command(TyperCommand):
+    """A command whose usage line names its arguments without braces."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:  # noqa: ANN401 - the context of Typer's own copy of click
+        """Return options and arguments as the usage line has them."""
+        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
+
+
+OutOption = Annotated[
+    Path, typer.Option(metavar="FOLDER", help="Folder for the results; made if need be.", file_okay=False)
+]
+FormatsOption = Annotated[
+    str,
+    typer.Option(
+        metavar="WORDS",
+        help="Files to write for each frame: npz (all fields), label (SemanticKITTI), lidarseg, panoptic (nuScenes), "
+        "ply, pcd, las, laz (coloured clouds), parquet, csv (a row a point), png (picture).",
+    ),
+]
+FramesOption = Annotated[
+    str | None,
+    typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
+]
+CoresOption = Annotated[int | None, typer.Option(metavar="N", min=1, help="Cores to use.", show_default="all")]
+PictureOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.png",
+        help="Write pictures: FILE.png, the image with masks and points; FILE-birds-eye.png; FILE-comparison.png, "
+        "direct projection beside the method.",
+        show_default=False,
+        dir_okay=False,
+    ),
+]
+ClassesOption = Annotated[
+    str, typer.Option("--categories", metavar="WORDS", help="Categories to score: Car,Pedestrian.")
+]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors and warnings.")]
 
 
 class SuitePart(StrEnum):

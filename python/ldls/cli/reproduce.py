@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import SuitePart, words
+from ldls.cli.options import ClassesOption, CoresOption, OutOption, SuitePart, words
 from ldls.cli.progress import progress
 from ldls.cli.reliability_files import draw_reliability
 from ldls.errors import ParameterError
@@ -28,21 +28,27 @@ class Truth(StrEnum):
 
 @speaks_plainly
 def reproduce(
-    out: Annotated[Path, typer.Option(help="Folder for tables and figures; made if need be.", file_okay=False)],
+    out: OutOption,
     folder: Annotated[
         Path | None,
         typer.Argument(
-            help="Folder with velodyne, calib, masks and the truth, or its parent.", exists=True, file_okay=False
+            metavar="FOLDER",
+            help="Folder with velodyne, calib, masks and the truth, or its parent.",
+            exists=True,
+            file_okay=False,
         ),
     ] = None,
     suite: Annotated[
-        SuitePart | None, typer.Option(help="Instead of FOLDER: the simulated frames, made if they are not there yet.")
+        SuitePart | None,
+        typer.Option(
+            metavar="|".join(SuitePart), help="Instead of FOLDER: the simulated frames, made if they are not there yet."
+        ),
     ] = None,
     truth: Annotated[
         Truth, typer.Option(help="Point annotations, or the 3D boxes of label_2, which are noisy.")
     ] = Truth.ANNOTATIONS,
-    classes: Annotated[str, typer.Option(help="Classes to score, separated by commas.")] = "Car,Pedestrian",
-    threads: Annotated[int | None, typer.Option(help="Frames at a time.", show_default="all cores")] = None,
+    categories: ClassesOption = "Car,Pedestrian",
+    cores: CoresOption = None,
 ) -> None:
     """Run the paper's experiments: from direct projection over clusters and the paper's method to ldls.
 
@@ -62,8 +68,8 @@ def reproduce(
     from ldls.params import Params
 
     frames = KittiObjectSource(_folder(folder, suite), masks="masks", truth=truth.value)
-    scored = ClassSet.kitti(words(classes))
-    labelled = progress(label(frames, classes=scored, params=Params(threads=threads)), len(frames), "labelling")
+    scored = ClassSet.kitti(words(categories))
+    labelled = progress(label(frames, classes=scored, params=Params(threads=cores)), len(frames), "labelling")
     experiment = score(list(labelled), classes=scored)
     screen = console()
     tables = _tables(experiment)

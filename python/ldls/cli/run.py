@@ -10,7 +10,7 @@ import typer
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
-from ldls.cli.options import FRAMES_FAILED, STOPPED, words
+from ldls.cli.options import FRAMES_FAILED, STOPPED, CoresOption, FormatsOption, FramesOption, OutOption, words
 from ldls.cli.progress import frame_progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption, StoredMasksOption, parse_options
 from ldls.params import Params
@@ -28,30 +28,28 @@ MOST_LISTED = 10
 def run(
     *,
     source: SourceArgument,
-    out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
+    out: OutOption,
     masks: StoredMasksOption = None,
     segmenter: SegmenterOption = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
-    formats: Annotated[
-        str,
-        typer.Option(help="Files to write for each frame, by their endings: label,ply,npz; png is the picture."),
-    ] = "label",
-    frames: Annotated[
-        str | None,
-        typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
-    ] = None,
+    formats: FormatsOption = "npz,label",
+    frames: FramesOption = None,
     dataset: DatasetOption = None,
     option: SourceOption = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Frames at a time, one a core.", min=1, show_default="all cores")
-    ] = None,
-    engine: Annotated[str, typer.Option(help="local, or ray for a Ray cluster; docs/scale.md.")] = "local",
+    cores: CoresOption = None,
+    engine: Annotated[
+        str, typer.Option(metavar="NAME", help="local, or ray for a Ray cluster; docs/scale.md.")
+    ] = "local",
     ray_address: Annotated[
         str | None,
-        typer.Option(help="Cluster to join, as auto or ray://HOST:10001.", show_default="one on this machine"),
+        typer.Option(
+            metavar="ADDRESS", help="Cluster to join, as auto or ray://HOST:10001.", show_default="one on this machine"
+        ),
     ] = None,
-    gpus: Annotated[float, typer.Option(help="GPUs of each worker of a Ray cluster, for its segmenter.")] = 0.0,
+    gpus: Annotated[
+        float, typer.Option(metavar="X", help="GPUs of each worker of a Ray cluster, for its segmenter.")
+    ] = 0.0,
     params: Params,
 ) -> None:
     """Label all frames of a source; a run that was interrupted goes on where it stopped.
@@ -62,7 +60,7 @@ def run(
     Examples:
     ldls run kitti/training --masks kitti/training/masks --out labels
 
-    ldls run 2011_09_26/2011_09_26_drive_0064_sync --segmenter onnx:yolo11n-seg.onnx --out labels --formats label,ply
+    ldls run 2011_09_26/2011_09_26_drive_0064_sync --segmenter onnx:yolo11n-seg.onnx --out labels --formats npz,ply
     """
     import ldls.batch as batch
     from ldls.batch.plan import parse_frames
@@ -93,7 +91,7 @@ def run(
                 settings,
                 frames=parse_frames(frames),
                 options=options,
-                workers=workers,
+                workers=cores,
                 engine=engine,
                 ray_address=ray_address,
                 gpus=gpus,

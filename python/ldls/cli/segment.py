@@ -27,10 +27,8 @@ from ldls.cli.mask_options import (
 )
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.method_options import takes_params
-from ldls.cli.outputs import DEFAULT_OUTPUTS, Output, PictureOption, write_outputs
+from ldls.cli.options import CoresOption, FormatsOption, OutOption, PictureOption, words
 from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
-from ldls.io import read_image, read_points, save
-from ldls.label_diffusion import segment as label_points
 from ldls.params import Params
 
 
@@ -40,22 +38,27 @@ def segment(
     *,
     points: Annotated[Path, POINTS],
     calib: Annotated[Path, CALIB],
-    out: Annotated[Path, typer.Option(help="Folder for the results; made if need be.", file_okay=False)],
+    out: OutOption,
     masks: Annotated[Path | None, MASKS] = None,
     segmenter: SegmenterOption = None,
     image: Annotated[
         Path | None,
-        typer.Option(help="Image for the segmenter, and to draw the picture on.", show_default=False, **EXISTING),
+        typer.Option(
+            metavar="FILE", help="Image for the segmenter, and to draw the picture on.", show_default=False, **EXISTING
+        ),
     ] = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
     save_masks: Annotated[
         Path | None,
-        typer.Option(help="File for the masks, for --masks of another run: .json, .npz or .png.", dir_okay=False),
+        typer.Option(
+            metavar="FILE", help="File for the masks, for --masks of another run: .json, .npz or .png.", dir_okay=False
+        ),
     ] = None,
     camera: Annotated[
         str | None,
         typer.Option(
+            metavar="NAME",
             help="Which camera of the calibration: 0 to 3 of KITTI, cam0 and so on of Kalibr, 1 or 2 of a stereo pair.",
             show_default="2, KITTI's left colour one; the first of others",
         ),
@@ -64,12 +67,9 @@ def segment(
     fisheye: FisheyeOption = None,
     rectified: RectifiedOption = None,
     image_id: Annotated[int | None, IMAGE_ID] = None,
-    formats: Annotated[
-        list[Output] | None,
-        typer.Option("--format", help="What to write; may be repeated.", show_default="npz, label, ply, png"),
-    ] = None,
+    formats: FormatsOption = "npz,label,ply,png",
     picture: PictureOption = None,
-    threads: Annotated[int | None, typer.Option(help="Threads.", show_default="all cores")] = None,
+    cores: CoresOption = None,
     rerun: RerunOption = None,
     diffusion: DiffusionOption = None,
     params: Params,
@@ -77,7 +77,7 @@ def segment(
     """Label the points of one lidar sweep by the instance masks of one image.
 
     Prints the objects found and the time of each stage, and writes to the folder --out, named after the sweep:
-    .npz (all fields), .label (SemanticKITTI), .ply (coloured cloud) and .png (picture), or what --format says.
+    .npz (all fields), .label (SemanticKITTI), .ply (coloured cloud) and .png (picture), or what --formats says.
 
     Masks come from a file (--masks) or from a segmenter that runs on the image (--segmenter); KITTI's 2D boxes are
     enough to begin with.
@@ -92,7 +92,13 @@ def segment(
     ldls segment --points sweep.pcd --calib camera.yaml --extrinsic lidar.yaml --image image.png --masks masks.json
     --out results
     """
+    from ldls.batch.formats import check_formats, write_formats
+    from ldls.io import read_image, read_points, save
+    from ldls.label_diffusion import segment as label_points
+
     check_recording(rerun)
+    wanted = words(formats)
+    check_formats(wanted)
     pixels = None if image is None else read_image(image)
     chosen = masks_of(
         pixels,
@@ -105,9 +111,10 @@ def segment(
     if save_masks is not None:
         save(chosen, save_masks)
     seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
-    result = label_points(read_points(points), chosen, seen_by, params=replace(params, threads=threads))
+    result = label_points(read_points(points), chosen, seen_by, params=replace(params, threads=cores))
     name = points.stem.removesuffix(".pcd")
-    written = write_outputs(out, name, result, pixels, formats or DEFAULT_OUTPUTS)
+    out.mkdir(parents=True, exist_ok=True)
+    written = write_formats(result, out, name, wanted, [pixels])
     if picture is not None:
         from ldls.viewing import save_pictures
 

@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import SuitePart
+from ldls.cli.options import CoresOption, SuitePart
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class LidarName(StrEnum):
     OS1_128 = "os1-128"
 
 
-class CameraName(StrEnum):
+class Rig(StrEnum):
     """Sets of cameras."""
 
     KITTI = "kitti"
@@ -57,33 +57,45 @@ BAGS = (Layout.ROSBAG1, Layout.ROSBAG2, Layout.MCAP)
 
 @speaks_plainly
 def simulate(
-    out: Annotated[Path, typer.Argument(help="Folder for the frames; made if need be.", file_okay=False)],
-    frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the first frame; each next frame has the next seed.")] = 0,
-    scene: Annotated[SceneKind, typer.Option(help="Kind of the scenes.")] = SceneKind.STREET,
-    lidar: Annotated[LidarName, typer.Option(help="Beam table, ranges and noise of the sweep.")] = LidarName.HDL_64E,
-    camera: Annotated[
-        CameraName,
-        typer.Option(help="KITTI's 1242 x 375, a robot's 640 x 480, or a ring of six of 1600 x 900."),
-    ] = CameraName.KITTI,
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="Folder for the frames; made if need be.", file_okay=False)
+    ],
+    count: Annotated[int, typer.Option(metavar="N", min=1, help="Number of frames.")] = 20,
+    seed: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Seed of the first frame; each next frame has the next seed.")
+    ] = 0,
+    scene: Annotated[
+        SceneKind, typer.Option(metavar="|".join(SceneKind), help="Kind of the scenes.")
+    ] = SceneKind.STREET,
+    lidar: Annotated[
+        LidarName, typer.Option(metavar="|".join(LidarName), help="Beam table, ranges and noise of the sweep.")
+    ] = LidarName.HDL_64E,
+    rig: Annotated[
+        Rig,
+        typer.Option(
+            metavar="|".join(Rig), help="KITTI's 1242 x 375, a robot's 640 x 480, or a ring of six of 1600 x 900."
+        ),
+    ] = Rig.KITTI,
     layout: Annotated[
         Layout,
         typer.Option(
+            metavar="|".join(Layout),
             help="Single scenes as KITTI's object data, a drive through a scene as KITTI's raw data, or a robot's "
-            "drive through a campus as a ROS bag; --scene, --lidar, --camera and --processes then do not count."
+            "drive through a campus as a ROS bag; --scene, --lidar, --rig and --cores then do not count.",
         ),
     ] = Layout.KITTI,
     suite: Annotated[
         SuitePart | None,
         typer.Option(
-            help="Write this part of the suite (200 or 20 fixed frames); the options above then do not count."
+            metavar="|".join(SuitePart),
+            help="Write this part of the suite (200 or 20 fixed frames); the options above then do not count.",
         ),
     ] = None,
     errors: Annotated[
         bool,
         typer.Option("--errors/--no-errors", help="Masks, calibration and clocks wrong as in life, or perfect."),
     ] = True,
-    processes: Annotated[int, typer.Option(min=1, help="Frames made at a time.")] = 2,
+    cores: CoresOption = None,
 ) -> None:
     """Make scenes with perfect labels: streets and campuses, seen by a lidar and a camera.
 
@@ -100,10 +112,11 @@ def simulate(
     With --layout rosbag1, rosbag2 (SQLite) or mcap, OUT holds a bag of the VLP-16 and the camera of a robot, ten
     frames a second, and masks and annotations named by stamp. Needs the extra `ros` too.
 
-    Example: ldls simulate scenes --frames 5 --scene campus, and then ldls segment
+    Example: ldls simulate scenes --count 5 --scene campus, and then ldls segment
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt
     --masks scenes/training/masks/000000.json --out results
     """
+    from ldls._ldls import default_threads
     from ldls.simulation import (
         Drive,
         FrameOrder,
@@ -116,24 +129,25 @@ def simulate(
     )
 
     if suite and layout is not Layout.KITTI:
-        raise ParameterError(f"--suite: the suite is in KITTI's layout; use --frames with --layout {layout.value}")
+        raise ParameterError(f"--suite: the suite is in KITTI's layout; use --count with --layout {layout.value}")
     if suite and not errors:
-        raise ParameterError("--no-errors: the suite's errors are part of it; use --frames and --seed without --suite")
+        raise ParameterError("--no-errors: the suite's errors are part of it; use --count and --seed without --suite")
+    processes = cores or default_threads()
     segmenter = SegmenterErrors() if errors else SegmenterErrors.none()
     sensors = SensorErrors() if errors else SensorErrors.none()
     if layout in BAGS:
-        _write_bag(out, layout, frames, seed, segmenter)
+        _write_bag(out, layout, count, seed, segmenter)
     elif layout is Layout.KITTI_RAW:
         drive = Drive(
-            n_frames=frames,
+            n_frames=count,
             seed=seed,
             kind=scene.value,
             lidar=lidar.value,
-            camera=camera.value,
+            camera=rig.value,
             segmenter=segmenter,
             sensors=sensors,
         )
-        _follow(write_drive(out, drive, processes=processes), frames, drive_folder(out, drive))
+        _follow(write_drive(out, drive, processes=processes), count, drive_folder(out, drive))
     else:
         orders = [
             FrameOrder(
@@ -141,11 +155,11 @@ def simulate(
                 seed=seed + number,
                 kind=scene.value,
                 lidar=lidar.value,
-                camera=camera.value,
+                camera=rig.value,
                 segmenter=segmenter,
                 sensors=sensors,
             )
-            for number in range(frames)
+            for number in range(count)
         ]
         if suite:
             orders = suite_orders(suite.value)

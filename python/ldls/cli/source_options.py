@@ -15,15 +15,17 @@ SourceArgument = Annotated[
     typer.Argument(metavar="SOURCE", help="Data set, drive, bag or folder; `ldls info SOURCE` says what it holds."),
 ]
 DatasetOption = Annotated[
-    str | None, typer.Option(help="Kind of the source, where the path leaves it open.", show_default="guessed")
+    str | None,
+    typer.Option(metavar="KIND", help="Kind of the source, where the path leaves it open.", show_default="guessed"),
 ]
 SourceOption = Annotated[
     list[str] | None,
-    typer.Option("--option", help="NAME=VALUE of the kind, as camera=3 or scene=scene-0061; may be repeated."),
+    typer.Option("--option", metavar="NAME=VALUE", help="Of the kind: camera=3, scene=scene-0061; may be repeated."),
 ]
 StoredMasksOption = Annotated[
     str | None,
     typer.Option(
+        metavar="PATH",
         help="Stored masks: a folder with a file a frame, or a path such as masks/{frame}.json; for several "
         "cameras masks/{camera}/{frame}.json.",
         show_default=False,

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import FRAMES_FAILED, refuse
-from ldls.cli.outputs import PictureOption
+from ldls.cli.options import FRAMES_FAILED, PictureOption, refuse
 from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, where_recorded
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
 from ldls.cli.view_source import MOST_FRAMES, chosen_frames, labelled, record_frames
 from ldls.errors import InputError
-from ldls.io import read_image, read_result
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @speaks_plainly
@@ -51,6 +51,7 @@ def view(
         Path | None,
         typer.Option(
             help="Folder of an earlier `ldls run --formats npz`: its results are shown, nothing is segmented.",
+            metavar="FOLDER",
             exists=True,
             file_okay=False,
             show_default=False,
@@ -111,6 +112,7 @@ def view_result(
     path: Path, images: Sequence[str], target: str | None, *, name: str, diffusion: int | None, picture: Path | None
 ) -> str:
     """Show a stored result; the message for the user."""
+    from ldls.io import read_result
     from ldls.view import camera_names
 
     result = read_result(path)
@@ -132,6 +134,8 @@ def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArr
     Raises:
         InputError: There are more images than cameras, or one camera has two.
     """
+    from ldls.io import read_image
+
     paths: dict[str, str] = {}
     for number, text in enumerate(texts):
         camera, equals, file = text.partition("=")

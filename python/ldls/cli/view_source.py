@@ -13,7 +13,6 @@ from ldls.cli.progress import progress
 from ldls.cli.recording_options import every_of
 from ldls.cli.source_options import parse_options
 from ldls.errors import InputError, LdlsError, ParameterError
-from ldls.io import read_result
 
 if TYPE_CHECKING:
     from ldls.batch.frame_work import FrameWork
@@ -134,7 +133,8 @@ def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segm
 
 
 def _stored(source: Source, results: Path, index: int) -> tuple[Frame, Segmentation]:
-    from ldls.batch.plan import file_name
+    from ldls.batch.formats import file_name
+    from ldls.io import read_result
 
     path = results / file_name(source.names[index], "npz")
     return source[index], read_result(path)

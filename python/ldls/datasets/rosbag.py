@@ -22,8 +22,7 @@ from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
 from ldls.io.ros.images import decode_compressed, decode_image
 from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, Message, seconds
-from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud
-from ldls.io.ros.point_cloud2 import decode as decode_points
+from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud, decode as decode_points
 
 STATIC_TRANSFORMS, MOVING_TRANSFORMS = "/tf_static", "/tf"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ldls.checks import checked
 from ldls.errors import InputError, UnsupportedFormatError
@@ -17,19 +17,27 @@ from ldls.io.points import las, pcd, ply
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 
-WRITERS: dict[str, Callable[[Path, Segmentation], None]] = {
-    ".npz": result_npz.write,
-    ".label": semantic_kitti.write,
-    ".ply": ply.write,
-    "_lidarseg.bin": nuscenes_labels.write_lidarseg,
-    "_panoptic.npz": nuscenes_labels.write_panoptic,
-    ".pcd": pcd.write,
-    ".las": las.write,
-    ".laz": las.write,
-    ".parquet": tables.write_parquet,
-    ".csv": tables.write_csv,
+
+class Format(NamedTuple):
+    """A format of results: the ending of its files' names, and their writer."""
+
+    ending: str
+    write: Callable[[Path, Segmentation], None]
+
+
+FORMATS: dict[str, Format] = {
+    "npz": Format(".npz", result_npz.write),
+    "label": Format(".label", semantic_kitti.write),
+    "ply": Format(".ply", ply.write),
+    "lidarseg": Format("_lidarseg.bin", nuscenes_labels.write_lidarseg),
+    "panoptic": Format("_panoptic.npz", nuscenes_labels.write_panoptic),
+    "pcd": Format(".pcd", pcd.write),
+    "las": Format(".las", las.write),
+    "laz": Format(".laz", las.write),
+    "parquet": Format(".parquet", tables.write_parquet),
+    "csv": Format(".csv", tables.write_csv),
 }
-"""Writers of results, by the ending of the name."""
+"""Formats of results, by the words that choose them on the command line."""
 
 
 @checked
@@ -74,9 +82,10 @@ def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **optio
         return
     if not isinstance(thing, Segmentation):
         raise InputError(f"save: expected a Segmentation or InstanceMasks, got {type(thing).__name__}")
-    endings = [ending for ending in WRITERS if path.name.lower().endswith(ending)]
-    if not endings:
-        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} files, expected {', '.join(WRITERS)}")
-    writer = WRITERS[max(endings, key=len)]
+    fitting = [each for each in FORMATS.values() if path.name.lower().endswith(each.ending)]
+    if not fitting:
+        known = ", ".join(each.ending for each in FORMATS.values())
+        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} files, expected {known}")
+    writer = max(fitting, key=lambda each: len(each.ending)).write
     check_options(f"{path.suffix} results ({path})", writer, options)
     writer(path, thing)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,9 +70,6 @@ class Segmentation:
     timings: Mapping[str, float]
     points: Points
     params: Params
-
-    # what notebooks show; the package gives it
-    _repr_html_: ClassVar[Callable[[Segmentation], str]]
 
     @property
     def masks(self) -> InstanceMasks:
@@ -174,6 +171,11 @@ class Segmentation:
             centroid=xyz.mean(axis=0) if len(rows) else None,
             box=fit_upright_box(xyz) if len(rows) else None,
         )
+
+    def _repr_html_(self) -> str:
+        from ldls import _html_of
+
+        return _html_of(self)
 
     def __repr__(self) -> str:
         n_found = sum(o.n_points > 0 for o in self.objects)

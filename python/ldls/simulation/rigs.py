@@ -173,7 +173,7 @@ MOUNTS: dict[str, tuple[float, tuple[MountedCamera, ...]]] = {
     "robot": (0.75, (MountedCamera(ROBOT, (0.10, 0.0, -0.12)),)),
     "ring": (1.84, _ring()),
 }
-"""Height of the lidar and the cameras, by the name that `ldls simulate --camera` takes."""
+"""Height of the lidar and the cameras, by the name that `ldls simulate --rig` takes."""
 
 
 def make_rig(*, lidar: str = "hdl-64e", camera: str = "kitti") -> Rig:

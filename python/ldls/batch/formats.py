@@ -1,0 +1,54 @@
+"""The files of a frame's result, and the words that choose them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.errors import ParameterError
+from ldls.io import save
+from ldls.io.results import FORMATS
+from ldls.segmentation import Segmentation
+from ldls.viewing import overlay, save_picture
+
+PICTURE = "png"
+"""The image with masks and points."""
+ENDINGS: dict[str, str] = {**{word: each.ending for word, each in FORMATS.items()}, PICTURE: ".png"}
+"""Endings of the names of files, by the words that choose them."""
+
+
+def check_formats(formats: Sequence[str]) -> None:
+    """Refuse words that choose no file.
+
+    Raises:
+        ParameterError: There is such a word, or none at all.
+    """
+    if not formats:
+        raise ParameterError("formats: expected at least one, as label")
+    for word in formats:
+        if word not in ENDINGS:
+            near = get_close_matches(word.lstrip("."), ENDINGS, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"expected some of {', '.join(ENDINGS)}"
+            raise ParameterError(f"formats: {word!r} is unknown; {hint}")
+
+
+def file_name(frame: str, word: str) -> str:
+    """Name of a file of a frame: 000001.label, 000001_lidarseg.bin."""
+    return frame + ENDINGS[word]
+
+
+def write_formats(
+    result: Segmentation, folder: Path, frame: str, formats: Sequence[str], images: Sequence[NDArray[np.uint8] | None]
+) -> list[Path]:
+    """Write the files of a frame to `folder`, each whole; `images` are those of the views, for the picture."""
+    paths = [folder / file_name(frame, word) for word in formats]
+    for word, path in zip(formats, paths, strict=True):
+        if word == PICTURE:
+            save_picture(path, overlay(result, images))
+        else:
+            save(result, path)
+    return paths

@@ -1,0 +1,75 @@
+"""One vocabulary of options over all commands: one word for one thing, and one thing for one word."""
+
+from collections import defaultdict
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from ldls.cli import app
+
+OTHER_WORDS = {
+    "--format": "--formats",
+    "--threads": "--cores",
+    "--workers": "--cores",
+    "--processes": "--cores",
+    "--jobs": "--cores",
+    "--classes": "--categories",
+    "--output": "--out",
+    "--images": "--image",
+    "--calibration": "--calib",
+    "--n-frames": "--count",
+}
+"""Words that other programs use, and ours for the same."""
+OF_A_FRAME_OR_OF_MANY = {
+    "--image": {"FILE", "[CAMERA=]FILE", "FOLDER"},
+    "--points": {"FILE", "FOLDER"},
+    "--calib": {"PATH", "FOLDER"},
+}
+"""Values that differ: the file of a frame, a file for each camera, or the folder of many frames."""
+
+
+def commands(command=None, name="ldls"):
+    command = command or typer.main.get_command(app)
+    if hasattr(command, "commands"):
+        for word, each in command.commands.items():
+            yield from commands(each, f"{name} {word}")
+    else:
+        yield pytest.param(name, command, id=name)
+
+
+COMMANDS = list(commands())
+
+
+@pytest.mark.parametrize(("name", "command"), COMMANDS)
+def test_no_command_has_a_word_of_its_own_for_what_has_one(name, command):
+    words = {word for param in command.params for word in param.opts}
+    assert words.isdisjoint(OTHER_WORDS), [f"{word} is {ours}" for word, ours in OTHER_WORDS.items() if word in words]
+
+
+def test_an_option_takes_the_same_value_in_every_command():
+    values = defaultdict(set)
+    for case in COMMANDS:
+        _, command = case.values
+        for param in command.params:
+            values[param.opts[-1] if param.param_type_name == "option" else param.metavar].add(param.metavar)
+    differing = {option: taken for option, taken in values.items() if len(taken) > 1}
+    assert differing == OF_A_FRAME_OR_OF_MANY
+
+
+@pytest.mark.parametrize(("name", "command"), COMMANDS)
+def test_help_shows_values_in_capitals_by_h_as_well(name, command):
+    words = name.split()[1:]
+    text = CliRunner().invoke(app, [*words, "-h"], env={"COLUMNS": "160"}).output
+    assert text == CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "160"}).output
+    assert "Example" in text, "how it is called is taught by an example"
+    usage = text.split("Usage: ", 1)[1].splitlines()[0]
+    assert usage.startswith(name)
+    assert "{" not in usage
+    unnamed = [param.opts[-1] for param in command.params if not (getattr(param, "is_flag", False) or param.metavar)]
+    assert unnamed == []
+
+
+def test_lists_are_separated_by_commas(tmp_path):
+    outcome = CliRunner().invoke(app, ["run", str(tmp_path), "--out", "o", "--formats", "npz", "--formats", "png"])
+    assert outcome.exit_code != 0
