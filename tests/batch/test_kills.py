@@ -61,7 +61,8 @@ def test_interrupted_by_ctrl_c(source, undisturbed, tmp_path):
         _, complaint = running.communicate()
     assert running.returncode == 130, complaint
     assert "Traceback" not in complaint
-    (count,) = re.findall(r"^stopped: (\d+) frames are done; give the same command again to go on$", complaint, re.M)
+    said = r"^stopped: (\d+) of 60 frames are done; give the same command again to go on$"
+    (count,) = re.findall(said, complaint, re.M)
     left = runs.contents(tmp_path)
     assert all(not name.startswith(".") for name in left)
     assert 0 < len(left) < 61

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -386,6 +387,36 @@ def test_disk_trouble_of_every_kind(source, undisturbed, tmp_path, monkeypatch, 
 def test_names_that_cannot_be_files(names):
     with pytest.raises(UnsafePathError):
         check_names(names, ["label"])
+
+
+def test_failures_so_far_are_kept_where_a_run_is_interrupted(few, tmp_path):
+    (few / "masks/000000.json").write_text("{")
+
+    def stop(finished, failed, total):
+        if failed and finished > 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(few, tmp_path, on_progress=stop)
+    (line,) = (tmp_path / "failures.jsonl").read_text().splitlines()
+    assert json.loads(line)["frame"] == "000000"
+
+
+def test_a_log_has_lines_meanwhile(few, tmp_path):
+    outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path)
+    lines = outcome.stdout.splitlines()
+    first = next(at for at, line in enumerate(lines) if re.fullmatch(r"labelling: 1 of 12 frames, .* a second", line))
+    assert first < next(at for at, line in enumerate(lines) if "objects found" in line)
+
+
+def test_quiet_prints_nothing(few, tmp_path):
+    outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--quiet")
+    assert (outcome.exit_code, outcome.output) == (0, "")
+    assert (tmp_path / "out/000000.npz").exists()
+    (few / "masks/000000.json").write_text("{")
+    outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "other", "-q")
+    assert (outcome.exit_code, outcome.stdout) == (2, "")
+    assert "000000 failed (masks)" in outcome.stderr
 
 
 def test_names_that_meet_by_their_endings():

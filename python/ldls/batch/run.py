@@ -71,6 +71,7 @@ def run(
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
         ImportError: The engine needs an extra that is not installed.
         OSError: The results cannot be written, as on a full disk; what is written stays, and the run can go on.
+        KeyboardInterrupt: It was interrupted; failures.jsonl has the frames that failed until then.
     """
     options = dict(options or {})
     opened = open_source(source, truth=False, **options) if isinstance(source, str | PathLike) else source
@@ -104,6 +105,9 @@ def run(
                     n_failed += "error" in outcome.record
                     if on_progress is not None:
                         on_progress(n_finished, n_failed, len(names))
+        except KeyboardInterrupt:
+            write_failures(folder, failures_of(journal.records(names)))
+            raise
         finally:
             journal.close()
         elapsed = time.perf_counter() - start

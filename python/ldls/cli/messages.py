@@ -6,7 +6,8 @@ import functools
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from rich.console import Console
@@ -17,7 +18,6 @@ from ldls.errors import LdlsError
 if TYPE_CHECKING:
     from ldls.segmentation import SegmentedObject
 
-P = ParamSpec("P")
 R = TypeVar("R")
 
 STAGES = {
@@ -31,11 +31,33 @@ STAGES = {
 }
 
 
-def speaks_plainly(command: Callable[P, R]) -> Callable[P, R]:
-    """`command`, with its errors and warnings as single lines instead of tracebacks, and help for any width."""
+QUIET = inspect.Parameter(
+    "quiet",
+    inspect.Parameter.KEYWORD_ONLY,
+    default=False,
+    annotation=Annotated[bool, typer.Option("--quiet", "-q", help="Print errors and warnings only.")],
+)
+_quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+
+
+def is_quiet() -> bool:
+    """Return True where --quiet was given."""
+    return _quiet.get()
+
+
+def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
+    """`command`, with its errors and warnings as single lines instead of tracebacks, and help for any width.
+
+    A command that writes to OUT also gets the option --quiet.
+    """
+    own = inspect.signature(command, eval_str=True)
+    parameters = [*own.parameters.values()]
+    if "out" in own.parameters:
+        parameters.append(QUIET)
 
     @functools.wraps(command)
-    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+    def wrapped(*args: Any, quiet: bool = False, **kwargs: Any) -> R:  # noqa: ANN401 - what Typer parsed
+        _quiet.set(quiet)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("default")
             try:
@@ -48,6 +70,8 @@ def speaks_plainly(command: Callable[P, R]) -> Callable[P, R]:
                     typer.secho(f"warning: {warning.message}", err=True, fg="yellow")
         return result
 
+    wrapped.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {each.name: each.annotation for each in parameters}
     wrapped.__doc__ = flowing(inspect.getdoc(command) or "")
     return wrapped
 
@@ -84,6 +108,6 @@ def timing_table(timings: Mapping[str, float]) -> Table:
 
 
 def console() -> Console:
-    """Return the console for tables: as wide as the terminal, and wide enough where there is none."""
-    terminal = Console()
-    return terminal if terminal.is_terminal else Console(width=100)
+    """Return the console for tables: as wide as the terminal, and wide enough where there is none; silent if quiet."""
+    terminal = Console(quiet=is_quiet())
+    return terminal if terminal.is_terminal else Console(width=100, quiet=is_quiet())

@@ -50,7 +50,6 @@ PictureOption = Annotated[
 ClassesOption = Annotated[
     str, typer.Option("--categories", metavar="WORDS", help="Categories to score: Car,Pedestrian.")
 ]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors and warnings.")]
 
 
 class SuitePart(StrEnum):

@@ -1,28 +1,57 @@
-"""A bar that shows how far a command is, on a terminal only."""
+"""How far a command is: a bar on a terminal, plain lines in a log."""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
+import typer
+
+from ldls.cli.messages import is_quiet
+
 T = TypeVar("T")
+LINE_EVERY_S = 10.0
+"""Seconds from one plain line to the next."""
 
 
 def progress(items: Iterable[T], total: int, title: str) -> Iterator[T]:
-    """The items, with a bar on standard error meanwhile if that is a terminal."""
-    from rich.console import Console
-    from rich.progress import track
-
-    screen = Console(stderr=True)
-    yield from track(
-        items, total=total, description=title, console=screen, transient=True, disable=not screen.is_terminal
-    )
+    """The items, which are or become frames, with word of how many are done."""
+    with frame_progress(title) as show:
+        for done, item in enumerate(items, start=1):
+            yield item
+            show(done, 0, total)
 
 
 @contextmanager
 def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
-    """Yield a function to call with the frames finished, failed and in all; shows a bar, speed, time left, failures."""
+    """Yield a function to call with the frames finished, failed and in all.
+
+    Standard error shows a bar, speed, time left and failures if it is a terminal. Standard output has a line now and
+    then if it is none, so that a log tells how far the command is.
+    """
+    start = time.monotonic()
+    said: float | None = None
+    with _bar(title) as show:
+
+        def update(finished: int, failed: int, total: int) -> None:
+            nonlocal said
+            now = time.monotonic()
+            show(finished, failed, total)
+            if sys.stdout.isatty() or is_quiet() or (said is not None and now - said < LINE_EVERY_S):
+                return
+            said = now
+            rate = finished / max(now - start, 1e-9)
+            left = f", {failed:,} failed" if failed else ""
+            typer.echo(f"{title}: {finished:,} of {total:,} frames{left}, {rate:.1f} a second")
+
+        yield update
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[Callable[[int, int, int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -35,10 +64,10 @@ def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[failed]}"),
     )
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+    with Progress(*columns, console=screen, transient=True, disable=is_quiet() or not screen.is_terminal) as bar:
         task = bar.add_task(title, total=None, rate="", failed="")
 
-        def update(finished: int, failed: int, total: int) -> None:
+        def show(finished: int, failed: int, total: int) -> None:
             speed = bar.tasks[0].speed
             bar.update(
                 task,
@@ -48,4 +77,4 @@ def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
                 failed=f"{failed} failed" if failed else "",
             )
 
-        yield update
+        yield show

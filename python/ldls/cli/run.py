@@ -76,6 +76,7 @@ def run(
     )
     options = parse_options(option or [])
     opened = open_source(source, kind=dataset, truth=False, **options)
+    chosen = parse_frames(frames)
     finished = failed = 0
     with frame_progress("labelling") as show_progress:
 
@@ -89,7 +90,7 @@ def run(
                 opened,
                 out,
                 settings,
-                frames=parse_frames(frames),
+                frames=chosen,
                 options=options,
                 workers=cores,
                 engine=engine,
@@ -98,9 +99,9 @@ def run(
                 on_progress=on_progress,
             )
         except KeyboardInterrupt:
-            typer.echo(
-                f"stopped: {finished - failed:,} frames are done; give the same command again to go on", err=True
-            )
+            failures = f", {failed:,} failed (failures.jsonl)" if failed else ""
+            done = f"{finished - failed:,} of {len(opened.names[chosen]):,} frames are done{failures}"
+            typer.echo(f"stopped: {done}; give the same command again to go on", err=True)
             raise typer.Exit(STOPPED) from None
     show(summary, out)
     if summary.failures:
@@ -114,11 +115,12 @@ def show(summary: Summary, out: Path) -> None:
         screen.print(object_counts(summary))
     if summary.seconds:
         screen.print(stage_times(summary))
-    for failure in summary.failures[:MOST_LISTED]:
-        screen.print(f"{failure.frame} failed ({failure.stage}): {failure.message}", highlight=False, soft_wrap=True)
+    failed = [f"{each.frame} failed ({each.stage}): {each.message}" for each in summary.failures[:MOST_LISTED]]
     more = len(summary.failures) - MOST_LISTED
     if more > 0:
-        screen.print(f"and {more} more; {out / 'failures.jsonl'} has all", highlight=False, soft_wrap=True)
+        failed.append(f"and {more} more; {out / 'failures.jsonl'} has all")
+    for line in failed:
+        typer.secho(line, err=True, fg="red")
     counts = [f"{summary.n_done:,} of {summary.n_frames:,} frames done"]
     if summary.n_earlier:
         counts.append(f"{summary.n_earlier:,} of them by earlier runs")

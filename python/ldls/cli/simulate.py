@@ -12,6 +12,7 @@ from rich.table import Table
 
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import CoresOption, SuitePart
+from ldls.cli.progress import progress
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -185,10 +186,8 @@ def summary_table(made: list[FrameSummary]) -> Table:
 
 def _follow(frames: Iterator[FrameSummary | None], total: int, where: Path) -> None:
     """Wait for frames that are made, and print what they hold."""
-    from rich.progress import track
-
     screen = console()
-    summaries = list(track(frames, "simulating", total=total, console=screen, transient=True))
+    summaries = list(progress(frames, total, "simulating"))
     made = [s for s in summaries if s is not None]
     if made:
         screen.print(summary_table(made))
