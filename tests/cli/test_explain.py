@@ -3,12 +3,14 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 import ldls
 from ldls.cli import app
 from ldls.cli.chosen_point import chosen_point
 from ldls.simulation import sample_frame
+from ldls.viewing import overlay, save_picture
 from ring_samples import as_views, random_ring
 
 run = CliRunner().invoke
@@ -332,3 +334,51 @@ def test_help_teaches():
     text = explain("--help").output
     assert "ldls explain 12345 results/000571.npz" in text
     assert "The first line is the verdict." in text
+
+
+@pytest.mark.parametrize("rings", [False, True], ids=["one camera", "three cameras"])
+def test_a_pixel_of_a_picture_of_ldls(frame, ring, tmp_path, rings):
+    result, path = ring if rings else frame
+    picture = overlay(result)
+    save_picture(tmp_path / "a.png", picture)
+    number = len(result.views) - 1
+    seen = result.views[number]
+    row = int(seen.in_view[11])
+    # where overlay draws the point: below the captions, the third image in the second row
+    scale = (897 if rings else 1800) / seen.view.masks.width
+    x, y = (seen.pixels[11] + 0.5) * scale + ((0, 598 + 2 * 30) if rings else (0, 0))
+    outcome = explain(f"{x:.2f},{y:.2f}", path, "--on", tmp_path / "a.png")
+    assert outcome.exit_code == 0, outcome.output
+    assert outcome.output.startswith(f"Point {row} is ")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        pytest.param(["3,4", "--on", "{other}"], "a picture of 40 x 30 pixels is no overlay", id="other"),
+        pytest.param(["0,899", "--on", "{own}", "--camera", "a"], "whose pixels tell their camera", id="camera"),
+        pytest.param(["7", "--on", "{own}"], "only a pixel U,V lies on a picture", id="beside a row"),
+        pytest.param(["3,5", "--on", "{own}"], "3,5 lies in no image of the picture", id="on a caption"),
+    ],
+)
+def test_misuse_of_pictures_is_one_line(ring, tmp_path, words, message):
+    result, path = ring
+    save_picture(tmp_path / "own.png", overlay(result))
+    save_picture(tmp_path / "other.png", Image.new("RGB", (40, 30)))
+    places = {"own": tmp_path / "own.png", "other": tmp_path / "other.png"}
+    outcome = explain(words[0], path, *(word.format(**places) for word in words[1:]))
+    assert outcome.exit_code == 1
+    assert message in outcome.stderr
+
+
+def test_a_point_far_from_the_pixel_or_place_is_not_taken(frame):
+    path = frame[1]
+    corner = explain("79.4,0", path)
+    assert corner.exit_code == 1
+    assert "POINT: no point is near. Point " in corner.stderr
+    assert "pixels away. Give " in corner.stderr
+    nowhere = explain("0,0,40", path)
+    assert nowhere.exit_code == 1
+    assert " m away. Give " in nowhere.stderr
+    row = int(nowhere.stderr.split("Give ")[1].split()[0])
+    assert explain(row, path).exit_code == 0

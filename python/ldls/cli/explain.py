@@ -40,8 +40,8 @@ def explain(
         str,
         typer.Argument(
             metavar="POINT",
-            help="Row number in the cloud, from 0; or U,V, a pixel of the picture; or X,Y,Z in metres in the lidar "
-            "frame. Of a pixel or a place, the nearest point is taken.",
+            help="Row number in the cloud, from 0; or U,V, a pixel of the image, or of the picture --on; or "
+            "X,Y,Z in metres in the lidar frame. Of a pixel or a place, the nearest point is taken.",
             callback=refuse_options,
         ),
     ],
@@ -59,6 +59,15 @@ def explain(
             help="Whose pixel U,V is, by name or number from 0, in a result of several cameras. With --calib: which "
             "camera of the calibration, as of ldls segment.",
             show_default=False,
+        ),
+    ] = None,
+    on: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.png",
+            help="Picture that ldls drew of the result, whose pixel U,V is: results/000571.png.",
+            show_default=False,
+            **EXISTING,
         ),
     ] = None,
     extrinsic: ExtrinsicOption = None,
@@ -82,6 +91,8 @@ def explain(
 
     ldls explain 610,180 results/000571.npz
 
+    ldls explain 884,260 results/000571.npz --on results/000571.png
+
     ldls explain 12.5,-3,0.2 --points velodyne/000571.bin --calib calib/000571.txt --masks masks/000571.json
     """
     from ldls.cli.chosen_point import chosen_point
@@ -99,7 +110,7 @@ def explain(
         seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
         instances = masks_of(None, masks=masks, segmenter=None, image_id=image_id)
         segmentation, view = segment(read_points(points), instances, seen_by), None
-    chosen = chosen_point(point, segmentation, view)
+    chosen = chosen_point(point, segmentation, view, on)
     explanation = explain_point(segmentation, chosen.row)
     if as_json:
         typer.echo(json.dumps(explanation.to_dict(), allow_nan=False, indent=2, ensure_ascii=False))

@@ -55,23 +55,29 @@ def grid(
     pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, columns: int, gap_px: int = GAP_PX
 ) -> Image.Image:
     """The pictures row by row, each below its caption if any."""
-    caption_px = CAPTION_PX if captions else 0
-    rows = [range(start, min(start + columns, len(pictures))) for start in range(0, len(pictures), columns)]
-    widths = [max(pictures[i].width for i in range(column, len(pictures), columns)) for column in range(columns)]
-    heights = [max(pictures[i].height for i in row) for row in rows]
-    size = sum(widths) + gap_px * (columns - 1), sum(heights) + caption_px * len(rows)
+    sizes = [picture.size for picture in pictures]
+    corners, size = places_in_grid(sizes, captions=bool(captions), columns=columns, gap_px=gap_px)
     whole = Image.new("RGB", size, PAPER)
     draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=FONT_PX)
-    top = 0
-    for row, height in zip(rows, heights, strict=True):
-        left = 0
-        for i, width in zip(row, widths, strict=False):
-            if captions:
-                draw.text((left + FONT_PX // 2, top + CAPTION_PX // 2), captions[i], INK, font, anchor="lm")
-            whole.paste(pictures[i], (left, top + caption_px))
-            left += width + gap_px
-        top += caption_px + height
+    for i, (left, top) in enumerate(corners):
+        if captions:
+            draw.text((left + FONT_PX // 2, top - CAPTION_PX // 2), captions[i], INK, font, anchor="lm")
+        whole.paste(pictures[i], (left, top))
     return whole
+
+
+def places_in_grid(
+    sizes: Sequence[tuple[int, int]], *, captions: bool, columns: int, gap_px: int = GAP_PX
+) -> tuple[list[tuple[int, int]], tuple[int, int]]:
+    """Left and top of each picture of `grid`, by their widths and heights, and width and height of the whole."""
+    caption_px = CAPTION_PX if captions else 0
+    rows = [range(start, min(start + columns, len(sizes))) for start in range(0, len(sizes), columns)]
+    widths = [max(sizes[i][0] for i in range(column, len(sizes), columns)) for column in range(columns)]
+    heights = [max(sizes[i][1] for i in row) for row in rows]
+    lefts = [sum(widths[:column]) + gap_px * column for column in range(columns)]
+    tops = [sum(heights[:row]) + caption_px * (row + 1) for row in range(len(rows))]
+    corners = [(lefts[i % columns], tops[i // columns]) for i in range(len(sizes))]
+    return corners, (sum(widths) + gap_px * (columns - 1), sum(heights) + caption_px * len(rows))
 
 
 def half(width_px: int) -> int:

@@ -49,4 +49,5 @@ def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:
     if path.suffix.lower() != ".png":
         raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} pictures, expected .png")
     with whole_file(path) as file:
-        picture.save(file, "PNG")
+        # a quarter of the time of the default level, and 6 % larger
+        picture.save(file, "PNG", compress_level=1)

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
 
-from ldls.errors import ParameterError
+from ldls.errors import InputError, ParameterError
 from ldls.masks import InstanceMasks
 from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView, camera_names
-from ldls.viewing.drawing import MARK, disc, grid, half, stamp
+from ldls.viewing.drawing import MARK, disc, grid, half, places_in_grid, stamp
 from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of
 from ldls.viewing.tags import Tag, draw_tags
 
@@ -52,6 +52,33 @@ def overlay(
     pairs = zip(result.views, each, strict=True)
     tiles = [overlay_of(shown, seen, image, width_px or half(WIDTH_PX)) for seen, image in pairs]
     return grid(tiles, camera_names(result.views), columns=2)
+
+
+def pixel_of(result: Segmentation, size_px: tuple[int, int], at_px: tuple[float, float]) -> tuple[int, float, float]:
+    """Number of the view, u and v in pixels of its image, that lie at a place of a picture of `overlay`.
+
+    Args:
+        result: The result that the picture shows.
+        size_px: Height and width of the picture.
+        at_px: x (right) and y (down) in pixels of the picture.
+
+    Raises:
+        InputError: No overlay of this result has this size, or the place lies between its images.
+    """
+    sizes = [seen.view.masks.image_size for seen in result.views]
+    several = len(sizes) > 1
+    width_px = half(size_px[1]) if several else size_px[1]
+    scales = [width_px / width for _, width in sizes]
+    tiles = [_scaled((width, height), scale) for (height, width), scale in zip(sizes, scales, strict=True)]
+    corners, whole = places_in_grid(tiles, captions=several, columns=2 if several else 1)
+    if whole != (size_px[1], size_px[0]):
+        expected = f"{whole[0]} x {whole[1]}"
+        raise InputError(f"a picture of {size_px[1]} x {size_px[0]} pixels is no overlay of this result ({expected})")
+    for number, ((left, top), (width, height), scale) in enumerate(zip(corners, tiles, scales, strict=True)):
+        x, y = at_px[0] - left, at_px[1] - top
+        if 0 <= x < width and 0 <= y < height:
+            return number, (x + 0.5) / scale - 0.5, (y + 0.5) / scale - 0.5
+    raise InputError(f"{at_px[0]:g},{at_px[1]:g} lies in no image of the picture of {size_px[1]} x {size_px[0]} pixels")
 
 
 def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) -> Image.Image:
@@ -124,7 +151,7 @@ def _subdued(image: NDArray[np.uint8], scale: float) -> Image.Image:
     picture = Image.fromarray(image)
     nearly_grey = Image.blend(picture.convert("L").convert("RGB"), picture, 0.3)
     darker = Image.blend(nearly_grey, Image.new("RGB", picture.size), 0.22)
-    return darker.resize(_scaled(picture, scale), Image.Resampling.BICUBIC)
+    return darker.resize(_scaled(picture.size, scale), Image.Resampling.BICUBIC)
 
 
 def _draw_mask(
@@ -132,7 +159,7 @@ def _draw_mask(
 ) -> None:
     margin = 3  # for the outline
     small = Image.fromarray(np.pad(crop, margin).astype(np.uint8) * 255)
-    large = small.resize(_scaled(small, scale), Image.Resampling.BILINEAR)
+    large = small.resize(_scaled(small.size, scale), Image.Resampling.BILINEAR)
     inside = np.asarray(large.filter(ImageFilter.GaussianBlur(scale))) / 255
     # A blurred edge rises by 1 / (sqrt(2 pi) radius) a pixel, which gives the way to it in pixels.
     to_edge_px = np.abs(inside - 0.5) * 2.5 * scale
@@ -142,8 +169,10 @@ def _draw_mask(
     picture.paste(colour, at_px, Image.fromarray((opacity * 255).round().astype(np.uint8)))
 
 
-def _scaled(picture: Image.Image, scale: float) -> tuple[int, int]:
-    return max(round(picture.width * scale), 1), max(round(picture.height * scale), 1)
+def _scaled(size_px: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Width and height of a picture, scaled."""
+    width, height = size_px
+    return max(round(width * scale), 1), max(round(height * scale), 1)
 
 
 def _pen_px(picture: Image.Image) -> float:
