@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from ldls.cli import annotate, demo, evaluate, explain, info, masks, reproduce, run, segment, simulate, view
+from ldls.cli import annotate, demo, evaluate, explain, info, init, masks, reproduce, run, segment, simulate, view
 from ldls.cli.options import Command
 
 
@@ -36,6 +36,7 @@ app = typer.Typer(
 app.command(name="segment", cls=Command)(segment.segment)
 # -3.2,1,0.5 is a place and no option
 app.command(name="explain", cls=Command, context_settings={"ignore_unknown_options": True})(explain.explain)
+app.command(name="init", cls=Command)(init.init)
 app.command(name="info", cls=Command)(info.info)
 app.command(name="run", cls=Command)(run.run)
 app.add_typer(masks.app, name="masks")

@@ -64,14 +64,39 @@ def _check_positions(values: NDArray[np.float32], columns: int) -> None:
     """Refuse a guess by which points lie where no lidar reaches, if with another number of columns none does."""
     if _are_positions(values, columns):
         return
-    fitting = [
-        other for other in range(3, MOST_TRIED + 1) if values.size % other == 0 and _are_positions(values, other)
-    ]
-    if fitting:
+    likeliest = _likeliest(values)
+    if likeliest is not None:
         raise FileFormatError(
             f"guessed {columns} floats a point, but then points lie farther than {FARTHEST_M:.0e} m; pass "
-            f"columns={fitting[0]} (or columns={columns} to insist)"
+            f"columns={likeliest} (or columns={columns} to insist)"
         )
+
+
+def likeliest_columns(path: Path) -> int | None:
+    """Number of columns by which the rows of a `.bin` file are points next to one another; None where there is none.
+
+    Raises:
+        FileFormatError: It is no regular file.
+        FileNotFoundError: There is no such file.
+    """
+    with open_file(path, "cloud") as file:
+        content = file.read()
+    return _likeliest(np.frombuffer(content, "<f4")) if len(content) % FLOAT_BYTES == 0 else None
+
+
+def _likeliest(values: NDArray[np.float32]) -> int | None:
+    """The least number of columns by which steps from one point to the next are as small as by any, or nearly."""
+    tried = range(3, MOST_TRIED + 1)
+    fitting = [columns for columns in tried if values.size % columns == 0 and _are_positions(values, columns)]
+    steps = [_step_m(values, columns) for columns in fitting]
+    return next((columns for columns, step in zip(fitting, steps, strict=True) if step <= 1.25 * min(steps)), None)
+
+
+def _step_m(values: NDArray[np.float32], columns: int) -> float:
+    """Median distance from one point to the next in metres; those of a lidar lie along its scan lines."""
+    steps = np.diff(values.reshape(-1, columns)[:, :3].astype(np.float64), axis=0)
+    distances = np.linalg.norm(steps, axis=1)
+    return float(np.nanmedian(distances)) if np.isfinite(distances).any() else 0.0
 
 
 def _are_positions(values: NDArray[np.float32], columns: int) -> bool:

@@ -1,0 +1,268 @@
+"""The proposal: sweeps, the images that go with them, and for each camera calibration, transform and masks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from ldls.cloud import Points
+from ldls.datasets.folder_description import FILE
+from ldls.datasets.proposal.calibrations import (
+    MAX_BYTES,
+    FoundCamera,
+    best_transform,
+    camera_in,
+    transforms_in,
+    view_of,
+)
+from ldls.datasets.proposal.patterns import FRAME, Pattern, patterns_of
+from ldls.errors import FileFormatError, LdlsError, SourceError
+from ldls.io import read_masks, read_points
+from ldls.io.images import read_image_size
+from ldls.io.labels import read_labeling
+from ldls.io.masks.formats import READERS as MASK_READERS
+from ldls.io.points import READERS as POINT_READERS
+from ldls.io.points.float_rows import likeliest_columns
+
+IMAGES = (".png", ".jpg", ".jpeg")
+CALIBRATIONS = (".yaml", ".yml", ".xml", ".json", ".toml", ".txt")
+NO_IMAGE_WORDS = ("mask", "inst", "seg", "label", "panoptic", "birds-eye", "comparison")
+"""Parts of the names of pictures that no camera took."""
+FEWEST_POINTS = 50
+"""Rows of numbers that make a text a cloud."""
+
+
+@dataclass
+class Proposal:
+    """An ldls.toml as far as the files tell.
+
+    Attributes:
+        lines: Its lines.
+        found: What it names, for people.
+        missing: What it lacks for `ldls info` and `ldls run`, for people.
+    """
+
+    lines: list[str] = field(default_factory=list)
+    found: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        """The file."""
+        return "\n".join(self.lines) + "\n"
+
+    def ask(self, question: str) -> None:
+        """Add a question as a comment."""
+        self.lines.append(f"# ? {question}")
+
+
+def propose(folder: Path) -> Proposal:
+    """Return the ldls.toml of a folder whose files are named by frames.
+
+    Raises:
+        SourceError: The folder has no cloud that can be read.
+    """
+    patterns = [pattern for pattern in patterns_of(folder) if PurePosixPath(pattern.text).name != FILE]
+    clouds = [pattern for pattern in patterns if pattern.suffix in POINT_READERS and _cloud(pattern) is not None]
+    if not clouds:
+        seen = ", ".join(pattern.text for pattern in patterns[:8]) or "nothing"
+        raise SourceError(f"{folder}: no file is a lidar sweep ({', '.join(POINT_READERS)}); found {seen}")
+    pictures = [pattern for pattern in patterns if _is_picture(pattern)]
+    sweeps = max(clouds, key=lambda cloud: (_most_shared(cloud, pictures), cloud.n_bytes))
+    points, columns = _known(_cloud(sweeps))
+    made = Proposal()
+    made.lines += [
+        "# What `ldls init` found; lines with # ? are questions. Paths are relative to this folder; {frame} is",
+        "# the name of a frame. docs/datasets.md has all keys.",
+        f'points = "{sweeps.text}"',
+    ]
+    made.found.append(f"{sweeps.text}: {_count(sweeps, 'sweep')}, the first of {len(points):,} points")
+    if columns is not None:
+        made.lines.append(f"columns = {columns}")
+        made.ask(f"the first file makes sense as rows of {columns} floats")
+    for other in clouds:
+        if other is not sweeps:
+            made.ask(f"{other.text} ({_count(other, 'cloud')}) is not used")
+    _add_truth(made, sweeps, patterns, len(points))
+    cameras = [picture for picture in pictures if picture.shared(sweeps)]
+    if not cameras:
+        made.missing.append(_no_images(sweeps, pictures))
+        made.lines += ["", "# [cameras.NAME]", f'# images = "images/{FRAME}.png"']
+    for picture in cameras:
+        _add_camera(made, picture, sweeps, patterns, points, alone=len(cameras) == 1)
+    return made
+
+
+def _cloud(pattern: Pattern) -> tuple[Points, int | None] | None:
+    """The first cloud of a pattern and its columns, where the reader has to be told; None where it is no cloud."""
+    _, path = pattern.first
+    for likeliest in (False, True) if pattern.suffix == ".bin" else (False,):
+        with suppress(LdlsError, ImportError, ValueError):
+            columns = likeliest_columns(path) if likeliest else None
+            points = read_points(path, columns=columns)
+            return (points, columns) if len(points) >= FEWEST_POINTS else None
+    return None
+
+
+def _known(cloud: tuple[Points, int | None] | None) -> tuple[Points, int | None]:
+    assert cloud is not None
+    return cloud
+
+
+def _is_picture(pattern: Pattern) -> bool:
+    if pattern.suffix not in IMAGES or any(word in pattern.text.lower() for word in NO_IMAGE_WORDS):
+        return False
+    with suppress(FileFormatError):
+        read_image_size(pattern.first[1])
+        return True
+    return False
+
+
+def _most_shared(cloud: Pattern, pictures: Iterable[Pattern]) -> int:
+    return max((len(cloud.shared(picture)) for picture in pictures), default=0)
+
+
+def _no_images(sweeps: Pattern, pictures: Sequence[Pattern]) -> str:
+    if not pictures:
+        return f"images: found none; the image of sweep {sweeps.first[0]} is to be named {sweeps.first[0]}.png or .jpg"
+    nearest = max(pictures, key=lambda picture: len(picture.files))
+    return (
+        f"images: no image has the name of a sweep ({nearest.text}: {nearest.first[0]}, "
+        f"{sweeps.text}: {sweeps.first[0]}); rename one of them"
+    )
+
+
+def _add_truth(made: Proposal, sweeps: Pattern, patterns: Iterable[Pattern], n_points: int) -> None:
+    for pattern in patterns:
+        common = pattern.shared(sweeps)
+        if pattern.suffix not in (".label", ".txt") or not common or pattern is sweeps:
+            continue
+        with suppress(LdlsError, ImportError):
+            if len(read_labeling(pattern.files[min(sweeps.files)])) == n_points:
+                made.lines.append(f'truth = "{pattern.text}"')
+                made.found.append(f"{pattern.text}: true labels")
+                return
+
+
+def _add_camera(
+    made: Proposal,
+    picture: Pattern,
+    sweeps: Pattern,
+    patterns: Sequence[Pattern],
+    points: Points,
+    *,
+    alone: bool,
+) -> None:
+    place = PurePosixPath(picture.text).parent
+    name = "camera" if place == PurePosixPath() else "_".join(place.parts).replace(" ", "_")
+    common = picture.shared(sweeps)
+    size = read_image_size(picture.files[min(common)])
+    made.lines += ["", f'[cameras."{name}"]', f'images = "{picture.text}"']
+    count = f"{_count(picture, 'image')} of {size[1]} x {size[0]}, {len(common):,} with a sweep"
+    made.found.append(f"{picture.text}: {count}")
+    own = [pattern for pattern in patterns if pattern not in (picture, sweeps)]
+    _add_masks(made, picture, own, size, alone=alone)
+    _add_calibration(made, name, sweeps, own, points, size, alone=alone)
+
+
+def _add_masks(
+    made: Proposal, picture: Pattern, others: Iterable[Pattern], size: tuple[int, int], *, alone: bool
+) -> None:
+    place = PurePosixPath(picture.text).parent.name
+    fitting = []
+    for other in others:
+        common = other.shared(picture)
+        if other.suffix not in MASK_READERS or not common or (other.suffix in IMAGES and _is_picture(other)):
+            continue
+        with suppress(LdlsError, ImportError, ValueError):
+            read_masks(other.files[min(common)], image_size=size)
+            fitting.append((alone or place in other.text, len(common), other))
+    if not fitting or not max(fitting, key=lambda each: each[:2])[0]:
+        made.lines.append(f'# masks = "masks/{FRAME}.json"')
+        made.ask("no masks were found: any format of docs/masks.md, or `ldls run --segmenter`")
+        return
+    _, n_common, masks = max(fitting, key=lambda each: each[:2])
+    made.lines.append(f'masks = "{masks.text}"')
+    made.found.append(f"{masks.text}: masks of {_number(n_common, 'image')}")
+
+
+def _add_calibration(
+    made: Proposal,
+    name: str,
+    sweeps: Pattern,
+    others: Sequence[Pattern],
+    points: Points,
+    size: tuple[int, int],
+    *,
+    alone: bool,
+) -> None:
+    small = [
+        pattern
+        for pattern in others
+        if pattern.suffix in CALIBRATIONS
+        and pattern.first[1].stat().st_size <= MAX_BYTES
+        and (len(pattern.files) == 1 or pattern.shared(sweeps))
+    ]
+    # of several cameras each has a file that is named like it, if there is one
+    small.sort(key=lambda pattern: not _names(pattern, name))
+    found = next((each for pattern in small if (each := _camera_of(pattern, sweeps, name)) is not None), None)
+    if found is None:
+        made.missing.append(f"calibration of {name}: found none; docs/formats.md has the files that are read")
+        made.lines += ['# calibration = "camera.yaml"', "# or K = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"]
+        made.ask("no calibration was found")
+        return
+    made.lines += found.lines
+    made.found.append(f"{found.place}: calibration of {name}")
+    calibrated = found.camera.image_size or size
+    if calibrated != size:
+        height, width = calibrated
+        made.ask(f"the calibration is of {width} x {height} pixels, images of {size[1]} x {size[0]}: was one resized?")
+    if not alone and not any(_names(pattern, name) for pattern in small):
+        made.ask("is this the calibration of this camera? No file has its name")
+    if found.knows_lidar:
+        upright, share = view_of(found.camera, points, size)
+        _judge(made, name, share, upright=upright)
+        return
+    transforms = [each for pattern in small for each in transforms_in(_file(pattern, sweeps), pattern.text)]
+    best = best_transform(transforms, found.camera, points, size)
+    if best is None:
+        turned = f", none of {len(transforms)} tried shows a point" if transforms else ""
+        made.missing.append(f"where the lidar is, for {name}: found no transform{turned}; docs/own-sensors.md says how")
+        made.lines.append("# T_camera_lidar = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]")
+        made.ask("no file says where the lidar is")
+        return
+    chosen, share = best
+    made.lines.append(chosen.line)
+    made.found.append(f"{chosen.how}: where the lidar is, for {name}")
+    if not chosen.is_sure:
+        made.ask(f"T_camera_lidar is {chosen.how}, one of {len(transforms)} ways to read it; is it right?")
+    _judge(made, name, share)
+
+
+def _camera_of(pattern: Pattern, sweeps: Pattern, name: str) -> FoundCamera | None:
+    return camera_in(_file(pattern, sweeps), pattern.text, name.rpartition("_")[2] if "_" in name else name)
+
+
+def _file(pattern: Pattern, sweeps: Pattern) -> Path:
+    common = pattern.shared(sweeps)
+    return pattern.files[min(common)] if len(pattern.files) > 1 and common else pattern.first[1]
+
+
+def _judge(made: Proposal, name: str, share: float, *, upright: bool = True) -> None:
+    made.ask(f"{share:.0%} of the first sweep's points are in view of {name}; look: ldls info . --picture check.png")
+    if not upright:
+        made.ask("but z of the lidar does not point up in the image: is the transform turned round?")
+
+
+def _names(pattern: Pattern, name: str) -> bool:
+    return name.rpartition("/")[2].lower() in pattern.text.lower()
+
+
+def _count(pattern: Pattern, what: str) -> str:
+    return _number(len(pattern.files), what)
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count:,} {what}{'s' if count != 1 else ''}"

@@ -1,0 +1,228 @@
+"""`ldls init`: the ldls.toml of folders as people have them, and what it says is missing."""
+
+import json
+import os
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+import ldls
+from ldls.cli import app
+from ldls.datasets import open_source
+from ldls.simulation import sample_frame
+from ldls.simulation.kitti_layout import calibration_lines
+
+NAMES = ("000007", "000008", "000011")
+
+
+def run(*words):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return sample_frame()
+
+
+@pytest.fixture
+def rig(tmp_path, frame):
+    """Sweeps, images and YOLO's masks of three frames, without calibration."""
+    (image,) = frame.images
+    for name in NAMES:
+        write(tmp_path / f"lidar/{name}.bin", np.asarray(frame.points, np.float32).tobytes())
+        (tmp_path / "front").mkdir(exist_ok=True)
+        Image.fromarray(image.read()).save(tmp_path / f"front/{name}.png")
+        write(tmp_path / f"labels/{name}.txt", b"2 0.1 0.4 0.2 0.4 0.2 0.6 0.1 0.6\n")
+    return tmp_path
+
+
+def write(path, content):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+
+
+def intrinsics(camera):
+    K = camera.projection[:, :3].ravel().tolist()
+    return f"camera_matrix: {K}\ndistortion_coefficients: [0, 0, 0, 0, 0]\nimage_width: 1242\nimage_height: 375\n"
+
+
+def rows(matrix):
+    return "\n".join(" ".join(repr(float(value)) for value in row) for row in matrix)
+
+
+def described(folder):
+    return tomllib.loads((folder / "ldls.toml").read_text())
+
+
+def pose(camera):
+    """x y z and the quaternion x y z w of the camera in the lidar frame."""
+    matrix = np.linalg.inv(camera.T_camera_lidar)
+    w = np.sqrt(1 + np.trace(matrix[:3, :3])) / 2
+    R = matrix[:3, :3]
+    xyz = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4 * w)
+    return matrix[:3, 3].tolist(), [*xyz.tolist(), float(w)]
+
+
+def in_kitti_files(folder, camera):
+    for name in NAMES:
+        write(folder / f"calib/{name}.txt", "\n".join(calibration_lines(camera)) + "\n")
+
+
+def in_parts_that_say_how(folder, camera):
+    translation, quaternion = pose(camera)
+    write(folder / "camera.yaml", intrinsics(camera))
+    parts = {"translation": translation, "quaternion_xyzw": quaternion, "pose_of": "camera"}
+    write(folder / "extrinsic.json", json.dumps(parts))
+
+
+def in_a_matrix_the_other_way_round(folder, camera):
+    cam = {"K": camera.projection[:, :3].tolist(), "D": [0.0] * 5}
+    tf = np.linalg.inv(camera.T_camera_lidar).tolist()
+    write(folder / "config.json", json.dumps({"cam": cam, "other": 4, "tf": tf}))
+
+
+def in_parts_that_leave_it_open(folder, camera):
+    translation, (x, y, z, w) = pose(camera)
+    write(folder / "camera.yaml", intrinsics(camera))
+    write(folder / "mount.yaml", f"lidar_to_cam:\n  translation: {translation}\n  rotation: [{w}, {x}, {y}, {z}]\n")
+
+
+def in_rows_of_numbers(folder, camera):
+    write(folder / "front.yaml", intrinsics(camera))
+    write(folder / "T.txt", rows(camera.T_camera_lidar))
+
+
+@pytest.mark.parametrize(
+    "calibrate",
+    [
+        in_kitti_files,
+        in_parts_that_say_how,
+        in_a_matrix_the_other_way_round,
+        in_parts_that_leave_it_open,
+        in_rows_of_numbers,
+    ],
+    ids=lambda each: each.__name__,
+)
+def test_the_camera_is_found_and_the_folder_is_a_source(rig, frame, calibrate):
+    camera = frame.images[0].camera
+    calibrate(rig, camera)
+    outcome = run("init", rig)
+    assert outcome.exit_code == 0, outcome.output
+    assert "missing" not in outcome.output
+    assert described(rig)["points"] == "lidar/{frame}.bin"
+    assert described(rig)["cameras"]["front"]["masks"] == "labels/{frame}.txt"
+    source = open_source(rig)
+    assert source.names == NAMES
+    read = source[0].images[0]
+    np.testing.assert_allclose(read.camera.T_camera_lidar, camera.T_camera_lidar, atol=1e-6)
+    np.testing.assert_allclose(read.camera.projection[:, :3], camera.projection[:, :3], atol=1e-6)
+    assert run("info", rig).exit_code == 0
+    done = run("run", rig, "--masks", rig / "labels", "--out", rig / "out")
+    assert done.exit_code == 0, done.output
+
+
+def test_what_was_guessed_is_a_question(rig, frame):
+    in_a_matrix_the_other_way_round(rig, frame.images[0].camera)
+    assert run("init", rig).exit_code == 0
+    questions = [line for line in (rig / "ldls.toml").read_text().splitlines() if line.startswith("# ?")]
+    assert any("tf of config.json, turned round, one of 2 ways to read it" in line for line in questions)
+    assert any("points are in view of front" in line for line in questions)
+
+
+def test_two_cameras_have_the_files_of_their_names(rig, frame):
+    camera = frame.images[0].camera
+    shutil.copytree(rig / "front", rig / "left")
+    for name, focal in (("left", 500.0), ("front", 721.0)):
+        K = [[focal, 0, 609.6], [0, focal, 172.9], [0, 0, 1]]
+        calibration = {"camera_matrix": K, "distortion_coefficients": [], "image_width": 1242, "image_height": 375}
+        write(rig / f"calibration/{name}.yaml", json.dumps(calibration))
+    write(rig / "calibration/extrinsic.txt", rows(camera.T_camera_lidar))
+    assert run("init", rig).exit_code == 0
+    focals = {image.name: image.camera.projection[0, 0] for image in open_source(rig)[0].images}
+    assert focals == {"front": 721.0, "left": 500.0}
+
+
+def test_names_that_are_times(tmp_path, frame):
+    camera = frame.images[0].camera
+    for stamp in ("1547131046.353", "1547131046.453", "1547131046.553", "1547131047.653"):
+        write(tmp_path / f"os1/{stamp}.bin", np.asarray(frame.points, np.float32).tobytes())
+        (tmp_path / "cam").mkdir(exist_ok=True)
+        Image.fromarray(frame.images[0].read()).save(tmp_path / f"cam/{stamp}.jpg")
+    in_rows_of_numbers(tmp_path, camera)
+    assert run("init", tmp_path).exit_code == 0
+    assert len(open_source(tmp_path)) == 4
+
+
+def test_rows_of_six_floats(rig, frame):
+    wide = np.zeros((len(frame.points), 6), np.float32)
+    wide[:, :4] = frame.points
+    wide[:, 4:] = 0.37
+    for name in NAMES:
+        write(rig / f"lidar/{name}.bin", wide.tobytes())
+    in_rows_of_numbers(rig, frame.images[0].camera)
+    assert run("init", rig).exit_code == 0
+    assert described(rig)["columns"] == 6
+    np.testing.assert_array_equal(open_source(rig)[0].points[:, :3], frame.points[:, :3])
+
+
+@pytest.mark.parametrize(
+    ("harm", "missing"),
+    [
+        pytest.param(lambda rig: None, "calibration of front: found none", id="no calibration"),
+        pytest.param(lambda rig: shutil.rmtree(rig / "front"), "images: found none", id="no images"),
+        pytest.param(
+            lambda rig: [path.rename(path.with_name(f"x{int(path.stem)}.png")) for path in (rig / "front").iterdir()],
+            "images: no image has the name of a sweep (front/x{frame}.png: 11, lidar/{frame}.bin: 000007)",
+            id="other names",
+        ),
+        pytest.param(
+            lambda rig: write(rig / "camera.yaml", intrinsics(sample_frame().images[0].camera)),
+            "where the lidar is, for front: found no transform",
+            id="no transform",
+        ),
+    ],
+)
+def test_what_is_missing_is_said_and_the_rest_is_written(rig, harm, missing):
+    harm(rig)
+    outcome = run("init", rig)
+    assert outcome.exit_code == 1
+    assert f"missing  {missing}" in outcome.output
+    assert described(rig)["points"] == "lidar/{frame}.bin"
+
+
+def test_a_file_that_is_there_is_kept(rig):
+    (rig / "ldls.toml").write_text("mine")
+    outcome = run("init", rig)
+    assert outcome.exit_code == 1
+    assert "ldls.toml: is there already" in outcome.stderr
+    assert (rig / "ldls.toml").read_text() == "mine"
+
+
+def test_a_folder_without_a_sweep(tmp_path):
+    write(tmp_path / "notes.md", "nothing")
+    outcome = run("init", tmp_path)
+    assert outcome.exit_code == 1
+    assert "no file is a lidar sweep" in outcome.stderr
+    assert "found notes.md" in outcome.stderr
+    assert not (tmp_path / "ldls.toml").exists()
+
+
+@pytest.mark.skipif("LDLS_TEST_DATA" not in os.environ, reason="LDLS_TEST_DATA is not set")
+def test_real_folders(tmp_path):
+    real = Path(os.environ["LDLS_TEST_DATA"]) / "real"
+    if not real.exists():
+        pytest.skip("LDLS_TEST_DATA has no folder real")
+    drive = run("init", real / "kitti_raw/2011_09_26/2011_09_26_drive_0005_sync")
+    assert "is read as it is (kitti-raw)" in drive.output
+    shutil.copytree(real / "boards", tmp_path / "boards", copy_function=shutil.copyfile)
+    outcome = run("init", tmp_path / "boards")
+    assert outcome.exit_code == 0, outcome.output
+    camera = open_source(tmp_path / "boards")[0].images[0].camera
+    config = json.loads((real / "boards/config.json").read_text())
+    np.testing.assert_allclose(camera.T_camera_lidar, config["tf"])
+    assert camera.distortion == ldls.Distortion("plumb_bob", tuple(config["cam"]["D"]))
