@@ -504,10 +504,14 @@ def test_masks_that_are_nowhere(few, tmp_path):
         batch.run(few, tmp_path / "out", batch.RunSettings(masks=str(tmp_path / "none")))
 
 
+def test_neither_masks_nor_a_segmenter(few, tmp_path):
+    with pytest.raises(ParameterError, match=r"got neither, and .*source names no masks of its own"):
+        batch.run(few, tmp_path / "out", batch.RunSettings())
+
+
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        pytest.param({}, "got neither", id="neither"),
         pytest.param({"masks": "a", "segmenter": "torchvision"}, "got both", id="both"),
         pytest.param({"masks": "a", "formats": ()}, "formats", id="no format"),
     ],

@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 from ldls.batch.formats import PICTURE, file_name, write_formats
-from ldls.batch.mask_files import MaskFiles
-from ldls.batch.settings import RunSettings, fill
+from ldls.batch.settings import RunSettings
 from ldls.datasets import CameraImage, Frame, Source
-from ldls.errors import BatchError
-from ldls.io import read_masks
+from ldls.datasets.stored_masks import StoredMasks, fill, own_masks
+from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io.files import digest_of
 from ldls.label_diffusion import LabelDiffusion, nothing_in_view
 from ldls.masks import InstanceMasks
@@ -115,12 +114,20 @@ class FrameWork:
 
         Raises:
             LdlsError: The segmenter, or the place of the masks, cannot be used.
+            ParameterError: Neither is given, and the source has no masks itself.
         """
         self._source = source
         self._settings = settings
         self.out = out
         self._diffusion = LabelDiffusion(params=replace(settings.params, threads=1))
-        self._files = None if settings.masks is None else MaskFiles(settings.masks)
+        self._own_masks = own_masks(source)
+        if settings.masks is None and settings.segmenter is None and not self._own_masks:
+            raise ParameterError(
+                f"masks, segmenter: give one of them, got neither, and {source.path} names no masks of its own"
+            )
+        self._stored = None if settings.masks is None else StoredMasks(settings.masks)
+        if self._stored is not None:
+            self._stored.check_names(source)
         self._segmenter = None if settings.segmenter is None else _segmenters(settings.segmenter, settings.min_score)
         self._reads_images = self._segmenter is not None or PICTURE in settings.formats
         self._digest = lru_cache(DIGESTS_KEPT)(_digest)
@@ -128,6 +135,12 @@ class FrameWork:
     def __reduce__(self) -> tuple[Any, ...]:
         """In another process all is opened anew."""
         return FrameWork, (self._source, self._settings, self.out)
+
+    @property
+    def masks_sha256(self) -> str | None:
+        """Digest of the one file that has the masks of all frames, for the journal; None without one."""
+        data_set = None if self._stored is None else self._stored.data_set
+        return None if data_set is None else data_set.sha256
 
     def read(self, work: Work) -> None:
         """Read points and stored masks; the files are looked at before, so that no change is missed."""
@@ -137,9 +150,10 @@ class FrameWork:
             unread = set() if self._reads_images else {image.path for image in work.frame.images}
             for path, look in seen.items():
                 work.inputs[str(path.absolute())] = self._state(path, look, read=path not in unread)
-        if self._files is not None:
+        if self._segmenter is None:
             with _stage(work, "masks"):
-                work.masks = tuple(self._stored(work, image) for image in work.frame.images)
+                masks = self._of_source(work) if self._stored is None else self._of_files(work, self._stored)
+                work.masks = tuple(map(self._wanted, masks))
 
     def segment(self, work: Work) -> None:
         """Make masks, unless they are stored, and label the points."""
@@ -205,12 +219,20 @@ class FrameWork:
             return Earlier.CHANGED
         return Earlier.DONE if there == names else Earlier.OPEN
 
-    def _stored(self, work: Work, image: CameraImage) -> InstanceMasks:
-        assert self._files is not None
+    def _of_files(self, work: Work, stored: StoredMasks) -> tuple[InstanceMasks, ...]:
         assert work.frame is not None
-        path = self._files.path(work.name, image.name, len(work.frame.images) == 1)
-        work.inputs[str(path.absolute())] = self._state(path, _look(path))
-        return self._wanted(read_masks(path, image_size=image.camera.image_size))
+        for path in stored.files(work.name, (image.name for image in work.frame.images)):
+            work.inputs[str(path.absolute())] = self._state(path, _look(path))
+        return stored.read(work.frame)
+
+    def _of_source(self, work: Work) -> tuple[InstanceMasks, ...]:
+        """The masks that the source has itself; cameras for which it names none are left out."""
+        assert work.frame is not None
+        work.frame = replace(work.frame, images=tuple(i for i in work.frame.images if i.name in self._own_masks))
+        for image in work.frame.images:
+            if image.masks is None:
+                raise InputError(f"camera {image.name}: no masks at {self._own_masks[image.name]!r} of the source")
+        return tuple(image.masks for image in work.frame.images if image.masks is not None)
 
     def _state(self, path: Path, look: Look, *, read: bool = True) -> list[int | str | None] | None:
         """Size, time of change and digest of a file that was seen so, for the journal."""

@@ -85,7 +85,7 @@ def run(
         sweep(folder)
         work = FrameWork(opened, settings, folder)
         header = {
-            "settings": settings.record(),
+            "settings": settings.record() | {"masks_sha256": work.masks_sha256},
             "source": source_record(opened.kind, str(Path(opened.path).resolve()), names, options),
         }
         journal = Journal(folder, header)

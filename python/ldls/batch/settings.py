@@ -11,6 +11,7 @@ from typing import Any
 
 import ldls._ldls as _ldls
 from ldls.batch.formats import check_formats
+from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
@@ -21,8 +22,9 @@ class RunSettings:
     """Settings that hold for every frame of a run.
 
     Attributes:
-        masks: Where stored masks lie: a folder, or a path with {frame} and, for several cameras, {camera}.
-        segmenter: What makes masks instead, as "onnx:model.onnx".
+        masks: Where stored masks lie: a folder, a path with {frame} and, for several cameras, {camera}, or one `.json`
+            of all images.
+        segmenter: What makes masks instead, as "onnx:model.onnx". Without either the source has masks itself.
         min_score: Lowest score of a mask that counts; the segmenter's own, or 0 of stored masks, without one.
         categories: Categories that count, by name or id; all without them.
         params: Parameters of the method; their number of threads does not matter to the result.
@@ -31,7 +33,7 @@ class RunSettings:
         same_object: See `ldls.segment`.
 
     Raises:
-        ParameterError: Neither or both of `masks` and `segmenter` are given, or there is no format, or an unknown one.
+        ParameterError: Both `masks` and `segmenter` are given, or there is no format, or an unknown one.
     """
 
     masks: str | None = None
@@ -43,9 +45,8 @@ class RunSettings:
     same_object: float = SAME_OBJECT
 
     def __post_init__(self) -> None:
-        if (self.masks is None) == (self.segmenter is None):
-            given = "neither" if self.masks is None else "both"
-            raise ParameterError(f"masks, segmenter: give one of them, got {given}")
+        if self.masks is not None and self.segmenter is not None:
+            raise ParameterError("masks, segmenter: give one of them, got both")
         check_formats(self.formats)
 
     def segmenter_file(self, frame: str, camera: str) -> Path | None:
@@ -63,11 +64,6 @@ class RunSettings:
         settings["version"] = _ldls.__version__
         recorded: dict[str, Any] = json.loads(json.dumps(settings))
         return recorded
-
-
-def fill(pattern: str, frame: str, camera: str) -> str:
-    """The pattern with the names of a frame and a camera in the places of {frame} and {camera}."""
-    return pattern.replace("{frame}", frame).replace("{camera}", camera)
 
 
 def source_record(kind: str, path: str, names: Sequence[str], options: Mapping[str, Any]) -> dict[str, Any]:

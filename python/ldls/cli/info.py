@@ -88,6 +88,7 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
 
     from ldls.datasets.file_source import counts_of
     from ldls.datasets.inspection import classes_of
+    from ldls.datasets.stored_masks import own_masks
 
     table = Table(title=escape(str(source.path)), show_header=False)
     table.add_row("kind", source.kind)
@@ -97,6 +98,8 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
         table.add_row("left out", f"{len(left_out):,} ({counts_of(left_out)})")
     table.add_row("time", _time(stamps))
     counts = [each.n_points for each in facts if each.n_points] or [0]
+    masks = ", ".join(f"{camera}: {place}" for camera, place in own_masks(source).items())
+    table.add_row("masks", escape(masks) or "none of its own")
     table.add_row("points a frame", _range(f"{min(counts):,}", f"{max(counts):,}"))
     classes = classes_of(facts)
     labelled = sum(each.truth is not None for each in facts)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ldls.cli.messages import console
 from ldls.cli.options import words
 from ldls.errors import InputError
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ldls.masks import InstanceMasks
+
+if TYPE_CHECKING:
+    from ldls.datasets import Source
 
 SEGMENTER_HELP = (
     "What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt."
@@ -66,6 +70,20 @@ def masks_of(
 def wanted(masks: InstanceMasks, *, min_score: float | None, categories: str | None) -> InstanceMasks:
     """The masks that score at least `min_score` and are of one of the categories of a list separated by commas."""
     return masks.filter(min_score=min_score or 0.0, categories=chosen_categories(categories))
+
+
+def say_own_masks(source: Source, masks: str | None, segmenter: str | None) -> bool:
+    """True for a source whose own masks are taken, as neither others nor a segmenter are given; a line says so."""
+    from ldls.datasets.stored_masks import own_masks
+
+    places = own_masks(source)
+    if masks is not None or segmenter is not None or not places:
+        return False
+    named = ", ".join(f"{camera}: {place}" for camera, place in places.items())
+    console().print(
+        f"masks are those that {source.path} names ({named})", highlight=False, markup=False, soft_wrap=True
+    )
+    return True
 
 
 def chosen_categories(text: str | None) -> tuple[int | str, ...] | None:

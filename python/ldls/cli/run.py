@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories
+from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories, say_own_masks
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
 from ldls.cli.options import FRAMES_FAILED, STOPPED, CoresOption, FormatsOption, FramesOption, OutOption, words
@@ -77,6 +77,7 @@ def run(
     options = parse_options(option or [])
     opened = open_source(source, kind=dataset, truth=False, **options)
     chosen = parse_frames(frames)
+    say_own_masks(opened, masks, segmenter)
     finished = failed = 0
     with frame_progress("labelling") as show_progress:
 

@@ -26,9 +26,9 @@ StoredMasksOption = Annotated[
     str | None,
     typer.Option(
         metavar="PATH",
-        help="Stored masks: a folder with a file a frame, or a path such as masks/{frame}.json; for several "
-        "cameras masks/{camera}/{frame}.json.",
-        show_default=False,
+        help="Stored masks: a folder with a file a frame; a path such as masks/{frame}.json, for several cameras "
+        "masks/{camera}/{frame}.json; or one COCO .json of all images, by their file names.",
+        show_default="those that the source names, as in ldls.toml",
     ),
 ]
 

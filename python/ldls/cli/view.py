@@ -70,8 +70,9 @@ def view(
 ) -> None:
     """Show a result, or the frames of a source, in the Rerun viewer (extra viz), or a result as pictures.
 
-    Frames of a source are segmented with --masks or --segmenter, or taken from --results; without any of these they
-    are shown as they are, with their truth. A frame that fails is passed over; the exit status is then 2.
+    Frames of a source are segmented with --masks, --segmenter or the masks that the source names itself, or taken from
+    --results; without any of these they are shown as they are, with their truth. A frame that fails is passed over; the
+    exit status is then 2.
     With --picture, pictures are written, and nothing is recorded unless --rerun says so.
 
     Examples:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ldls.cli.mask_options import chosen_categories
+from ldls.cli.mask_options import chosen_categories, say_own_masks
 from ldls.cli.options import refuse
 from ldls.cli.progress import progress
 from ldls.cli.recording_options import every_of
@@ -54,13 +54,14 @@ def labelled(
     categories: str | None,
     results: Path | None,
 ) -> Labelled:
-    """Frames of a source, segmented, or with stored results, or without labels.
+    """Frames of a source, segmented by given masks or its own, or with stored results, or without labels.
 
     Raises:
         ParameterError: Labels would come from two places, or options choose among masks and there are none.
         InputError: There are no stored results.
     """
-    if masks is None and segmenter is None:
+    own = results is None and say_own_masks(source, masks, segmenter)
+    if masks is None and segmenter is None and not own:
         refuse({"min-score": min_score, "categories": categories}, "they choose among --masks or --segmenter's masks")
         if results is None:
             return lambda index: (source[index], None)

@@ -19,6 +19,8 @@ from ldls.io import read_camera, read_masks
 from ldls.io.cameras.extrinsic_file import as_extrinsic
 from ldls.io.files import read_lines, strictly_below
 from ldls.io.images import read_image_size
+from ldls.io.masks.data_set import MaskDataSet
+from ldls.masks import InstanceMasks
 
 __all__ = ["FolderSource", "template"]
 
@@ -34,6 +36,7 @@ class FolderSource(FileSource):
         names: Values of {frame}, sorted.
         stamps: Times of the sweeps in seconds; None for each without a file of stamps.
         left_out: Parts that incomplete frames lack, by name of the frame.
+        stored_masks: Place of the masks of each camera that has them, as the description names it.
     """
 
     kind = "folder"
@@ -53,6 +56,7 @@ class FolderSource(FileSource):
             SourceError: No frame is whole, or a stamp is missing.
             CalibrationError: A calibration cannot be a camera's.
             FileFormatError: The description or a file of stamps is broken.
+            MaskError: One file of all masks contradicts itself.
             FileNotFoundError: There is no description, or a file that it names is not there.
         """
         self._file = _description_in(Path(path))
@@ -64,6 +68,10 @@ class FolderSource(FileSource):
         super().__init__(self.path, parts, self._cameras, truth=truth, columns=self._described.columns)
         self.stamps = self._read_stamps(self._described.stamps)
         self._image_stamps = {name: self._read_stamps(each.stamps) for name, each in self._cameras.items()}
+        self.stored_masks = {name: each.masks for name, each in self._cameras.items() if each.masks is not None}
+        self._data_sets = {
+            place: MaskDataSet(self._safe(place)) for place in set(self.stored_masks.values()) if FRAME not in place
+        }
         for key in self._cameras:
             self._camera(key, self.names[0])
 
@@ -74,16 +82,27 @@ class FolderSource(FileSource):
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
-        return (self._file, *super().files(index))
+        masks = tuple(self._one(place, self.names[index]) for place in self.stored_masks.values())
+        return (self._file, *super().files(index), *dict.fromkeys(masks))
 
     def _image(self, camera: str, index: int) -> CameraImage:
-        name, described = self.names[index], self._cameras[camera]
+        name = self.names[index]
         path = self._parts[f"cameras.{camera}"][name]
         made = self._camera(camera, name)
         made = made if made.image_size is not None else replace(made, image_size=read_image_size(path))
-        stored = None if described.masks is None else self._one(described.masks, name)
-        masks = None if stored is None or not stored.exists() else read_masks(stored)
+        masks = self._masks(camera, name, made.image_size)
         return image_from_file(camera, path, made, stamp=self._image_stamps[camera][index], masks=masks)
+
+    def _masks(self, camera: str, name: str, image_size: tuple[int, int] | None) -> InstanceMasks | None:
+        place = self._cameras[camera].masks
+        if place is None:
+            return None
+        if FRAME not in place:
+            paths: dict[str, Path | None] = {key: self._parts[f"cameras.{key}"][name] for key in self._cameras}
+            data_set = self._data_sets[place]
+            return data_set.masks(data_set.find(name, camera, paths), image_size)
+        stored = self._one(place, name)
+        return read_masks(stored, image_size=image_size) if stored.exists() else None
 
     def _camera(self, key: str, name: str) -> Camera:
         each = self._cameras[key]

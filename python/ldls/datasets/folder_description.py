@@ -46,7 +46,7 @@ truth_format = "semantic-kitti"     # only where the file's ending does not tell
 # one table a camera; its calibration inline ...
 [cameras.front]
 images = "front/{frame}.png"
-masks = "front_masks/{frame}.json"  # optional: any format of docs/masks.md
+masks = "front_masks/{frame}.json"  # optional: any format of docs/masks.md, or one .json of all images
 stamps = "front/stamps.txt"         # optional
 image_size = [480, 640]             # optional: height, width in pixels; else that of each image
 K = [[525.0, 0.0, 319.5], [0.0, 525.0, 239.5], [0.0, 0.0, 1.0]]
@@ -87,7 +87,7 @@ class CameraDescription:
 
     Attributes:
         images: Pattern of its images.
-        masks: Pattern of their masks, if there are any.
+        masks: Pattern of their masks, or one file of all of them, if there are any.
         stamps: File of their stamps, if there is one.
         calibration: Pattern of calibration files, where the calibration is not inline.
         options: Options of `ldls.read_camera` for those files, but for T_camera_lidar.

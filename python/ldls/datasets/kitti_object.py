@@ -34,6 +34,7 @@ class KittiObjectSource(FileSource):
         names: Numbers of the frames, as "000571".
         stamps: None for each frame, as the data set has none.
         left_out: Parts that incomplete frames lack, by name of the frame.
+        stored_masks: Folder of the stored masks, by camera, if there are any.
     """
 
     kind = "kitti-object"
@@ -64,6 +65,7 @@ class KittiObjectSource(FileSource):
         path = _training(Path(path), split)
         self._numbers = {f"image_{n}": n for n in camera_numbers(camera)}
         self._masks = masks
+        self.stored_masks = {} if masks is None else dict.fromkeys(self._numbers, masks)
         parts = {
             "velodyne": find_points(path / "velodyne"),
             "calib": find_files(path / "calib", (".txt",)),

@@ -16,7 +16,7 @@ import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES
 from ldls.errors import CorruptFileError, LeftOutWarning, MaskError, within
 from ldls.masks.instance_mask import InstanceMask
-from ldls.masks.pixels import checked_size
+from ldls.masks.pixels import check_same_size, checked_size
 
 
 def arguments(
@@ -85,12 +85,17 @@ def _parts(content: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, A
     if not isinstance(content, Mapping) or "annotations" not in content:
         raise CorruptFileError("expected COCO's object with images, annotations and categories, or a list of results")
     annotations = _records("annotations", content["annotations"])
-    images = _by_id("images", content.get("images", []), (int, str))
-    categories = _by_id("categories", content.get("categories", []), (int,))
+    images = by_id("images", content.get("images", []), (int, str))
+    categories = by_id("categories", content.get("categories", []), (int,))
     return annotations, images, {i: str(c.get("name", i)) for i, c in categories.items()}
 
 
-def _by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[str, Any]]:
+def by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[str, Any]]:
+    """Records of a list by their id.
+
+    Raises:
+        CorruptFileError: It is no list of objects, an id is of none of the types, or two records have the same.
+    """
     records = _records(name, values)
     by_id: dict[Any, dict[str, Any]] = {}
     for i, record in enumerate(records):
@@ -148,9 +153,8 @@ def _size_of(
     image = images.get(image_id, {})
     if image.get("height") is not None and image.get("width") is not None:
         own = checked_size((image["height"], image["width"]))
-        if given not in (None, own):
-            hint = "; swapped?" if given == own[::-1] else ""
-            raise MaskError(f"masks of {own} (height, width), the image is {given}{hint}")
+        if given is not None:
+            check_same_size(own, given)
         return own
     if given is not None:
         return given

@@ -114,3 +114,14 @@ def checked_size(size: object) -> tuple[int, int]:
         MaskError: It is no pair of whole numbers from 1 to 2**31 - 1.
     """
     return as_image_size("size", size, MaskError)
+
+
+def check_same_size(own: tuple[int, int], size: tuple[int, int]) -> None:
+    """Refuse masks of another image than the one at hand.
+
+    Raises:
+        MaskError: The size of the masks, `own`, is not that of the image.
+    """
+    if own != size:
+        hint = "; swapped?" if own == size[::-1] else ""
+        raise MaskError(f"masks of {own} (height, width), the image is {size}{hint}")

@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 from numpy.typing import ArrayLike
 
 from ldls.checks import checked
-from ldls.errors import MaskError, UnsupportedFormatError
+from ldls.errors import UnsupportedFormatError, within
 from ldls.io.masks import coco_json, instance_png, json_file, npz, numpy_stack, png_folder, text
 from ldls.io.options import check_options
 from ldls.masks import InstanceMasks
-from ldls.masks.pixels import checked_size
+from ldls.masks.pixels import check_same_size, checked_size
 
 READERS: dict[str, Callable[..., InstanceMasks]] = {
     ".json": json_file.read,
@@ -86,9 +86,8 @@ def read_masks(
         return reader(path, **given)
     size = checked_size(image_size)
     masks = reader(path, **given, **({"image_size": size} if "image_size" in known else {}))
-    if size != masks.image_size:
-        hint = "; swapped?" if size == masks.image_size[::-1] else ""
-        raise MaskError(f"{path}: masks of {masks.image_size} (height, width), the image is {size}{hint}")
+    with within(path):
+        check_same_size(masks.image_size, size)
     return masks
 
 

@@ -35,14 +35,31 @@ def read(
         LimitError: The file is too large.
     """
     with open_file(path, "JSON file", limit=MAX_FILE_BYTES) as file:
-        content = json.loads(file.text(), parse_constant=_refuse_constant)
-        if isinstance(content, dict) and "shapes" in content:
-            return InstanceMasks(**labelme.arguments(content, names=names))
-        if isinstance(content, dict) and panoptic_png.is_panoptic(content):
-            return panoptic_png.read(Path(path), content, image_id=image_id)
-        if _is_sam(_records(content)):
-            return InstanceMasks(**adapters.from_sam(_records(content), names=names, image_size=image_size))
-        return InstanceMasks(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
+        content = json.loads(file.text(), parse_constant=refuse_constant)
+        return parse(content, Path(path), image_id=image_id, image_size=image_size, names=names)
+
+
+def parse(
+    content: Any,  # noqa: ANN401
+    path: Path,
+    *,
+    image_id: int | str | None = None,
+    image_size: tuple[int, int] | None = None,
+    names: Mapping[int, str] | None = None,
+) -> InstanceMasks:
+    """The masks of one image of the parsed `content` of the file `path`; arguments and errors as of `read`."""
+    if isinstance(content, dict) and "shapes" in content:
+        return InstanceMasks(**labelme.arguments(content, names=names))
+    if isinstance(content, dict) and panoptic_png.is_panoptic(content):
+        return panoptic_png.read(path, content, image_id=image_id)
+    if _is_sam(_records(content)):
+        return InstanceMasks(**adapters.from_sam(_records(content), names=names, image_size=image_size))
+    return InstanceMasks(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
+
+
+def refuse_constant(name: str) -> None:
+    """Refuse NaN and its like, which JSON does not have."""
+    raise ValueError(f"{name} is no JSON number")
 
 
 def _records(content: Any) -> list[Any]:  # noqa: ANN401
@@ -55,7 +72,3 @@ def _is_sam(records: list[Any]) -> bool:
     return bool(records) and all(
         isinstance(record, dict) and "predicted_iou" in record and "category_id" not in record for record in records
     )
-
-
-def _refuse_constant(name: str) -> None:
-    raise ValueError(f"{name} is no JSON number")

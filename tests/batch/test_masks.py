@@ -1,0 +1,140 @@
+"""Runs with one file of all masks, and with the masks that a source names itself."""
+
+import json
+
+import pytest
+
+from batch import runs
+from datasets import layouts
+from ldls import batch
+from ldls.errors import BatchError, InputError
+from ldls.io.masks import data_set as data_set_module
+
+
+def gather(source, path, names="{}.png", frames=None):
+    """One file of the masks of all frames, each image under a name made of its frame's."""
+    files = sorted((source / "masks").glob("*.json"))[:frames]
+    documents = [json.loads(file.read_text()) for file in files]
+    images = [
+        document["images"][0] | {"id": k, "file_name": names.format(file.stem)}
+        for k, (file, document) in enumerate(zip(files, documents, strict=True))
+    ]
+    annotations = [a | {"image_id": k} for k, document in enumerate(documents) for a in document["annotations"]]
+    content = {"images": images, "categories": documents[0]["categories"], "annotations": annotations}
+    path.write_text(json.dumps(content))
+    return path
+
+
+def run(source, out, masks=None, **options):
+    return batch.run(source, out, batch.RunSettings(masks=None if masks is None else str(masks)), **options)
+
+
+def labels(out):
+    return {name: content for name, content in runs.contents(out).items() if name.endswith(".label")}
+
+
+def test_one_file_yields_the_results_of_a_file_for_each_frame(source, undisturbed, tmp_path, monkeypatch):
+    path = gather(source, tmp_path / "instances.json", "image_2/{}.jpg")
+    opened = []
+    open_file = data_set_module.open_file
+    monkeypatch.setattr(
+        data_set_module,
+        "open_file",
+        lambda path, *more, **options: opened.append(path) or open_file(path, *more, **options),
+    )
+    assert run(source, tmp_path / "out", path).n_done == 60
+    assert labels(tmp_path / "out") == {name: each for name, each in undisturbed.items() if name.endswith(".label")}
+    assert opened == [path]
+    header, *frames = (tmp_path / "out/journal.jsonl").read_text().splitlines()
+    assert len(json.loads(header)["settings"]["masks_sha256"]) == 64
+    assert not any("instances.json" in line for line in frames)
+
+
+def test_a_frame_that_is_not_in_the_file_fails_and_one_without_annotations_does_not(few, tmp_path):
+    path = gather(few, tmp_path / "instances.json", frames=11)
+    content = json.loads(path.read_text())
+    content["annotations"] = [a for a in content["annotations"] if a["image_id"] != 4]
+    path.write_text(json.dumps(content))
+    summary = run(few, tmp_path / "out", path)
+    (failure,) = summary.failures
+    assert (failure.frame, failure.stage) == ("000011", "masks")
+    assert "has no 000011, the image of camera image_2 in frame 000011" in failure.message
+    assert set((tmp_path / "out/000004.label").read_bytes()) == {0}
+    assert set((tmp_path / "out/000003.label").read_bytes()) != {0}
+
+
+def test_a_file_of_other_images_stops_the_run_at_once(few, tmp_path):
+    path = gather(few, tmp_path / "instances.json", "frame {}.png")
+    outcome = runs.resumed(["run", str(few), "--masks", str(path), "--out", str(tmp_path / "out")])
+    assert outcome.exit_code == 1
+    assert "it has 'frame 000000.png', 'frame 000001.png', 'frame 000002.png' and 9 more" in outcome.output
+    assert "the frames are '000000', '000001', '000002' and 9 more" in outcome.output
+    assert not (tmp_path / "out/journal.jsonl").exists()
+
+
+def test_a_file_of_masks_that_was_changed_since_is_refused(few, tmp_path):
+    path = gather(few, tmp_path / "instances.json")
+    run(few, tmp_path / "out", path)
+    assert run(few, tmp_path / "out", path).n_earlier == 12
+    path.write_text(path.read_text() + "\n")
+    with pytest.raises(BatchError, match="settings.masks_sha256 was '[0-9a-f]{64}', is '[0-9a-f]{64}'"):
+        run(few, tmp_path / "out", path)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder of two frames whose ldls.toml names masks, and those masks."""
+    made = layouts.plain_folder(tmp_path / "rig", layouts.FOLDER_TOML.replace(".npz", ".json"))
+    for left, name in enumerate("ab", start=20):
+        layouts.write_text(made / f"masks/{name}.json", json.dumps(layouts.coco(left)))
+    return made
+
+
+def test_masks_that_the_source_names_are_used_and_said(folder, tmp_path):
+    outcome = runs.resumed(["run", str(folder), "--out", str(tmp_path / "own")])
+    assert outcome.exit_code == 0, outcome.output
+    assert f"masks are those that {folder} names (front: masks/{{frame}}.json)" in outcome.output
+    words = ["run", str(folder), "--masks", f"{folder}/masks/{{frame}}.json", "--out", str(tmp_path / "given")]
+    outcome = runs.resumed(words)
+    assert outcome.exit_code == 0 and "masks are those" not in outcome.output
+    assert labels(tmp_path / "own") == labels(tmp_path / "given") != {}
+    assert any(set(content) != {0} for content in labels(tmp_path / "own").values())
+
+
+def test_given_masks_win_over_those_of_the_source(folder, tmp_path):
+    for name in "ab":
+        layouts.write_text(tmp_path / f"others/{name}.json", json.dumps(layouts.coco(45)))
+    run(folder, tmp_path / "own")
+    run(folder, tmp_path / "given", tmp_path / "others")
+    assert labels(tmp_path / "own") != labels(tmp_path / "given")
+
+
+def test_a_changed_file_of_the_source_s_masks_is_refused(folder, tmp_path):
+    run(folder, tmp_path / "out")
+    layouts.write_text(folder / "masks/b.json", json.dumps(layouts.coco(45)))
+    with pytest.raises(BatchError, match=r"masks/b\.json, of which frame b was made, was changed since"):
+        run(folder, tmp_path / "out")
+
+
+def test_a_frame_whose_masks_the_source_names_and_does_not_have_fails(folder, tmp_path):
+    (folder / "masks/b.json").unlink()
+    (failure,) = run(folder, tmp_path / "out").failures
+    assert (failure.frame, failure.stage) == ("b", "masks")
+    assert failure.message == "camera front: no masks at 'masks/{frame}.json' of the source"
+
+
+def test_cameras_for_which_the_source_names_no_masks_are_left_out(folder, tmp_path):
+    run(folder, tmp_path / "one")
+    description = (folder / "ldls.toml").read_text()
+    front = description[description.index("[cameras.front]") :]
+    back = front.replace("front", "back").replace('masks = "masks/{frame}.json"\n', "")
+    layouts.write_text(folder / "ldls.toml", description + back)
+    for name in "ab":
+        layouts.write_image(folder / f"back/{name}.png")
+    run(folder, tmp_path / "two")
+    assert labels(tmp_path / "one") == labels(tmp_path / "two")
+
+
+def test_a_place_without_masks(few, tmp_path):
+    with pytest.raises(InputError, match="no folder and has no"):
+        run(few, tmp_path / "out", tmp_path / "none")
