@@ -18,6 +18,7 @@ from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import SegmenterErrors, robot_drive, write_robot_drive
 from ldls.simulation.drives import ROBOT
 from ldls.simulation.rigs import CameraModel, distorted, undistorted
+from ldls.simulation.scene_object import KITTI_NAMES
 from ldls.stages import project
 
 KINDS = {"rosbag1": "drive.bag", "rosbag2": "drive", "mcap": "drive"}
@@ -112,6 +113,25 @@ def test_the_bag_holds_what_was_simulated(drive_folder, simulated):
         np.testing.assert_array_equal(masks.to_array(), made.images[0].masks.to_array())
         truth = read_annotations(drive_folder / f"annotations/{frame.name}.txt")
         np.testing.assert_array_equal(truth.instances, made.truth.instances)
+
+
+def test_the_first_frame_of_a_drive_has_the_true_classes():
+    (frame,) = robot_drive(1)
+    (image,) = frame.images
+    result = ldls.segment(frame.points, image.masks, image.camera)
+    true = np.array(frame.truth.names)[frame.truth.classes]
+    things = [thing for thing in result.objects if thing.n_points > 0]
+    assert len(things) > 10
+    for thing in things:
+        names, counts = np.unique(true[result.labels == thing.label], return_counts=True)
+        assert names[counts.argmax()] == KITTI_NAMES.get(thing.category, thing.name)
+
+
+def test_only_the_names_of_a_drive_s_masks_are_without_errors():
+    (usual,), (drive,) = (list(robot_drive(1, segmenter=each)) for each in (SegmenterErrors(), None))
+    named, right = usual.images[0].masks, drive.images[0].masks
+    assert sorted(mask.area for mask in named) == sorted(mask.area for mask in right)
+    assert sorted(mask.name for mask in named) != sorted(mask.name for mask in right)
 
 
 def test_from_bag_to_labelled_bag_and_back(drive_folder, simulated, tmp_path):

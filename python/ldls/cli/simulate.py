@@ -111,7 +111,7 @@ def simulate(
     Needs the extra `sim` of ldls.
 
     With --layout rosbag1, rosbag2 (SQLite) or mcap, OUT holds a bag of the VLP-16 and the camera of a robot, ten
-    frames a second, and masks and annotations named by stamp. Needs the extra `ros` too.
+    frames a second, and masks (of the right categories) and annotations named by stamp. Needs the extra `ros` too.
 
     Example: ldls simulate scenes --count 5 --scene campus, and then ldls segment
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt
@@ -137,7 +137,7 @@ def simulate(
     segmenter = SegmenterErrors() if errors else SegmenterErrors.none()
     sensors = SensorErrors() if errors else SensorErrors.none()
     if layout in BAGS:
-        _write_bag(out, layout, count, seed, segmenter)
+        _write_bag(out, layout, count, seed, None if errors else segmenter)
     elif layout is Layout.KITTI_RAW:
         drive = Drive(
             n_frames=count,
@@ -197,7 +197,7 @@ def _follow(frames: Iterator[FrameSummary | None], total: int, where: Path) -> N
         screen.print(f"kept {kept} that were there; delete them to make them anew", highlight=False)
 
 
-def _write_bag(out: Path, layout: Layout, frames: int, seed: int, segmenter: SegmenterErrors) -> None:
+def _write_bag(out: Path, layout: Layout, frames: int, seed: int, segmenter: SegmenterErrors | None) -> None:
     from ldls.simulation import write_robot_drive
 
     screen = console()

@@ -29,6 +29,9 @@ CLEAR_M = 1.5
 """No object comes nearer to the lidar than this."""
 ROBOT = Rig(VLP_16, 0.75, (MountedCamera(ROBOT_LENS, (0.10, 0.0, -0.12)),))
 """A VLP-16 over a camera with a lens."""
+ROBOT_SEGMENTER = SegmenterErrors(wrong_class=0)
+"""Gives whatever it finds its right category: a drive is there to look at, and a wrong name passes from the mask to all
+points of the object, whatever the method does."""
 ROBOT_SPEED_M_S = 1.2
 ROBOT_IMAGE_DELAY_S = 0.012
 """Time from a robot's sweep to its image."""
@@ -114,7 +117,7 @@ def robot_drive(
         frames: Number of frames.
         seed: Seed of the scene and its noise.
         rig: Lidar and camera.
-        segmenter: Errors of the masks; `SegmenterErrors()` by default.
+        segmenter: Errors of the masks; by default the usual ones, but for wrong categories.
 
     Raises:
         ParameterError: `frames` is below 1.
@@ -135,7 +138,7 @@ def robot_drive(
             sweep_noise=(seed, 0, number),
             mask_seed=seed + 7919 * number,
             drift=np.eye(4),
-            segmenter=segmenter,
+            segmenter=ROBOT_SEGMENTER if segmenter is None else segmenter,
         )
 
 

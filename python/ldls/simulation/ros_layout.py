@@ -66,7 +66,7 @@ def write_robot_drive(
         kind: "rosbag1", "rosbag2" (SQLite) or "mcap".
         frames: Number of sweeps, ten a second.
         seed: Seed of the scene and its noise.
-        segmenter: Errors of the masks; `SegmenterErrors()` by default.
+        segmenter: Errors of the masks; by default the usual ones, but for wrong categories.
         compressed: PNG images rather than raw ones.
 
     Raises:
