@@ -262,9 +262,7 @@ def test_left_over_parts_are_swept(few, tmp_path):
     ("options", "named"),
     [
         pytest.param({"settings": {"params": ldls.Params(sigma=2.0)}}, "params.sigma was 0.1, is 2.0", id="sigma"),
-        pytest.param({"settings": {"formats": ("label", "ply")}}, "settings.formats was", id="formats"),
         pytest.param({"settings": {"min_score": 0.5}}, "settings.min_score was None, is 0.5", id="score"),
-        pytest.param({"frames": slice(0, 5)}, "source.frames was 12, is 5", id="frames"),
     ],
 )  # fmt: skip
 def test_a_run_of_other_settings_is_refused(few, tmp_path, options, named):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -17,6 +17,8 @@ from ldls.viewing import overlay, save_picture
 
 PICTURE = "png"
 """The image with masks and points."""
+RESULT = "npz"
+"""The file that a whole result is read from, to write others."""
 ENDINGS: dict[str, str] = {**{word: each.ending for word, each in FORMATS.items()}, PICTURE: ".png"}
 """Endings of the names of files, by the words that choose them."""
 
@@ -39,6 +41,17 @@ def check_formats(formats: Sequence[str]) -> None:
 def file_name(frame: str, word: str) -> str:
     """Name of a file of a frame: 000001.label, 000001_lidarseg.bin."""
     return frame + ENDINGS[word]
+
+
+def written_formats(endings: Iterable[str], wanted: Sequence[str]) -> tuple[str, ...]:
+    """The formats that are `wanted`, and those whose `endings` are there already."""
+    there = set(endings)
+    return tuple(dict.fromkeys([*wanted, *(word for word, ending in ENDINGS.items() if ending in there)]))
+
+
+def file_names(frame: str) -> frozenset[str]:
+    """Names of all files that a frame can have."""
+    return frozenset(frame + ending for ending in ENDINGS.values())
 
 
 def write_formats(

@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from ldls.batch.formats import PICTURE, file_name, write_formats
+from ldls.batch.formats import PICTURE, RESULT, file_name, file_names, write_formats
+from ldls.batch.journal import KeptRecords, Record
 from ldls.batch.settings import RunSettings
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.datasets.stored_masks import StoredMasks, fill, own_masks
 from ldls.errors import BatchError, InputError, ParameterError
+from ldls.io import read_result
 from ldls.io.files import digest_of
 from ldls.label_diffusion import LabelDiffusion, nothing_in_view
 from ldls.masks import InstanceMasks
@@ -75,6 +77,8 @@ class Work:
         masks: Stored masks of each image.
         inputs: Size, time of change and digest of the files that it is made of, by path; None for one that is not
             there, and for the digest of one that is not read.
+        earlier: What the journal says of it, if an earlier run did it.
+        kept: Its files of earlier runs that need not be written again, with size and digest.
         result: What came of it.
         record: Its line for the journal.
         seconds: Time that each stage took.
@@ -86,6 +90,8 @@ class Work:
     images: tuple[CameraImage, ...] = ()
     masks: tuple[InstanceMasks, ...] | None = None
     inputs: dict[str, list[int | str | None] | None] = field(default_factory=dict)
+    earlier: Record | None = None
+    kept: Mapping[str, list[int | str]] = field(default_factory=dict)
     result: Segmentation | None = None
     record: Mapping[str, Any] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -109,8 +115,14 @@ class Work:
 class FrameWork:
     """Does the stages of frames; several threads may do so at a time."""
 
-    def __init__(self, source: Source, settings: RunSettings, out: Path) -> None:
+    def __init__(self, source: Source, settings: RunSettings, out: Path, earlier: KeptRecords | None = None) -> None:
         """Prepare for the frames of `source`: the segmenter is opened here, limited to one thread.
+
+        Args:
+            source: The frames.
+            settings: How they are treated.
+            out: Folder of the results.
+            earlier: What the journal says of frames of which an earlier run did a part.
 
         Raises:
             LdlsError: The segmenter, or the place of the masks, cannot be used.
@@ -119,6 +131,7 @@ class FrameWork:
         self._source = source
         self._settings = settings
         self.out = out
+        self.records = earlier
         self._diffusion = LabelDiffusion(params=replace(settings.params, threads=1))
         self._own_masks = own_masks(source)
         if settings.masks is None and settings.segmenter is None and not self._own_masks:
@@ -134,7 +147,7 @@ class FrameWork:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """In another process all is opened anew."""
-        return FrameWork, (self._source, self._settings, self.out)
+        return FrameWork, (self._source, self._settings, self.out, self.records)
 
     @property
     def masks_sha256(self) -> str | None:
@@ -143,20 +156,30 @@ class FrameWork:
         return None if data_set is None else data_set.sha256
 
     def read(self, work: Work) -> None:
-        """Read points and stored masks; the files are looked at before, so that no change is missed."""
+        """Read points and stored masks, or the result that an earlier run wrote of them.
+
+        Files are looked at before they are read, so that no change is missed.
+        """
         with _stage(work, "read"):
+            self._read_earlier(work)
+            if work.result is not None and PICTURE not in self._missing(work):
+                return
             seen = {path: _look(path) for path in self._source.files(work.index)}
             work.frame = self._source[work.index]
             unread = set() if self._reads_images else {image.path for image in work.frame.images}
             for path, look in seen.items():
                 work.inputs[str(path.absolute())] = self._state(path, look, read=path not in unread)
-        if self._segmenter is None:
+        if work.result is not None:
+            work.images = tuple(_image_of(seen.view, work.frame) for seen in work.result.views)
+        elif self._segmenter is None:
             with _stage(work, "masks"):
                 masks = self._of_source(work) if self._stored is None else self._of_files(work, self._stored)
                 work.masks = tuple(map(self._wanted, masks))
 
     def segment(self, work: Work) -> None:
-        """Make masks, unless they are stored, and label the points."""
+        """Make masks, unless they are stored, and label the points, unless they are labelled."""
+        if work.result is not None:
+            return
         frame = work.frame
         assert frame is not None
         if work.masks is None:
@@ -176,17 +199,18 @@ class FrameWork:
         with _stage(work, "write"):
             # times differ from run to run; files must not
             quiet = replace(result, timings={})
-            images = [image.read() for image in work.images] if PICTURE in self._settings.formats else []
-            paths = write_formats(quiet, self.out, work.name, self._settings.formats, images)
+            missing = self._missing(work)
+            images = [image.read() for image in work.images] if PICTURE in missing else []
+            paths = write_formats(quiet, self.out, work.name, missing, images)
             written = {path.name: [path.stat().st_size, digest_of(path)] for path in paths}
             work.record = {
                 "frame": work.name,
-                "files": written,
-                "inputs": work.inputs,
+                "files": {**work.kept, **written},
+                "inputs": _known(work),
                 "objects": _objects(result),
                 "nothing_in_view": nothing_in_view(result),
             }
-        work.result = None
+        work.frame = work.result = None
 
     def do(self, work: Work, before_writing: Callable[[], None] = lambda: None) -> Outcome:
         """All stages of a frame, one after the other."""
@@ -213,11 +237,35 @@ class FrameWork:
                     f"{self.out}: {path}, of which frame {record['frame']} was made, was changed since; choose another "
                     "folder"
                 )
+        files = record["files"]
         names = [file_name(record["frame"], word) for word in self._settings.formats]
-        there = [name for name in names if (self.out / name).is_file()]
-        if any(not _is_written(self.out / name, record["files"].get(name)) for name in there):
+        # what a killed run wrote and could not record is written again
+        there = [name for name in names if name in files and (self.out / name).is_file()]
+        is_foreign = bool(files.keys() - file_names(record["frame"]))
+        if is_foreign or any(not _is_written(self.out / name, files[name]) for name in there):
             return Earlier.CHANGED
         return Earlier.DONE if there == names else Earlier.OPEN
+
+    def _read_earlier(self, work: Work) -> None:
+        """Find what need not be done again, and the result that an earlier run stored."""
+        record = None if self.records is None else self.records.get(work.name)
+        if record is None or "error" in record:
+            return
+        work.earlier = record
+        own = file_names(work.name)
+        asked = {file_name(work.name, word) for word in self._settings.formats}
+        work.kept = {
+            name: state
+            for name, state in record["files"].items()
+            if name in own and (name not in asked or _is_written(self.out / name, state))
+        }
+        stored = file_name(work.name, RESULT)
+        if stored in work.kept and _is_written(self.out / stored, work.kept[stored]):
+            work.result = read_result(self.out / stored)
+
+    def _missing(self, work: Work) -> list[str]:
+        """The formats that are to be written of a frame."""
+        return [word for word in self._settings.formats if file_name(work.name, word) not in work.kept]
 
     def _of_files(self, work: Work, stored: StoredMasks) -> tuple[InstanceMasks, ...]:
         assert work.frame is not None
@@ -290,8 +338,20 @@ def _digest(path: Path, look: Look) -> str:
     return digest_of(path)
 
 
-def _is_written(path: Path, written: list[int | str] | None) -> bool:
-    return written is not None and path.stat().st_size == written[0] and digest_of(path) == written[1]
+def _is_written(path: Path, written: list[int | str]) -> bool:
+    return path.is_file() and path.stat().st_size == written[0] and digest_of(path) == written[1]
+
+
+def _known(work: Work) -> dict[str, list[int | str | None] | None]:
+    """The inputs of a frame; those whose digest an earlier run knew and this one did not need keep it."""
+    before = {} if work.earlier is None else work.earlier["inputs"]
+    unread = [path for path, state in work.inputs.items() if state is not None and state[2] is None]
+    return {**before, **work.inputs, **{path: before[path] for path in unread if path in before}}
+
+
+def _image_of(view: View, frame: Frame) -> CameraImage:
+    """The image of a frame that a view is of."""
+    return next(image for image in frame.images if image.name == view.name)
 
 
 @contextmanager

@@ -1,9 +1,10 @@
 """The journal of a run: a line a frame, appended when the files of the frame are safe on the disk.
 
-The first line holds the settings; a run goes on only with the same ones. Frames are appended in the order in which
-they are finished, in groups, so that the disk need not be waited for after each; a line that a crash cut off is
-dropped. When all is done the lines are put in the order of the frames: every run of the same settings ends with the
-same bytes.
+The first line holds the settings that labels depend on; a run goes on only with the same ones, but may add frames, and
+formats of their files. Frames are appended in the order in which they are finished, in groups, so that the disk need
+not be waited for after each; the last line of a frame counts, and one that a crash cut off is dropped. When all is done
+the lines are put in the order of the frames: every run of the same settings, formats and frames ends with the same
+bytes, whatever was done first.
 
 The line of a frame has its name, `frame`, and
 
@@ -20,6 +21,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any
@@ -33,7 +35,11 @@ Record = Mapping[str, Any]
 
 
 class Journal:
-    """The journal of a folder. Only where each line stands is kept in memory, for runs may have very many frames."""
+    """The journal of a folder. Only where each line stands is kept in memory, for runs may have very many frames.
+
+    Attributes:
+        endings: What comes after the name of the frame in the names of the files that earlier runs wrote.
+    """
 
     def __init__(self, folder: Path, header: Record) -> None:
         """Begin a journal, or go on with the one there is.
@@ -47,6 +53,7 @@ class Journal:
         self._path = folder / JOURNAL_NAME
         self._header = header
         self._places: dict[str, int] = {}
+        self.endings: set[str] = set()
         self._file = open_to_append(self._path)
         try:
             self._end = self._read()
@@ -59,13 +66,18 @@ class Journal:
             self._file.close()
             raise
 
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The frames that have a record."""
+        return tuple(self._places)
+
     def get(self, frame: str) -> Record | None:
         """Return the record of a frame; None if it has none."""
-        place = self._places.get(frame)
-        if place is None:
-            return None
-        with self._path.open("rb") as file:
-            return _record_at(file, place)
+        return self.kept([frame]).get(frame)
+
+    def kept(self, frames: Iterable[str]) -> KeptRecords:
+        """The records of those of `frames` that have one, for other processes; good until the journal is finished."""
+        return KeptRecords(self._path, {frame: self._places[frame] for frame in frames if frame in self._places})
 
     def records(self, frames: Sequence[str]) -> Iterator[Record]:
         """Yield the records of `frames`; those without one are passed over."""
@@ -91,13 +103,15 @@ class Journal:
         """Let go of the file."""
         self._file.close()
 
-    def finish(self, frames: Sequence[str]) -> None:
-        """Put the lines in the order of `frames`; nothing is appended any more."""
+    def finish(self, order: Sequence[str]) -> None:
+        """Put the lines in the `order` of the frames of the source; nothing is appended any more."""
         self.close()
         places: dict[str, int] = {}
+        known = set(order)
         with whole_file(self._path) as file:
             file.write(_line(self._header))
-            for record in self.records(frames):
+            # those that the source has no more come last
+            for record in self.records([*order, *sorted(self._places.keys() - known)]):
                 places[record["frame"]] = file.tell()
                 file.write(_line(record))
         self._places = places
@@ -126,7 +140,9 @@ class Journal:
                 if number == 1:
                     self._check(record)
                 else:
-                    self._places[record["frame"]] = whole
+                    frame = record["frame"]
+                    self._places[frame] = whole
+                    self.endings.update(name.removeprefix(frame) for name in record.get("files", ()))
                 whole += len(line)
         return whole
 
@@ -153,8 +169,29 @@ class Journal:
         if differences:
             raise BatchError(
                 f"{self._folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go "
-                "on with it, or choose another folder"
+                "on with it (frames and formats may be added), or choose another folder"
             )
+
+
+@dataclass(frozen=True)
+class KeptRecords:
+    """Records of a journal that are read when they are asked for.
+
+    Attributes:
+        path: The journal.
+        places: Where the line of each frame begins.
+    """
+
+    path: Path
+    places: Mapping[str, int]
+
+    def get(self, frame: str) -> Record | None:
+        """Return the record of a frame; None if it has none here."""
+        place = self.places.get(frame)
+        if place is None:
+            return None
+        with self.path.open("rb") as file:
+            return _record_at(file, place)
 
 
 def _is_of_frame(record: object) -> bool:

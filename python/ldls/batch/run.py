@@ -13,6 +13,7 @@ from typing import Any
 
 import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
+from ldls.batch.formats import written_formats
 from ldls.batch.frame_work import Earlier, FrameWork, Outcome
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
@@ -46,8 +47,9 @@ def run(
     """Label the frames of a source, and write the files of each to the folder `out`.
 
     Files appear under their name only when they are whole. A journal in `out` knows what is done: a run that was
-    interrupted, however it was, goes on where it stopped when it is called again in the same way. A frame that fails
-    is recorded and passed over, and tried again by the next call.
+    interrupted, however it was, goes on where it stopped when it is called again in the same way, and one that is
+    finished does what is missing when frames or formats are added. A frame that fails is recorded and passed over, and
+    tried again by the next call.
 
     Args:
         source: A source of `ldls.datasets`, or a path that one is guessed from.
@@ -86,12 +88,14 @@ def run(
         work = FrameWork(opened, settings, folder)
         header = {
             "settings": settings.record() | {"masks_sha256": work.masks_sha256},
-            "source": source_record(opened.kind, str(Path(opened.path).resolve()), names, options),
+            "source": source_record(opened.kind, str(Path(opened.path).resolve()), options),
         }
         journal = Journal(folder, header)
         try:
+            check_names(sorted({*names, *journal.frames}), written_formats(journal.endings, settings.formats))
             # what an earlier run did must still be there, and of the same input
             pending = _pending(chosen, work, journal)
+            work.records = journal.kept(name for _, name in pending)
             n_earlier = len(chosen) - len(pending)
             start = time.perf_counter()
             seconds: Counter[str] = Counter()
@@ -106,14 +110,14 @@ def run(
                     if on_progress is not None:
                         on_progress(n_finished, n_failed, len(names))
         except KeyboardInterrupt:
-            write_failures(folder, failures_of(journal.records(names)))
+            write_failures(folder, failures_of(journal.records(opened.names)))
             raise
         finally:
             journal.close()
         elapsed = time.perf_counter() - start
-        journal.finish(names)
+        journal.finish(opened.names)
         failures = failures_of(journal.records(names))
-        write_failures(folder, failures)
+        write_failures(folder, failures_of(journal.records(opened.names)))
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
     doubts = doubts_of(journal.records(names))

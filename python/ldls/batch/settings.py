@@ -1,10 +1,9 @@
-"""Settings of a run: everything that changes its outputs, so that a run goes on only as it began."""
+"""Settings of a run: all that labels depend on, for a run goes on only as it began, and the formats of its files."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -55,8 +54,10 @@ class RunSettings:
         return path if path.is_file() else None
 
     def record(self) -> dict[str, Any]:
-        """These settings as a journal stores them."""
+        """What labels depend on, as a journal stores it."""
         settings = asdict(self)
+        # other files of the same labels may be added
+        del settings["formats"]
         # the same bits for any number of threads
         del settings["params"]["threads"]
         if self.masks is not None:
@@ -66,8 +67,6 @@ class RunSettings:
         return recorded
 
 
-def source_record(kind: str, path: str, names: Sequence[str], options: Mapping[str, Any]) -> dict[str, Any]:
-    """A source as a journal stores it: its path, its frames and the options that it was opened with."""
-    digest = hashlib.sha256("\n".join(names).encode()).hexdigest()
-    given = {name: str(value) for name, value in sorted(options.items())}
-    return {"kind": kind, "path": path, "frames": len(names), "names_sha256": digest, "options": given}
+def source_record(kind: str, path: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """A source as a journal stores it: its path and the options that it was opened with."""
+    return {"kind": kind, "path": path, "options": {name: str(value) for name, value in sorted(options.items())}}
