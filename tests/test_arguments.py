@@ -446,6 +446,7 @@ READERS = {
     "read_image": (ldls.read_image, {"path": "none.png"}),
     "read_result": (ldls.read_result, {"path": "none.npz"}),
     "save": (ldls.save, {"thing": W.result, "path": "none/none.npz"}),
+    "save_objects": (ldls.save_objects, {"results": W.result, "path": "none/none.csv"}),
 }
 READER_CASES = [
     pytest.param(*READERS[which], name, id=f"{which} {name}") for which in READERS for name in READERS[which][1]

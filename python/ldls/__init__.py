@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         read_points as read_points,
         read_result as read_result,
         save as save,
+        save_objects as save_objects,
     )
     from ldls.label_diffusion import LabelDiffusion as LabelDiffusion, segment as segment
     from ldls.masks import InstanceMasks as InstanceMasks
@@ -73,7 +74,7 @@ _NAMES = {
         "UnsupportedFormatError",
     ),
     "ldls.explaining": ("Explanation", "explain"),
-    "ldls.io": ("read_camera", "read_image", "read_masks", "read_points", "read_result", "save"),
+    "ldls.io": ("read_camera", "read_image", "read_masks", "read_points", "read_result", "save", "save_objects"),
     "ldls.label_diffusion": ("LabelDiffusion", "segment"),
     "ldls.masks": ("InstanceMasks",),
     "ldls.params": ("Params",),

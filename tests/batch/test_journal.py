@@ -12,7 +12,7 @@ from ldls.errors import BatchError, ChangedFileWarning, CorruptFileError
 BRACKETS = b"[" * 100_000 + b"]" * 100_000
 DIGITS = b"9" * 5_000
 STATE = [1, 2, "0" * 64]
-FRAME = {"frame": "000001", "files": {}, "inputs": {}, "objects": {}, "nothing_in_view": None}
+FRAME = {"frame": "000001", "files": {}, "inputs": {}, "images": [], "objects": [], "nothing_in_view": None}
 ERROR = {"stage": "read", "code": "a", "message": "b"}
 
 
@@ -66,8 +66,11 @@ def test_a_line_that_is_no_record_is_refused_with_its_number(finished, content, 
         pytest.param(line(inputs=[]), id="inputs in a list"),
         pytest.param(line(inputs={"a": [1, 2]}), id="an input without a digest"),
         pytest.param(line(inputs={"a": ["1", 2, None]}), id="a size in words"),
-        pytest.param(line(objects={"car": "2"}), id="a count in words"),
+        pytest.param(line(objects={"car": 2}), id="counts for objects"),
+        pytest.param(line(objects=[{"label": 1}]), id="an object without its columns"),
         pytest.param(line(objects=None), id="no objects"),
+        pytest.param(line(images=[["image_2", 375]]), id="an image without its width"),
+        pytest.param(line(images=None), id="no images"),
         pytest.param(line(nothing_in_view=1), id="a number for a cause"),
         pytest.param(b'{"frame":"000001","error":null}', id="no error"),
         pytest.param(b'{"frame":"000001","error":{"stage":"read"}}', id="half an error"),

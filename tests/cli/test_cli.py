@@ -55,6 +55,24 @@ def test_segment_on_the_files_of_the_demo_gives_the_same(demo, tmp_path):
         assert (tmp_path / f"seen{kind}.png").read_bytes() == (folder / f"demo{kind}.png").read_bytes()
 
 
+@pytest.mark.parametrize("ending", ["csv", "json"])
+def test_segment_writes_a_table_of_the_objects(demo, tmp_path, ending):
+    outcome = run(app, arguments(demo[0], tmp_path / "out", objects=tmp_path / f"out/objects.{ending}"))
+    assert outcome.exit_code == 0, outcome.output
+    ldls.save_objects({"points": ldls.read_result(tmp_path / "out/points.npz")}, tmp_path / f"expected.{ending}")
+    written = (tmp_path / f"out/objects.{ending}").read_bytes()
+    assert written == (tmp_path / f"expected.{ending}").read_bytes()
+    assert written.count(b"person") > 0
+    assert f"objects.{ending}" in outcome.output.splitlines()[-1]
+
+
+def test_an_unknown_ending_of_the_table_is_refused_before_anything_is_done(demo, tmp_path):
+    outcome = run(app, arguments(demo[0], tmp_path / "out", objects=tmp_path / "objects.xlsx"))
+    assert outcome.exit_code == 1
+    assert "cannot write objects as '.xlsx', expected .csv, .json" in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
 def test_formats_can_be_chosen_and_an_image_is_not_needed(demo, tmp_path):
     words = arguments(demo[0], tmp_path)
     at = words.index("--image")

@@ -1,5 +1,6 @@
 """`segment`: the input it accepts and refuses, its report and its result."""
 
+import json
 import multiprocessing
 import sys
 import threading
@@ -11,6 +12,7 @@ import pytest
 import ldls
 from conftest import pinhole
 from ldls.errors import DuplicateWarning, NoUsablePoints, PrecisionWarning, ScaleWarning, UprightWarning
+from ring_samples import as_views, random_ring
 
 
 def test_shapes_and_types_of_the_result(small_scene):
@@ -50,9 +52,68 @@ def test_objects_describe_their_points(small_scene):
         members = points[result.labels == label]
         assert (found.label, found.n_points) == (label, len(members))
         np.testing.assert_allclose(found.centroid, members.mean(axis=0), rtol=1e-5)
-        np.testing.assert_allclose(found.distance_m, np.hypot(*found.centroid[:2]))
+        np.testing.assert_allclose(found.distance_m, np.linalg.norm(members.mean(axis=0, dtype=np.float64)))
         assert found.box.size[0] >= found.box.size[1]
     assert [found.name for found in result.objects] == ["person", "car"]
+
+
+def test_objects_are_rows_of_plain_values(small_scene):
+    points, masks, camera = small_scene
+    empty = ldls.InstanceMasks.from_array(np.zeros((1, 60, 80), bool), categories=[7])
+    result = ldls.segment(
+        points,
+        ldls.InstanceMasks.from_array(np.concatenate([empty.to_array(), masks.to_array()]), categories=[7, 1, 3]),
+        camera,
+    )
+    person, car = result.to_table()
+    assert list(person) == list(car) == [
+        "label", "category", "name", "score", "n_points", "distance_m", "centroid_x_m", "centroid_y_m", "centroid_z_m",
+        "box_x_m", "box_y_m", "box_z_m", "length_m", "width_m", "height_m", "yaw_rad",
+        "camera", "mask_left_px", "mask_top_px", "mask_width_px", "mask_height_px",
+    ]  # fmt: skip
+    found = result.objects[2]
+    assert list(car.values()) == [
+        3, 3, "car", 1.0, found.n_points, found.distance_m, *found.centroid, *found.box.center, *found.box.size,
+        found.box.yaw, "camera 0", 51, 23, 12, 15,
+    ]  # fmt: skip
+    assert {type(value) for value in car.values()} == {int, str, float}
+    assert json.loads(json.dumps([person, car])) == [person, car]
+    nothing = ldls.segment(points, empty, camera)
+    assert nothing.to_table() == []
+
+
+def test_rows_have_the_mask_of_the_first_camera_that_shows_the_object():
+    points, views = random_ring(3)
+    result = ldls.segment(points, as_views(views))
+    rows = result.to_table()
+    assert {row["camera"] for row in rows} == {"camera 0", "camera 1", "camera 2"}
+    for row in rows:
+        view, mask = min(result.instances[row["label"] - 1].sources)
+        top, left, height, width = result.views[view].view.masks[mask].bounding_box
+        box = [row[f"mask_{side}_px"] for side in ("left", "top", "width", "height")]
+        assert (row["camera"], box) == (f"camera {view}", [left, top, width, height])
+
+
+def test_corners_go_round_the_bottom_and_then_the_top():
+    box = ldls.OrientedBox(center=np.array([10.0, 5, 1]), size=np.array([4.0, 2, 3]), yaw=np.pi / 2)
+    corners = box.corners()
+    assert (corners.shape, corners.dtype) == ((8, 3), np.float64)
+    # the length points along y: front is at y = 7, left at x = 9
+    around = [[9, 7], [9, 3], [11, 3], [11, 7]]
+    np.testing.assert_allclose(corners[:4], [[*place, -0.5] for place in around], atol=1e-12)
+    np.testing.assert_allclose(corners[4:], [[*place, 2.5] for place in around], atol=1e-12)
+
+
+@pytest.mark.parametrize("yaw_deg", [-60, 25])
+def test_corners_enclose_the_points_of_the_box(yaw_deg):
+    generator = np.random.default_rng(4)
+    points = turned(generator.uniform([-2, -1], [2, 1], (100, 2)), yaw_deg, generator)
+    corners = ldls.segmentation.fit_upright_box(points).corners()
+    for side in range(4):
+        edge, there = corners[(side + 1) % 4] - corners[side], points - corners[side]
+        # anticlockwise from above: the inside is to the left of every side
+        assert (edge[0] * there[:, 1] - edge[1] * there[:, 0] >= -1e-9).all()
+    assert (points[:, 2] >= corners[0, 2] - 1e-9).all() and (points[:, 2] <= corners[4, 2] + 1e-9).all()
 
 
 @pytest.mark.parametrize("yaw_deg", [-89, -45, 0, 10, 33, 90])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -11,8 +10,6 @@ from enum import Enum
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ldls.batch.formats import PICTURE, RESULT, file_name, file_names, write_formats
 from ldls.batch.journal import KeptRecords, Record
@@ -22,6 +19,7 @@ from ldls.datasets.stored_masks import StoredMasks, fill, own_masks
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_result
 from ldls.io.files import digest_of
+from ldls.io.objects import FrameObjects
 from ldls.label_diffusion import LabelDiffusion, nothing_in_view
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
@@ -203,11 +201,13 @@ class FrameWork:
             images = [image.read() for image in work.images] if PICTURE in missing else []
             paths = write_formats(quiet, self.out, work.name, missing, images)
             written = {path.name: [path.stat().st_size, digest_of(path)] for path in paths}
+            objects = FrameObjects.of(work.name, quiet)
             work.record = {
                 "frame": work.name,
                 "files": {**work.kept, **written},
                 "inputs": _known(work),
-                "objects": _objects(result),
+                "images": objects.images,
+                "objects": objects.rows,
                 "nothing_in_view": nothing_in_view(result),
             }
         work.frame = work.result = None
@@ -314,11 +314,6 @@ def _segmenters(spec: str, min_score: float | None) -> Callable[[str, CameraImag
     options = {"threads": 1} if spec.startswith("onnx:") else {}
     opened = open_segmenter(spec, min_score=min_score, **options)
     return lambda frame, image: opened
-
-
-def _objects(result: Segmentation) -> dict[str, int]:
-    points = np.bincount(result.labels[result.in_view], minlength=len(result.instances) + 1)
-    return dict(Counter(instance.name for instance in result.instances if points[instance.label] > 0))
 
 
 Look = tuple[int, int] | None

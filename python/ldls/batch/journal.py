@@ -10,7 +10,8 @@ The line of a frame has its name, `frame`, and
 
 - `files`: size and digest of each result;
 - `inputs`: size, time of change and digest of each file that it was made of, as far as they are known;
-- `objects`: how many there are of each category;
+- `images`: name of the camera, height and width in pixels of each image;
+- `objects`: a row of a table for each object with points (`ldls.Segmentation.to_table`);
 - `nothing_in_view`: why nothing is labelled, or null;
 
 or, where it failed, `error` with `stage`, `code` and `message`.
@@ -28,6 +29,7 @@ from typing import IO, Any
 
 from ldls.errors import BatchError, CorruptFileError
 from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
+from ldls.segmentation.object_rows import COLUMNS
 
 JOURNAL_NAME = "journal.jsonl"
 LONGEST_LINE_BYTES = 1 << 24
@@ -202,13 +204,15 @@ def _is_of_frame(record: object) -> bool:
             "frame": str(),
             "files": dict() as files,
             "inputs": dict() as inputs,
-            "objects": dict() as objects,
+            "images": list() as images,
+            "objects": list() as objects,
             "nothing_in_view": str() | None,
         }:
             return (
                 all(map(_is_of_file, files.values()))
                 and all(map(_is_of_input, inputs.values()))
-                and all(isinstance(count, int) for count in objects.values())
+                and all(map(_is_of_image, images))
+                and all(isinstance(row, dict) and row.keys() == {*COLUMNS} for row in objects)
             )
     return False
 
@@ -223,6 +227,13 @@ def _is_of_file(state: object) -> bool:
 def _is_of_input(state: object) -> bool:
     match state:
         case None | [int(), int(), str() | None]:
+            return True
+    return False
+
+
+def _is_of_image(image: object) -> bool:
+    match image:
+        case [str(), int(), int()]:
             return True
     return False
 

@@ -19,10 +19,11 @@ from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
 from ldls.batch.plan import check_names
 from ldls.batch.settings import RunSettings, source_record
-from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, write_failures
+from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
 from ldls.datasets import Source, open_source
 from ldls.errors import ChangedFileWarning, NothingInView, some
-from ldls.io.files import sweep
+from ldls.io.files import check_folder, sweep
+from ldls.io.objects import objects_writer
 
 GROUP_S = 0.5
 """Frames finished within this time share a wait for the disk."""
@@ -38,6 +39,7 @@ def run(
     *,
     frames: slice = slice(None),
     options: Mapping[str, Any] | None = None,
+    objects: str | PathLike[str] | None = None,
     workers: int | None = None,
     engine: str | Engine = "local",
     ray_address: str | None = None,
@@ -58,6 +60,8 @@ def run(
         frames: Which frames of the source.
         options: Options of the source's kind, for `ldls.datasets.open_source`. Of a source that is open already, those
             that it was opened with: a run goes on only with the same ones.
+        objects: A `.csv` or `.json` file for one table of the objects of all frames, in the order of the frames, as
+            `ldls.save_objects` writes it; it is written at the end, of what earlier runs did, too.
         workers: Frames segmented at a time; as many as the process, or the cluster, may use cores by default.
         engine: Where they are segmented: "local", "ray", or an engine of your own.
         ray_address: Address of the Ray cluster to join; by default one is started on this machine.
@@ -70,6 +74,7 @@ def run(
     Raises:
         BatchError: Another run is at work in `out`, or `out` holds a run of other settings, source or version.
         CorruptFileError: The journal in `out` is none.
+        UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
         ImportError: The engine needs an extra that is not installed.
         OSError: The results cannot be written, as on a full disk; what is written stays, and the run can go on.
@@ -81,8 +86,11 @@ def run(
     chosen = list(zip(range(len(opened))[frames], opened.names[frames], strict=True))
     names = [name for _, name in chosen]
     check_names(names, settings.formats)
+    write_objects = None if objects is None else objects_writer(objects)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
+    if objects is not None:
+        check_folder(objects)
     with only_run(folder):
         sweep(folder)
         work = FrameWork(opened, settings, folder)
@@ -118,6 +126,8 @@ def run(
         journal.finish(opened.names)
         failures = failures_of(journal.records(names))
         write_failures(folder, failures_of(journal.records(opened.names)))
+        if write_objects is not None:
+            write_objects(objects_of(journal.records(names)))
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
     doubts = doubts_of(journal.records(names))

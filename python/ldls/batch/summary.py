@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ldls.io.files import whole_file
+from ldls.io.objects import FrameObjects
 
 
 @dataclass(frozen=True)
@@ -86,9 +87,16 @@ def write_failures(folder: Path, failures: Sequence[Failure]) -> None:
         file.writelines(json.dumps(asdict(failure)).encode() + b"\n" for failure in failures)
 
 
+def objects_of(records: Iterable[Mapping[str, Any]]) -> Iterator[FrameObjects]:
+    """Yield the objects of the frames that are done."""
+    for record in records:
+        if "error" not in record:
+            yield FrameObjects(record["frame"], record["images"], record["objects"])
+
+
 def count_objects(records: Iterable[Mapping[str, Any]]) -> dict[str, int]:
     """Objects with points of all frames, by category name, the most frequent first."""
     total: Counter[str] = Counter()
     for record in records:
-        total.update(record.get("objects", {}))
+        total.update(row["name"] for row in record.get("objects", ()))
     return dict(total.most_common())

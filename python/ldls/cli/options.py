@@ -29,7 +29,7 @@ FormatsOption = Annotated[
     typer.Option(
         metavar="WORDS",
         help="Files to write for each frame: npz (all fields), label (SemanticKITTI), lidarseg, panoptic (nuScenes), "
-        "ply, pcd, las, laz (coloured clouds), parquet, csv (a row a point), png (picture).",
+        "ply, pcd, las, laz (coloured clouds), parquet, csv (a row a point), kitti-boxes (label_2), png (picture).",
     ),
 ]
 FramesOption = Annotated[
@@ -37,6 +37,15 @@ FramesOption = Annotated[
     typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
 ]
 CoresOption = Annotated[int | None, typer.Option(metavar="N", min=1, help="Cores to use.", show_default="all")]
+ObjectsOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Table of the objects, a row each: .csv, or .json after COCO's data sets, with boxes in the lidar frame.",
+        show_default=False,
+        dir_okay=False,
+    ),
+]
 PictureOption = Annotated[
     Path | None,
     typer.Option(

@@ -10,7 +10,16 @@ import typer
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories, say_own_masks
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
-from ldls.cli.options import FRAMES_FAILED, STOPPED, CoresOption, FormatsOption, FramesOption, OutOption, words
+from ldls.cli.options import (
+    FRAMES_FAILED,
+    STOPPED,
+    CoresOption,
+    FormatsOption,
+    FramesOption,
+    ObjectsOption,
+    OutOption,
+    words,
+)
 from ldls.cli.progress import frame_progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption, StoredMasksOption, parse_options
 from ldls.params import Params
@@ -34,6 +43,7 @@ def run(
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
     formats: FormatsOption = "npz,label",
+    objects: ObjectsOption = None,
     frames: FramesOption = None,
     dataset: DatasetOption = None,
     option: SourceOption = None,
@@ -93,6 +103,7 @@ def run(
                 settings,
                 frames=chosen,
                 options=options,
+                objects=objects,
                 workers=cores,
                 engine=engine,
                 ray_address=ray_address,
@@ -105,6 +116,8 @@ def run(
             typer.echo(f"stopped: {done}; give the same command again to go on", err=True)
             raise typer.Exit(STOPPED) from None
     show(summary, out)
+    if objects is not None:
+        console().print(f"objects in {objects}", highlight=False, soft_wrap=True)
     if summary.failures:
         raise typer.Exit(FRAMES_FAILED)
 

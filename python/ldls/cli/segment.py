@@ -27,7 +27,7 @@ from ldls.cli.mask_options import (
 )
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.method_options import takes_params
-from ldls.cli.options import CoresOption, FormatsOption, OutOption, PictureOption, words
+from ldls.cli.options import CoresOption, FormatsOption, ObjectsOption, OutOption, PictureOption, words
 from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
 from ldls.params import Params
 
@@ -68,6 +68,7 @@ def segment(
     rectified: RectifiedOption = None,
     image_id: Annotated[int | None, IMAGE_ID] = None,
     formats: FormatsOption = "npz,label,ply,png",
+    objects: ObjectsOption = None,
     picture: PictureOption = None,
     cores: CoresOption = None,
     rerun: RerunOption = None,
@@ -94,11 +95,13 @@ def segment(
     """
     from ldls.batch.formats import check_formats, write_formats
     from ldls.io import read_image, read_points, save
+    from ldls.io.objects import FrameObjects, objects_writer
     from ldls.label_diffusion import segment as label_points
 
     check_recording(rerun)
     wanted = words(formats)
     check_formats(wanted)
+    write_objects = None if objects is None else objects_writer(objects)
     pixels = None if image is None else read_image(image)
     chosen = masks_of(
         pixels,
@@ -115,6 +118,9 @@ def segment(
     name = points.stem.removesuffix(".pcd")
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, name, wanted, [pixels])
+    if write_objects is not None and objects is not None:
+        write_objects([FrameObjects.of(name, result)])
+        written.append(objects)
     if picture is not None:
         from ldls.viewing import save_pictures
 

@@ -179,12 +179,22 @@ def names_file(path: str | PathLike[str]) -> Iterator[None]:
         raise
 
 
+def check_folder(path: str | PathLike[str]) -> None:
+    """Refuse a file whose folder is not there.
+
+    Raises:
+        FileNotFoundError: It is not.
+    """
+    folder = Path(path).parent
+    if not folder.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such folder to write to; make it first", str(folder))
+
+
 @contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails."""
     target = Path(path)
-    if not target.parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, "no such folder to write to; make it first", str(target.parent))
+    check_folder(target)
     # beside the target, for only within one file system is a file renamed at a stroke; without its name, which may be
     # as long as names can be
     temporary = target.with_name(f".{secrets.token_hex(8)}{UNFINISHED}")

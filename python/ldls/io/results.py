@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ldls.checks import checked
 from ldls.errors import InputError, UnsupportedFormatError
 from ldls.io import result_npz, tables
-from ldls.io.labels import nuscenes_labels, semantic_kitti
+from ldls.io.labels import kitti_objects, nuscenes_labels, semantic_kitti
 from ldls.io.masks.formats import write_masks
 from ldls.io.options import check_options
 from ldls.io.points import las, pcd, ply
@@ -36,6 +36,7 @@ FORMATS: dict[str, Format] = {
     "laz": Format(".laz", las.write),
     "parquet": Format(".parquet", tables.write_parquet),
     "csv": Format(".csv", tables.write_csv),
+    "kitti-boxes": Format(".txt", kitti_objects.write),
 }
 """Formats of results, by the words that choose them on the command line."""
 
@@ -56,10 +57,11 @@ def read_result(path: str | PathLike[str]) -> Segmentation:
 def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
     """Write a result or instance masks; the ending of the name chooses the format.
 
-    Of a result, `.npz` has everything, `.label` is SemanticKITTI's, `_lidarseg.bin` and `_panoptic.npz` are nuScenes'.
-    `.ply`, `.pcd`, `.las` and `.laz` are point clouds with labels, confidence and colour; `.parquet` and `.csv` tables
-    with a row a point. docs/formats.md says what is in each. Of masks, `.json` is COCO's, `.png` has instance numbers
-    (for masks that do not overlap), `.npz` run lengths and `.npy` pixels only. The file appears only when it is whole.
+    Of a result, `.npz` has everything, `.label` is SemanticKITTI's, `_lidarseg.bin` and `_panoptic.npz` are nuScenes',
+    `.txt` is KITTI's label_2 with a line an object. `.ply`, `.pcd`, `.las` and `.laz` are point clouds with labels,
+    confidence and colour; `.parquet` and `.csv` tables with a row a point; `save_objects` writes tables with a row an
+    object. docs/formats.md says what is in each. Of masks, `.json` is COCO's, `.png` has instance numbers (for masks
+    that do not overlap), `.npz` run lengths and `.npy` pixels only. The file appears only when it is whole.
 
     Args:
         thing: What `ldls.segment` returns, or instance masks.
@@ -73,7 +75,7 @@ def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **optio
         NonFiniteError: The format cannot hold points that are not finite.
         MaskError: The format cannot keep these masks.
         ParameterError: The format has no such option.
-        InputError: It is neither a result nor masks.
+        InputError: It is neither a result nor masks, or a result of several cameras to `.txt`.
         ImportError: The format needs an extra that is not installed; the message names it.
     """
     path = Path(path)

@@ -34,5 +34,5 @@ class SegmentedObject:
 
     @property
     def distance_m(self) -> float | None:
-        """Distance of the centroid from the lidar along the ground, in metres; None without points."""
-        return None if self.centroid is None else float(np.hypot(*self.centroid[:2]))
+        """Distance from the lidar's origin to the centroid, in metres; None without points."""
+        return None if self.centroid is None else float(np.linalg.norm(self.centroid))

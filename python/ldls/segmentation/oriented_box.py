@@ -32,6 +32,19 @@ class OrientedBox:
     size: NDArray[np.float64]
     yaw: float
 
+    def corners(self) -> NDArray[np.float64]:
+        """(8, 3) float64 x y z of its corners in metres, in the lidar frame.
+
+        The four at the bottom come first, anticlockwise as seen from above, then the four above them in the same order:
+        front left, rear left, rear right, front right. Front is where `yaw` points, for points do not tell which end of
+        an object is which.
+        """
+        half = np.array([[1, 1, -1], [-1, 1, -1], [-1, -1, -1], [1, -1, -1]]) / 2
+        along, across, up = (np.vstack([half, half * (1, 1, -1)]) * self.size).T
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        offsets = np.stack([cos * along - sin * across, sin * along + cos * across, up], axis=1)
+        return np.asarray(self.center + offsets, np.float64)
+
 
 def fit_upright_box(points: NDArray[np.float64]) -> OrientedBox:
     """The upright box around (n, 3) points in metres whose sides run along the sides that the lidar saw.
@@ -77,7 +90,7 @@ def _to_nearer_side(places: NDArray[np.float64]) -> NDArray[np.float64]:
     n = places.shape[1]
     stray = int(STRAY * (n - 1))
     in_order = np.partition(places, (stray, n - 1 - stray), axis=1)
-    low, high = in_order[:, stray, None], in_order[:, n - 1 - stray, None]
-    to_low, to_high = np.abs(places - low), np.abs(high - places)
-    low_is_nearer = np.square(to_low).sum(axis=1) < np.square(to_high).sum(axis=1)
-    return np.where(low_is_nearer[:, None], to_low, to_high)
+    low, high = in_order[:, stray], in_order[:, n - 1 - stray]
+    # the sum of the squared distances is less to that end on whose side of the middle the mean is
+    nearer = np.where(places.mean(axis=1) < (low + high) / 2, low, high)
+    return np.abs(places - nearer[:, None])

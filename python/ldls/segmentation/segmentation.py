@@ -16,6 +16,7 @@ from ldls.cloud import Points
 from ldls.errors import DtypeError, InputError, ShapeError
 from ldls.masks import InstanceMasks
 from ldls.params import Params
+from ldls.segmentation.object_rows import Row, object_rows
 from ldls.segmentation.objects import SegmentedObject
 from ldls.segmentation.oriented_box import fit_upright_box
 from ldls.segmentation.report import Report
@@ -159,6 +160,19 @@ class Segmentation:
         ends = np.searchsorted(self.labels[inside], labels, side="right")
         rows = (inside[start:end] for start, end in zip(starts, ends, strict=True))
         return tuple(self._object(*parts) for parts in zip(self.instances, rows, strict=True))
+
+    def to_table(self) -> list[Row]:
+        """Return a row for each object with points, in their order, as `pandas.DataFrame` takes them.
+
+        A row is a dict of plain values; its columns, in this order:
+
+        - `label`, `category`, `name`, `score`, `n_points` and `distance_m`, as of `objects`;
+        - `centroid_x_m`, `centroid_y_m`, `centroid_z_m`: mean of its points in the lidar frame;
+        - `box_x_m`, `box_y_m`, `box_z_m`, `length_m`, `width_m`, `height_m`, `yaw_rad`: its box in the lidar frame;
+        - `camera`: name of the first camera that shows it, and `mask_left_px`, `mask_top_px`, `mask_width_px`,
+          `mask_height_px`: the smallest box around its mask there.
+        """
+        return object_rows(self.objects, self.sources, self.views)
 
     def _object(self, instance: Instance, rows: NDArray[np.int64]) -> SegmentedObject:
         xyz = self.points[rows, :3].astype(np.float64)

@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.errors import CorruptFileError, TruncatedFileError
-from ldls.io.labels.kitti_objects import KittiObject, label_by_boxes, read_kitti_boxes, read_kitti_objects
+from ldls.errors import CorruptFileError, InputError, TruncatedFileError
+from ldls.io.labels.kitti_objects import (
+    KittiObject,
+    in_camera_frame,
+    label_by_boxes,
+    read_kitti_boxes,
+    read_kitti_objects,
+)
+from ring_samples import as_views, random_ring
 
 ROW = "Car 0.25 1 -1.57 599.41 156.40 629.75 189.25 1.5 1.6 4.0 1.0 1.5 20.0 -1.56"
 BOX = KittiObject(
@@ -125,3 +132,99 @@ def test_real_boxes_hold_points(data_folder, name, classes):
     counts = {name for name, count in found.counts().items() if count} - {"background"}
     assert counts == classes
     assert 15_000 < (~found.ignored).sum() < 25_000
+
+
+TURNED = np.array([[0.8, 0, -0.6, 0.3], [0, 1, 0, -0.2], [0.6, 0, 0.8, 0.5], [0, 0, 0, 1]])
+PITCHED = np.array([[1, 0, 0, 0.3], [0, 0.96, -0.28, -0.2], [0, 0.28, 0.96, 0.5], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        pytest.param({}, id="lidar axes are the camera's"),
+        pytest.param({"T_camera_lidar": TURNED}, id="turned about the camera's y axis"),
+        pytest.param({"T_camera_lidar": PITCHED}, id="looks down, so that the boxes of the lidar frame stand askew"),
+        pytest.param({"distortion": ldls.Distortion("plumb_bob", [-0.1, 0.01, 0, 0, 0])}, id="not rectified"),
+    ],
+)
+def test_boxes_that_are_written_hold_the_points_of_their_object(small_scene, tmp_path, camera):
+    points, masks, straight = small_scene
+    seen_by = replace(straight, **camera)
+    # the scene stands before the camera, wherever that is
+    back = np.linalg.inv(seen_by.T_camera_lidar)
+    placed = points @ back[:3, :3].T + back[:3, 3]
+    result = ldls.segment(placed, masks, seen_by)
+    ldls.save(result, tmp_path / "a.txt")
+    rows = read_kitti_objects(tmp_path / "a.txt")
+    assert [row.type for row in rows] == ["Pedestrian", "Car"]
+    in_camera = in_camera_frame(placed, seen_by)
+    for row, found in zip(rows, result.objects, strict=True):
+        own = result.labels == found.label
+        assert found.n_points > 50 and row.contains(in_camera[own]).all()
+        # and no larger than they need
+        low, high = in_camera[own].min(axis=0), in_camera[own].max(axis=0)
+        assert row.dimensions[0] == pytest.approx(high[1] - low[1], abs=2e-3)
+        assert row.location[1] == pytest.approx(high[1], abs=2e-4)
+        x, _, z = row.location
+        assert row.alpha == pytest.approx((row.rotation_y - np.arctan2(x, z) + np.pi) % (2 * np.pi) - np.pi, abs=2e-4)
+        assert -np.pi <= row.rotation_y <= np.pi
+        assert (row.truncated, row.occluded, row.score) == (-1, 3, pytest.approx(found.score, abs=1e-4))
+
+
+def test_rectangles_that_are_written_are_those_of_the_masks(small_scene, tmp_path):
+    points, masks, camera = small_scene
+    ldls.save(ldls.segment(points, masks, camera), tmp_path / "a.txt")
+    assert [row.bbox for row in read_kitti_objects(tmp_path / "a.txt")] == [(17, 23, 28, 37), (51, 23, 62, 37)]
+    again = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))
+    np.testing.assert_array_equal(again.to_array(), masks.to_array())
+    assert [mask.name for mask in again] == ["person", "car"]
+
+
+def test_objects_without_points_have_no_line(small_scene, tmp_path):
+    points, masks, camera = small_scene
+    ldls.save(ldls.segment(points[:0], masks, camera), tmp_path / "a.txt")
+    assert (tmp_path / "a.txt").read_bytes() == b""
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        pytest.param("car", "Car", id="COCO's car"),
+        pytest.param("person", "Pedestrian", id="COCO's person"),
+        pytest.param("train", "Tram", id="COCO's train"),
+        pytest.param("Van", "Van", id="KITTI's own"),
+        pytest.param("cyclist", "Cyclist", id="KITTI's in small letters"),
+        pytest.param("bicycle", "bicycle", id="none of KITTI's"),
+        pytest.param("traffic light", "traffic_light", id="two words"),
+        pytest.param("a\tb\nc", "a_b_c", id="all kinds of blanks"),
+    ],
+)
+def test_names_become_types_of_kitti(small_scene, tmp_path, name, written):
+    points, masks, camera = small_scene
+    named = ldls.InstanceMasks.from_array(masks.to_array(), categories=[200, 200], names={200: name})
+    ldls.save(ldls.segment(points, named, camera), tmp_path / "a.txt")
+    assert {row.type for row in read_kitti_objects(tmp_path / "a.txt")} == {written}
+
+
+def test_masks_of_names_of_two_words_can_be_read_again(small_scene, tmp_path):
+    points, masks, camera = small_scene
+    plants = ldls.InstanceMasks.from_array(masks.to_array(), categories=[64, 10])
+    ldls.save(ldls.segment(points, plants, camera), tmp_path / "a.txt")
+    again = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))
+    assert [mask.name for mask in again] == ["potted plant", "traffic light"]
+
+
+def test_several_cameras_are_refused(tmp_path):
+    points, views = random_ring(3)
+    with pytest.raises(InputError, match=r"a\.txt: KITTI's labels are of one camera, the result has 3; save_objects"):
+        ldls.save(ldls.segment(points, as_views(views)), tmp_path / "a.txt")
+    assert not (tmp_path / "a.txt").exists()
+
+
+def test_real_objects_lie_in_the_boxes_that_are_written(kitti_frame, tmp_path):
+    result = ldls.segment(kitti_frame.points, kitti_frame.masks, kitti_frame.camera)
+    ldls.save(result, tmp_path / "a.txt")
+    points = in_camera_frame(kitti_frame.points, kitti_frame.camera)
+    found = [each for each in result.objects if each.n_points]
+    for row, each in zip(read_kitti_objects(tmp_path / "a.txt"), found, strict=True):
+        assert row.contains(points[result.labels == each.label]).all()

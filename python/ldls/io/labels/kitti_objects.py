@@ -1,13 +1,14 @@
 """KITTI object labels: a line of 15 fields for each object, and a 16th, the score, in results.
 
-Their 3D boxes are truth for points too: noisy, for a box holds ground and air as well as its object.
+Their 3D boxes are truth for points too: noisy, for a box holds ground and air as well as its object. `write` makes such
+lines of a result.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -16,16 +17,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import as_points
-from ldls.errors import CorruptFileError, TruncatedFileError
-from ldls.io.files import read_lines
+from ldls.errors import CorruptFileError, InputError, TruncatedFileError
+from ldls.io.files import read_lines, whole_file
 from ldls.labeling import BACKGROUND, Labeling
+from ldls.segmentation import Segmentation, fit_upright_box
+from ldls.segmentation.object_rows import first_seen
 from ldls.stages import project
 
 KITTI: tuple[str, ...] = (
     "Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc", "DontCare",
 )  # fmt: skip
 """Classes of KITTI's object labels."""
+TYPES = {name.lower(): name for name in KITTI} | {"person": "Pedestrian", "train": "Tram"}
+"""KITTI's class of a category; any other name stays, with `_` for blanks, which separate fields."""
 N_FIELDS = 15
+DECIMALS = 4
+UNKNOWN_TRUNCATION = -1
+UNKNOWN_OCCLUSION = 3
 IMAGE_SIZE = (375, 1242)
 """Height and width of most of KITTI's images, where that of the frame is not known."""
 
@@ -55,6 +63,13 @@ class KittiObject:
     location: tuple[float, float, float]
     rotation_y: float
     score: float | None = None
+
+    def line(self) -> str:
+        """Its row, without the end of the line."""
+        numbers = (self.alpha, *self.bbox, *self.dimensions, *self.location, self.rotation_y)
+        score = () if self.score is None else (self.score,)
+        words = (f"{number:.{DECIMALS}f}" for number in (*numbers, *score))
+        return " ".join((self.type, f"{self.truncated:g}", str(self.occluded), *words))
 
     @property
     def is_region(self) -> bool:
@@ -139,6 +154,72 @@ def in_camera_frame(points: ArrayLike, camera: Camera) -> NDArray[np.float64]:
     with np.errstate(invalid="ignore"):
         placed: NDArray[np.float64] = xyz @ transform[:3, :3].T + transform[:3, 3]
     return placed
+
+
+def write(path: Path, result: Segmentation) -> None:
+    """Write a line for each object with points of the one camera there is.
+
+    The box is the upright one around its points in the frame of the camera, whether or not its image is rectified; the
+    rectangle is the one around its mask; truncation and occlusion are unknown, -1 and 3.
+
+    Raises:
+        InputError: There are several cameras, of which the format cannot say which one an object is seen by.
+    """
+    if len(result.views) != 1:
+        raise InputError(
+            f"{path}: KITTI's labels are of one camera, the result has {len(result.views)}; save_objects writes .csv "
+            "and .json of several"
+        )
+    rows = [_from_result(result, each.label) for each in result.objects if each.n_points]
+    with whole_file(path) as file:
+        file.write("".join(f"{row.line()}\n" for row in rows).encode())
+
+
+def _from_result(result: Segmentation, label: int) -> KittiObject:
+    instance = result.instances[label - 1]
+    _, mask = first_seen(instance.sources, result.views)
+    top, left, rows, columns = mask.bounding_box
+    box = _upright_box(in_camera_frame(result.points[result.labels == label], result.views[0].view.camera))
+    x, _, z = box.location
+    return replace(
+        box,
+        type=TYPES.get(instance.name.lower(), "_".join(instance.name.split()) or "Misc"),
+        alpha=_wrapped(box.rotation_y - math.atan2(x, z)),
+        bbox=(left, top, left + columns - 1, top + rows - 1),
+        score=float(instance.score),
+    )
+
+
+def _upright_box(points_camera: NDArray[np.float64]) -> KittiObject:
+    """A nameless object whose box holds (n, 3) points of the camera frame, its numbers rounded as in files."""
+    # axes as a lidar has them: forward, left, up
+    box = fit_upright_box(points_camera[:, [2, 0, 1]] * (1, -1, -1))
+    forward, left, up = box.center
+    bottom = up - box.size[2] / 2
+    placed = KittiObject(
+        type="",
+        truncated=UNKNOWN_TRUNCATION,
+        occluded=UNKNOWN_OCCLUSION,
+        alpha=0.0,
+        bbox=(0, 0, 0, 0),
+        dimensions=(0, 0, 0),
+        location=(round(-left, DECIMALS), _above(-bottom), round(forward, DECIMALS)),
+        rotation_y=round(_wrapped(-box.yaw - math.pi / 2), DECIMALS),
+    )
+    along, up_from_bottom, across = placed.in_box_frame(points_camera).T
+    height, width, length = up_from_bottom.max(), 2 * np.abs(across).max(), 2 * np.abs(along).max()
+    return replace(placed, dimensions=(_above(height), _above(width), _above(length)))
+
+
+def _above(number: float) -> float:
+    """The next number above with `DECIMALS` decimals, so that points on a side of the box lie in it."""
+    steps = 10.0**DECIMALS
+    return (math.floor(number * steps) + 1) / steps
+
+
+def _wrapped(angle: float) -> float:
+    """The angle from -pi to pi."""
+    return math.remainder(angle, 2 * math.pi)
 
 
 def _object(place: str, words: list[str]) -> KittiObject:

@@ -50,7 +50,8 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
     """
     objects = [each for each in read_kitti_objects(path) if not each.is_region]
     all_names = KITTI_NAMES | dict(names or {})
-    ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
+    # a blank separates fields, so names are written without
+    ids = {name.replace(" ", "_"): category for category, name in all_names.items()} | KITTI_CATEGORIES
     with within(path):
         return KittiBoxes(
             boxes=[each.bbox for each in objects],

@@ -1,0 +1,59 @@
+"""Objects as rows of a table: plain values under names that carry their units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ldls.masks.instance_mask import InstanceMask
+from ldls.segmentation.objects import SegmentedObject
+from ldls.view import SeenView, camera_names
+
+Row = dict[str, Any]
+"""An object: a value for each of `COLUMNS`."""
+
+COLUMNS = (
+    "label", "category", "name", "score", "n_points", "distance_m",
+    "centroid_x_m", "centroid_y_m", "centroid_z_m",
+    "box_x_m", "box_y_m", "box_z_m", "length_m", "width_m", "height_m", "yaw_rad",
+    "camera", "mask_left_px", "mask_top_px", "mask_width_px", "mask_height_px",
+)  # fmt: skip
+"""Columns of a table of objects, in their order."""
+
+
+def object_rows(
+    objects: Sequence[SegmentedObject], sources: Sequence[Sequence[tuple[int, int]]], views: Sequence[SeenView]
+) -> list[Row]:
+    """Return a row for each object with points.
+
+    Args:
+        objects: The objects of a result.
+        sources: View and mask of each, as `Segmentation.sources`.
+        views: The views of the result.
+    """
+    return list(_rows(objects, sources, views))
+
+
+def _rows(
+    objects: Sequence[SegmentedObject], sources: Sequence[Sequence[tuple[int, int]]], views: Sequence[SeenView]
+) -> Iterator[Row]:
+    cameras = camera_names(views)
+    for each, own in zip(objects, sources, strict=True):
+        if each.centroid is None or each.box is None:
+            continue
+        view, mask = first_seen(own, views)
+        top, left, height, width = mask.bounding_box
+        values = (
+            each.label, each.category, each.name, float(each.score), each.n_points, each.distance_m,
+            *each.centroid.tolist(),
+            *each.box.center.tolist(), *each.box.size.tolist(), float(each.box.yaw),
+            cameras[view], left, top, width, height,
+        )  # fmt: skip
+        yield dict(zip(COLUMNS, values, strict=True))
+
+
+def first_seen(sources: Sequence[tuple[int, int]], views: Sequence[SeenView]) -> tuple[int, InstanceMask]:
+    """Number of the first view that shows an object with points, and its mask there."""
+    masks = ((view, views[view].view.masks[mask]) for view, mask in sorted(sources))
+    # of several masks of an object one may be empty
+    return next((view, mask) for view, mask in masks if mask.area)
