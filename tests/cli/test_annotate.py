@@ -31,9 +31,9 @@ def test_annotations_are_truth_for_evaluate_and_score_full_against_their_boxes(d
     assert "points of ground" not in outcome.output
     outcome = run(
         app,
-        ["evaluate", str(tmp_path / "out"), str(training / "label_2"), "--prediction-format", "annotations",
-         "--truth-format", "kitti-boxes", "--points", str(training / "velodyne"), "--calib", str(training / "calib"),
-         "--images", str(training / "image_2"), "--out", str(tmp_path / "tables")],
+        ["evaluate", str(tmp_path / "out"), str(training / "label_2"), "--points", str(training / "velodyne"),
+         "--calib", str(training / "calib"),
+         "--image", str(training / "image_2"), "--out", str(tmp_path / "tables")],
     )  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
     rows = (tmp_path / "tables/semantic.csv").read_text().splitlines()

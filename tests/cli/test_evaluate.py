@@ -3,6 +3,7 @@ import shutil
 
 import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 import ldls
@@ -32,7 +33,7 @@ def frames(tmp_path):
 
 
 def evaluate(folder, *options):
-    words = [str(folder / "mine"), str(folder / "truth"), "--truth-format", "annotations", *map(str, options)]
+    words = [str(folder / "mine"), str(folder / "truth"), *map(str, options)]
     return run(app, ["evaluate", *words])
 
 
@@ -64,7 +65,7 @@ def test_methods_stand_side_by_side(frames):
     rows = json.loads((frames / "t/semantic.json").read_text())["rows"]
     assert [row["method"] for row in rows] == ["mine"] * 3 + ["a network"] * 3
     assert [row["IoU"] for row in rows[:3]] == [row["IoU"] for row in rows[3:]]
-    assert "a network: 2 frames, 7 of 8 points counted" in outcome.output
+    assert "\n2 frames, 7 of 8 points counted" in outcome.output
     assert "do not compare" not in outcome.output
 
 
@@ -125,26 +126,154 @@ def test_a_confidence_out_of_range_is_one_line(results):
     assert "2.npz: confidence is <U" in outcome.stderr
 
 
-def test_methods_that_label_different_points_are_told_apart(frames):
+def test_a_point_that_one_method_leaves_out_counts_for_none(frames):
     shutil.copytree(frames / "mine", frames / "other")
     write_labeling(
         frames / "other/1.npz", Labeling(np.array([1, 1, 0, 0]), np.array([1, 1, 0, 0]), np.arange(4) > 2, NAMES)
     )
-    outcome = evaluate(frames, "--beside", f"other={frames / 'other'}")
-    assert "label different points" in outcome.output
+    outcome = evaluate(frames, "--beside", f"other={frames / 'other'}", "--out", frames / "t")
+    assert outcome.exit_code == 0, outcome.output
+    rows = json.loads((frames / "t/semantic.json").read_text())["rows"]
+    # the pedestrian that both would have missed is the point left out
+    assert [row["true points"] for row in rows if row["class"] == "Pedestrian"] == [0, 0]
+    assert "2 frames, 6 of 8 points counted; no method is scored on those out of view by other" in outcome.output
 
 
-@pytest.mark.parametrize("text", ["other", "=mine", "other=nowhere"])
-def test_another_method_needs_a_name_and_a_path(frames, text):
+def test_methods_of_different_frames_do_not_compare(frames):
+    shutil.copytree(frames / "mine", frames / "other")
+    (frames / "other/2.npz").unlink()
+    outcome = evaluate(frames, "--beside", f"other={frames / 'other'}", "--missing", "skip")
+    assert outcome.exit_code == 0, outcome.output
+    assert "mine: 2 frames, 7 of 8 points counted" in outcome.output
+    assert "other: 1 frame, 4 of 4 points counted" in outcome.output
+    assert "their scores do not compare" in outcome.output
+
+
+@pytest.fixture
+def seen(tmp_path, small_scene):
+    """Ours as .npz, the same labels as .label with 0 out of view, and whole true labels of 300 points all around."""
+    points, masks, camera = small_scene
+    behind = points * (1, 1, -1)
+    result = ldls.segment(np.vstack([points, behind]), masks, camera)
+    for folder in ("ours", "theirs", "truth"):
+        (tmp_path / folder).mkdir()
+    ldls.save(result, tmp_path / "ours/7.npz")
+    ldls.save(result, tmp_path / "theirs/7.label")
+    # a car stands behind, which nobody can find in the image
+    one = np.where(points[:, 2] < 12, np.where(points[:, 0] < 0, 30 | 1 << 16, 10 | 2 << 16), 40)
+    np.tile(one, 2).astype("<u4").tofile(tmp_path / "truth/7.label")
+    np.save(tmp_path / "7.npy", result.points)
+    return tmp_path
+
+
+def scores_by_method(folder):
+    rows = json.loads((folder / "semantic.json").read_text())["rows"]
+    return {(row.pop("method"), row["class"]): row for row in rows}
+
+
+def test_equal_labels_of_different_formats_have_equal_scores(seen):
+    words = [str(seen / "theirs"), str(seen / "truth"), "--beside", f"mine={seen / 'ours'}", "--out", str(seen / "t")]
+    outcome = run(app, ["evaluate", *words])
+    assert outcome.exit_code == 0, outcome.output
+    found = scores_by_method(seen / "t")
+    for name in ("Car", "Pedestrian", "mean"):
+        assert found["theirs", name] == found["mine", name]
+    assert found["theirs", "Car"]["true points"] == 120
+    assert found["theirs", "Car"]["IoU"] > 90
+    # the bound is that of the method that has masks, whichever comes first
+    assert found["bound", "Car"]["IoU"] >= found["mine", "Car"]["IoU"]
+    assert "500 of 1,000 points counted; no method is scored on those out of view by mine" in outcome.output
+    instances = json.loads((seen / "t/instances.json").read_text())["rows"]
+    counts = {(row.pop("method"), *row.values()) for row in instances}
+    assert {row[1:] for row in counts if row[0] == "theirs"} == {row[1:] for row in counts if row[0] == "mine"}
+
+
+def test_labels_alone_count_everywhere_unless_a_calibration_tells(seen):
+    words = ["evaluate", str(seen / "theirs"), str(seen / "truth"), "--out", str(seen / "t")]
+    outcome = run(app, words)
+    assert outcome.exit_code == 0, outcome.output
+    assert scores_by_method(seen / "t")["theirs", "Car"]["true points"] == 240
+    assert "1,000 of 1,000 points counted; no file tells which points a camera sees" in outcome.output
+    (seen / "7.txt").write_text(
+        "P2: 100 0 40 0 0 100 30 0 0 0 1 0\nR0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0\n"
+    )
+    Image.new("RGB", (80, 60)).save(seen / "7.png")
+    outcome = run(app, [*words, "--calib", str(seen), "--points", str(seen), "--image", str(seen)])
+    assert outcome.exit_code == 0, outcome.output
+    assert scores_by_method(seen / "t")["theirs", "Car"]["true points"] == 120
+    assert "500 of 1,000 points counted; no method is scored on those out of view by the calibration" in outcome.output
+    outcome = run(app, [*words, "--calib", str(seen)])
+    assert outcome.exit_code == 1
+    assert "frame 7: needs its points; name their folder (--points)" in outcome.stderr
+
+
+def test_each_method_has_the_format_that_its_files_tell(seen):
+    result = ldls.read_result(seen / "ours/7.npz")
+    for folder in ("nuscenes", "text"):
+        (seen / folder).mkdir()
+    ldls.save(result, seen / "nuscenes/7_panoptic.npz")
+    write_annotations(seen / "text/7.txt", Labeling.from_segmentation(result))
+    others = [("a", "ours"), ("b", "nuscenes"), ("c", "text")]
+    outcome = run(
+        app,
+        ["evaluate", str(seen / "theirs"), str(seen / "truth"), "--out", str(seen / "t"),
+         *(word for name, folder in others for word in ("--beside", f"{name}={seen / folder}"))],
+    )  # fmt: skip
+    assert outcome.exit_code == 0, outcome.output
+    found = scores_by_method(seen / "t")
+    for name in "abc":
+        assert found[name, "mean"] == found["theirs", "mean"]
+
+
+def test_a_format_can_be_said_of_each_side(seen):
+    result = ldls.read_result(seen / "ours/7.npz")
+    ldls.save(result, seen / "ours/7.label")
+    (seen / "truth/7.label").rename(seen / "truth/7.data")
+    outcome = run(
+        app,
+        ["evaluate", f"label:{seen / 'ours/7.label'}", f"label:{seen / 'truth/7.data'}",
+         "--beside", f"whole=npz:{seen / 'ours/7.npz'}", "--out", str(seen / "t"), "--missing", "skip"],
+    )  # fmt: skip
+    assert outcome.exit_code == 0, outcome.output
+    found = scores_by_method(seen / "t")
+    assert found["7", "mean"] == found["whole", "mean"]
+
+
+def test_a_method_of_another_number_of_points_is_refused(seen):
+    (seen / "other").mkdir()
+    nothing = np.zeros(999, np.uint32)
+    nothing.tofile(seen / "other/7.label")
+    words = ["evaluate", str(seen / "theirs"), str(seen / "truth"), "--beside"]
+    outcome = run(app, [*words, f"other={seen / 'other'}"])
+    assert outcome.exit_code == 1
+    assert f"{seen / 'other/7.label'}: frame 7: prediction has 999 points, truth 1,000" in outcome.stderr
+    write_labeling(seen / "other/7.npz", Labeling(nothing, nothing, nothing > 0, NAMES))
+    outcome = run(app, [*words, f"other={seen / 'other'}"])
+    assert outcome.exit_code == 1
+    assert "frame 7: other has 999 points, the truth 1,000; all must be of the whole cloud" in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        pytest.param("other", "expected NAME=PATH, or NAME=FORMAT:PATH", id="no name"),
+        pytest.param("=mine", "expected NAME=PATH, or NAME=FORMAT:PATH", id="an empty name"),
+        pytest.param("other=nowhere", "nowhere: no such file or folder; expected PATH, or FORMAT:PATH", id="no path"),
+        pytest.param("other=cvat:mine", "FORMAT:PATH with one of lidarseg, panoptic, npz, label", id="no such format"),
+        pytest.param("mine=mine", "'mine' is the name of another method; give each its own (--name)", id="twice"),
+    ],
+)
+def test_another_method_needs_a_name_of_its_own_and_a_path(frames, monkeypatch, text, message):
+    monkeypatch.chdir(frames)
     outcome = evaluate(frames, "--beside", text)
-    assert outcome.exit_code != 0
-    assert "expected NAME=PATH" in outcome.output
+    assert outcome.exit_code == 1
+    assert message in outcome.stderr
 
 
 def test_options_reach_the_scores(frames):
     assert evaluate(frames, "--out", frames / "t", "--leave-out", "").exit_code == 0
     assert scores(frames / "t")["Car precision"] == 75.0
-    assert evaluate(frames, "--out", frames / "t", "--classes", "Van,Car").exit_code == 0
+    assert evaluate(frames, "--out", frames / "t", "--categories", "Van,Car").exit_code == 0
     assert scores(frames / "t")["Van recall"] == 0.0
     assert evaluate(frames, "--out", frames / "t", "--min-points", "2").exit_code == 0
     rows = json.loads((frames / "t/instances.json").read_text())["rows"]
@@ -194,11 +323,13 @@ def test_bad_files_are_one_line_and_nothing_is_written(frames, change, message):
     assert not (frames / "t").exists()
 
 
-def test_formats_are_asked_for_where_no_ending_tells(frames):
-    outcome = run(app, ["evaluate", str(frames / "mine"), str(frames / "truth")])
+def test_formats_are_asked_for_where_no_file_tells(frames):
+    for name in "12":
+        (frames / f"truth/{name}.txt").write_text("")
+    outcome = evaluate(frames)
     assert outcome.exit_code == 1
-    assert "may be annotations or kitti-boxes" in outcome.stderr
-    outcome = run(app, ["evaluate", str(frames / "mine"), str(frames / "truth"), "--truth-format", "kitti-boxes"])
+    assert "may be annotations or kitti-boxes; say which by format=, or as FORMAT:PATH" in outcome.stderr
+    outcome = run(app, ["evaluate", str(frames / "mine"), f"kitti-boxes:{frames / 'truth'}"])
     assert outcome.exit_code == 1
     assert "frame 1: needs its points" in outcome.stderr
 
@@ -219,8 +350,8 @@ def test_real_frames_against_their_boxes(data_folder, tmp_path):
         assert outcome.exit_code == 0, outcome.output
     outcome = run(
         app,
-        ["evaluate", str(out), str(labels), "--truth-format", "kitti-boxes", "--points", str(training / "velodyne"),
-         "--calib", str(training / "calib"), "--images", str(training / "image_2"), "--out", str(tmp_path / "t")],
+        ["evaluate", str(out), str(labels), "--points", str(training / "velodyne"),
+         "--calib", str(training / "calib"), "--image", str(training / "image_2"), "--out", str(tmp_path / "t")],
     )  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
     row = scores(tmp_path / "t")

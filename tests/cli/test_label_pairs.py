@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ldls.cli.label_pairs import FrameFolders, read_pairs
+from ldls.cli.label_pairs import Counting, FrameFolders, read_pairs
 from ldls.errors import InputError, ShapeError
-from ldls.io.labels.label_formats import LabelFiles, pair_files
+from ldls.io.labels.label_formats import LabelFile, LabelFiles, pair_files
 
 CALIB = """P0: 1 0 0 0 0 1 0 0 0 0 1 0
 P2: 100 0 50 0 0 100 40 0 0 0 1 0
@@ -27,10 +27,14 @@ def boxes(tmp_path):
 
 
 def read(folder, **inputs):
-    formats = {"prediction_format": "annotations", "truth_format": "kitti-boxes"}
-    frames, _ = pair_files(folder / "mine", folder / "label_2", **formats)
-    (pair,) = read_pairs(frames, folders=FrameFolders(**{k: folder / v for k, v in inputs.items()}), **formats)
+    frames, _ = pair_files(folder / "mine", folder / "label_2")
+    (pair,) = read_pairs(frames, counting(FrameFolders(**{k: folder / v for k, v in inputs.items()})))
     return pair
+
+
+def counting(folders):
+    """All points count but those that the truth leaves out."""
+    return Counting({}, folders)
 
 
 def test_boxes_take_points_calibration_and_the_size_of_the_image(boxes):
@@ -59,7 +63,8 @@ def test_squeezeseg_brings_its_ranges(tmp_path):
     image[0, 0, 4:] = 12.5, 1
     np.save(tmp_path / "truth.npy", image)
     np.save(tmp_path / "mine.npy", image[:, :, 5].astype(np.uint8))
-    (pair,) = read_pairs([LabelFiles("a", tmp_path / "mine.npy", tmp_path / "truth.npy")])
+    mine, truth = (LabelFile(tmp_path / f"{side}.npy", "squeezeseg") for side in ("mine", "truth"))
+    (pair,) = read_pairs([LabelFiles("a", mine, truth)], counting(FrameFolders()))
     assert pair.ranges_m[:2].tolist() == [12.5, 0]
-    (pair,) = read_pairs([LabelFiles("a", tmp_path / "mine.npy", tmp_path / "mine.npy")])
+    (pair,) = read_pairs([LabelFiles("a", mine, mine)], counting(FrameFolders()))
     assert pair.ranges_m is None

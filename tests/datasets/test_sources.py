@@ -120,7 +120,7 @@ def test_truth_of_kitti_is_its_annotations_before_its_boxes(tmp_path):
     assert open_source(folder)[0].truth.counts()["Pedestrian"] == 100
     assert open_source(folder)[1].truth is None
     with pytest.warns(LeftOutWarning, match="2 of 3 sweeps are left out: 2 no label_2"):
-        (frame,) = open_source(folder, truth="boxes")
+        (frame,) = open_source(folder, truth="kitti-boxes")
     assert frame.truth.counts()["Car"] > 40
 
 
@@ -140,7 +140,8 @@ def test_with_stored_masks_kitti_needs_no_images(tmp_path):
         image.read()
     with pytest.raises(ldls.ParameterError, match="masks: got 'masks' for 2 cameras"):
         open_source(folder, masks="masks", camera=(2, 3))
-    with pytest.raises(ldls.ParameterError, match="truth: got 'guess', expected true, false, annotations or boxes"):
+    expected = "true, false, annotations or kitti-boxes"
+    with pytest.raises(ldls.ParameterError, match=f"truth: got 'guess', expected {expected}"):
         open_source(folder, masks="masks", truth="guess")
 
 

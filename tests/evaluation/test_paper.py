@@ -86,7 +86,7 @@ def test_a_folder_yields_its_whole_frames(folder, small_scene):
 
 def test_a_folder_without_a_part_is_refused(folder):
     with pytest.raises(ldls.InputError, match="no folder label_2"):
-        frames_of(folder, "boxes")
+        frames_of(folder, "kitti-boxes")
     shutil.rmtree(folder / "masks")
     with pytest.raises(ldls.InputError, match="no folder masks; found annotations, calib, velodyne"):
         frames_of(folder)
@@ -125,7 +125,7 @@ def test_scores_are_those_of_the_labels(folder):
 
 def test_on_real_frames_each_step_of_the_method_gains(data_folder):
     with pytest.warns(LeftOutWarning, match="1 of 5 sweeps are left out: 1 no label_2"):
-        frames = frames_of(data_folder / "kitti/training", "boxes")
+        frames = frames_of(data_folder / "kitti/training", "kitti-boxes")
     found = paper.score(list(paper.label(frames, classes=ClassSet.kitti(), iterations=())), classes=ClassSet.kitti())
     for name in ("Car", "Pedestrian"):
         iou = {method: evaluation.semantic[name].iou for method, evaluation in found.methods.items()}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import words
+from ldls.cli.options import ClassesOption, words
 from ldls.cli.progress import progress
 from ldls.cli.reliability_files import draw_reliability
 from ldls.errors import ParameterError, UnsupportedFormatError
@@ -19,9 +19,7 @@ from ldls.errors import ParameterError, UnsupportedFormatError
 if TYPE_CHECKING:
     from ldls.evaluation import Evaluation
 
-EXISTING = {"exists": True, "readable": True}
-FOLDER = {"exists": True, "file_okay": False, "readable": True}
-FORMAT_NAMES = "annotations, kitti-boxes, ldls, semantic-kitti, squeezeseg, nuscenes-lidarseg, nuscenes-panoptic"
+FOLDER = {"exists": True, "file_okay": False, "readable": True, "metavar": "FOLDER"}
 
 
 class Missing(StrEnum):
@@ -33,90 +31,133 @@ class Missing(StrEnum):
 
 @speaks_plainly
 def evaluate(
-    predictions: Annotated[Path, typer.Argument(help="Labels of a method: a file or a folder.", **EXISTING)],
-    truth: Annotated[Path, typer.Argument(help="True labels: a file or a folder.", **EXISTING)],
-    classes: Annotated[str, typer.Option(help="Classes to score, separated by commas.")] = "Car,Pedestrian",
-    prediction_format: Annotated[
-        str | None, typer.Option(help=f"One of {FORMAT_NAMES}.", show_default="by the files' ending")
+    predictions: Annotated[
+        str,
+        typer.Argument(
+            metavar="PREDICTIONS",
+            help="Labels of a method: a file or folder, or FORMAT:PATH where the files do not tell their format: npz, "
+            "label, lidarseg, panoptic, squeezeseg, annotations or kitti-boxes.",
+        ),
+    ],
+    truth: Annotated[str, typer.Argument(metavar="TRUTH", help="True labels, in the same way.")],
+    beside: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=PATH",
+            help="Labels of another method for the same tables, of any format; may be repeated.",
+            show_default=False,
+        ),
     ] = None,
-    truth_format: Annotated[
-        str | None, typer.Option(help="The same for the truth.", show_default="by the files' ending")
+    name: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Name of the method of PREDICTIONS.", show_default="that of its folder"),
     ] = None,
-    missing: Annotated[Missing, typer.Option(help="What becomes of a frame without its pair.")] = Missing.ERROR,
+    categories: ClassesOption = "Car,Pedestrian",
+    missing: Annotated[
+        Missing, typer.Option(metavar="|".join(Missing), help="What becomes of a frame without its pair.")
+    ] = Missing.ERROR,
     merge_sitting: Annotated[
         bool, typer.Option("--merge-sitting/--keep-sitting", help="Is Person_sitting a Pedestrian, or left out?")
     ] = True,
     leave_out: Annotated[
         str | None,
-        typer.Option(help='True classes that do not count; "" for none.', show_default="Van,Cyclist,Misc,DontCare"),
+        typer.Option(
+            metavar="WORDS",
+            help='True categories that do not count; "" for none.',
+            show_default="Van,Cyclist,Misc,DontCare",
+        ),
     ] = None,
-    background: Annotated[str, typer.Option(help="Names of your own that truth holds and that are background.")] = "",
-    max_range: Annotated[float | None, typer.Option(help="Only points this near count, in metres.")] = None,
-    min_points: Annotated[int, typer.Option(min=0, help="True instances of fewer points do not count.")] = 0,
+    background: Annotated[
+        str, typer.Option(metavar="WORDS", help="Names of your own that truth holds and that are background.")
+    ] = "",
+    max_range: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Only points this near count.", show_default="all")
+    ] = None,
+    min_points: Annotated[
+        int, typer.Option(metavar="N", min=0, help="True instances of fewer points do not count.")
+    ] = 0,
     points: Annotated[
-        Path | None, typer.Option(help="Folder of the sweeps, for --max-range and kitti-boxes.", **FOLDER)
+        Path | None,
+        typer.Option(help="Folder of the sweeps, for --calib, --max-range and kitti-boxes.", **FOLDER),
     ] = None,
-    calib: Annotated[Path | None, typer.Option(help="Folder of the calibration, for kitti-boxes.", **FOLDER)] = None,
-    images: Annotated[
-        Path | None, typer.Option(help="Folder of the images, for their size, for kitti-boxes.", **FOLDER)
+    calib: Annotated[
+        Path | None,
+        typer.Option(help="Folder of KITTI calibrations: only points that the camera sees count.", **FOLDER),
     ] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the method.", show_default="that of PREDICTIONS")] = None,
-    beside: Annotated[
-        list[str] | None, typer.Option(help="NAME=PATH of another method for the same tables; may be repeated.")
+    image: Annotated[
+        Path | None, typer.Option(help="Folder of the images, whose size says what the camera sees.", **FOLDER)
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the tables as Markdown, CSV and JSON.", file_okay=False)
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for the tables as Markdown, CSV and JSON.", file_okay=False),
     ] = None,
 ) -> None:
-    """Score the labels of a method against true labels.
+    """Score the labels of a method, and of others beside it, against true labels.
 
     Prints precision, recall and IoU over points, instances found at IoU 0.50 and 0.70, and panoptic quality; of .npz
     results of ldls also how far their confidence can be relied on, and what their masks allow at best. Files belong
-    together by name: 000123.npz and 000123.txt.
+    together by name: 000123.npz and 000123.txt. Points that a method's .npz, the truth or --calib has out of view count
+    for no method.
 
-    Example: ldls evaluate results label_2 --truth-format kitti-boxes --points velodyne --calib calib --out tables
+    Examples:
+    ldls evaluate results label_2 --points velodyne --calib calib --out tables
+
+    ldls evaluate theirs labels --beside mine=results --beside boxes=kitti-boxes:detections --points velodyne
+    --calib calib
     """
-    from ldls.cli.label_pairs import FrameFolders, read_bounds, read_pairs
+    from ldls.cli.label_pairs import Counting, FrameFolders, parse_place, read_bounds, read_pairs
     from ldls.evaluation import ClassSet, evaluate as score_pairs
     from ldls.evaluation.methods import BOUND
     from ldls.io.labels.label_formats import pair_files
 
     scored = ClassSet.kitti(
-        words(classes),
+        words(categories),
         merge_sitting=merge_sitting,
         leave_out=None if leave_out is None else words(leave_out),
         background=words(background),
     )
-    formats = {"prediction_format": prediction_format, "truth_format": truth_format}
-    folders = FrameFolders(points=points, calib=calib, images=images)
-    score = partial(score_pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
-    by_method = {}
-    for method, path in {name or predictions.stem: predictions, **_named(beside or [])}.items():
-        files, lacking = pair_files(path, truth, missing=missing.value, **formats)
-        pairs = progress(read_pairs(files, folders=folders, **formats), len(files), "scoring")
-        by_method[method] = score(pairs)
+    places = _places(predictions, name, beside or [])
+    true_path, true_format = parse_place(truth)
+    files = {}
+    for method, (path, format) in places.items():
+        files[method], lacking = pair_files(
+            path, true_path, prediction_format=format, truth_format=true_format, missing=missing.value
+        )
         if lacking:
             typer.echo(f"{method}: left out for want of their pair: {_frames(len(lacking))}")
-    # labels alone have no masks
-    with suppress(UnsupportedFormatError):
-        files, _ = pair_files(predictions, truth, missing=missing.value, **formats)
-        bounds = read_bounds(files, classes=scored, folders=folders, **formats)
-        by_method.setdefault(BOUND, score(progress(bounds, len(files), "bound")))
-    _show(by_method, out)
+    folders = FrameFolders(points=points, calib=calib, images=image)
+    of_methods = {method: {each.name: each.prediction for each in own} for method, own in files.items()}
+    counting = Counting(of_methods, folders)
+    score = partial(score_pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
+    by_method = {
+        method: score(progress(read_pairs(own, counting), len(own), "scoring")) for method, own in files.items()
+    }
+    for own in files.values():
+        # labels alone have no masks
+        with suppress(UnsupportedFormatError):
+            bounds = read_bounds(own, counting, classes=scored)
+            by_method.setdefault(BOUND, score(progress(bounds, len(own), "bound")))
+            break
+    _show(by_method, counting.by, out)
 
 
-def _named(beside: list[str]) -> dict[str, Path]:
-    """Paths of other methods by their names."""
-    named = {}
+def _places(predictions: str, name: str | None, beside: list[str]) -> dict[str, tuple[Path, str | None]]:
+    """Where the labels of each method are, and their format where that is said, by its name."""
+    from ldls.cli.label_pairs import parse_place
+
+    path, format = parse_place(predictions)
+    places = {name or (path.resolve().name if path.is_dir() else path.stem): (path, format)}
     for text in beside:
-        method, equals, path = text.partition("=")
-        if not (method and equals and Path(path).exists()):
-            raise ParameterError(f"--beside: got {text!r}, expected NAME=PATH with a file or folder that exists")
-        named[method] = Path(path)
-    return named
+        method, equals, place = text.partition("=")
+        if not (method and equals and place):
+            raise ParameterError(f"--beside: got {text!r}, expected NAME=PATH, or NAME=FORMAT:PATH")
+        if method in places:
+            raise ParameterError(f"--beside: {method!r} is the name of another method; give each its own (--name)")
+        places[method] = parse_place(place)
+    return places
 
 
-def _show(by_method: dict[str, Evaluation], out: Path | None) -> None:
+def _show(by_method: dict[str, Evaluation], left_out_by: set[str], out: Path | None) -> None:
     from ldls.evaluation import tables
 
     shown = {
@@ -135,15 +176,28 @@ def _show(by_method: dict[str, Evaluation], out: Path | None) -> None:
     screen = console()
     for table in shown.values():
         screen.print(table.rich())
-    for method, scores in by_method.items():
-        counted, all_points = (sum(getattr(f, field) for f in scores.frames) for field in ("n_counted", "n_points"))
-        counts = f"{_frames(len(scores.frames))}, {counted:,} of {all_points:,} points counted"
-        screen.print(counts if len(by_method) == 1 else f"{method}: {counts}", highlight=False)
-    if len({sum(f.n_counted for f in scores.frames) for scores in by_method.values()}) > 1:
-        screen.print("the methods label different points: their scores do not compare", highlight=False)
+    _say_what_counted(by_method, left_out_by)
     if out:
         written = [f"{', '.join(shown)} and frames as .md, .csv and .json", *(path.name for path in figures)]
         screen.print(f"wrote {', '.join(written)} to {out}", highlight=False, soft_wrap=True)
+
+
+def _say_what_counted(by_method: dict[str, Evaluation], left_out_by: set[str]) -> None:
+    said = {}
+    for method, scores in by_method.items():
+        counted, all_points = (sum(getattr(f, field) for f in scores.frames) for field in ("n_counted", "n_points"))
+        said[method] = f"{_frames(len(scores.frames))}, {counted:,} of {all_points:,} points counted"
+    why = "no file tells which points a camera sees (--points and --calib do)"
+    if left_out_by:
+        why = f"no method is scored on those out of view by {', '.join(sorted(left_out_by))}"
+    screen = console()
+    if len({*said.values()}) == 1:
+        screen.print(f"{next(iter(said.values()))}; {why}", highlight=False, soft_wrap=True)
+        return
+    for method, counts in said.items():
+        screen.print(f"{method}: {counts}", highlight=False)
+    screen.print(why, highlight=False, soft_wrap=True)
+    screen.print("the methods label different points: their scores do not compare", highlight=False)
 
 
 def _frames(number: int) -> str:

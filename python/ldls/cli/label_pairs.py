@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.errors import InputError, UnsupportedFormatError
+from ldls.errors import InputError, ShapeError, UnsupportedFormatError, within
 from ldls.evaluation.bound import bound_labels
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.pair import Pair, ranges_of
 from ldls.io import read_camera, read_points, read_result
 from ldls.io.images import read_image_size
-from ldls.io.labels.label_formats import FORMATS, LabelFiles, guess_format, read_labeling
+from ldls.io.labels.kitti_objects import IMAGE_SIZE
+from ldls.io.labels.label_formats import FORMATS, LabelFile, LabelFiles, read_labeling
 from ldls.io.labels.labeling_npz import read_confidence_npz
 from ldls.io.labels.squeezeseg import read_squeezeseg_ranges
 from ldls.labeling import Labeling
+from ldls.stages import project
 
-POINT_ENDINGS = (".bin", ".pcd.bin", ".npy")
+POINT_ENDINGS = (".bin", ".pcd.bin", ".npy", ".pcd", ".ply", ".las", ".laz")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,69 +67,130 @@ class FrameFolders:
         image = None if self.images is None else self.images / f"{name}.png"
         return replace(camera, image_size=read_image_size(image) if image is not None and image.exists() else None)
 
+    def in_view(self, name: str) -> NDArray[np.bool_] | None:
+        """(N,) True for the points of the frame `name` that its camera sees; None without a calibration.
 
-def read_pairs(
-    files: Iterable[LabelFiles],
-    *,
-    prediction_format: str | None = None,
-    truth_format: str | None = None,
-    folders: FrameFolders | None = None,
-) -> Iterator[Pair]:
+        Raises:
+            LdlsError: As `read_points` and `read_camera`.
+        """
+        if self.calib is None:
+            return None
+        points, camera = self.read_points(name), self.read_camera(name)
+        rows, _ = project(points, camera, image_size=camera.image_size or IMAGE_SIZE, keep_origin=True)
+        seen = np.zeros(len(points), bool)
+        seen[rows] = True
+        return seen
+
+    def read_labels(self, name: str, file: LabelFile) -> Labeling:
+        """Labels of a file of the frame `name`.
+
+        Raises:
+            FileFormatError: The file is broken.
+            InputError: Its format needs points or calibration whose folder is not known.
+        """
+        if not FORMATS[file.format].needs_points:
+            return read_labeling(file.path, format=file.format)
+        return read_labeling(
+            file.path, format=file.format, points=self.read_points(name), camera=self.read_camera(name)
+        )
+
+
+@dataclass(frozen=True)
+class Counting:
+    """The points that count, of all methods alike: those that nobody says to be out of view.
+
+    Attributes:
+        methods: Files of each method by the names of frames.
+        folders: What is known of the frames; with a calibration, the camera says what is in view, too.
+        by: Those who left points out so far: names of methods, "the truth" and "the calibration".
+    """
+
+    methods: Mapping[str, Mapping[str, LabelFile]]
+    folders: FrameFolders
+    by: set[str] = field(default_factory=set)
+
+    def restricted(self, name: str, truth: Labeling) -> Labeling:
+        """The truth of the frame `name`, with all points ignored that do not count.
+
+        Raises:
+            ShapeError: A file labels another number of points.
+        """
+        if truth.ignored.any():
+            self.by.add("the truth")
+        for who, counts in self._said(name):
+            if len(counts) != len(truth):
+                raise ShapeError(
+                    f"frame {name}: {who} has {len(counts):,} points, the truth {len(truth):,}; all must be of the "
+                    "whole cloud in its order"
+                )
+            if not counts.all():
+                self.by.add(who)
+            truth = truth.restricted(counts)
+        return truth
+
+    def _said(self, name: str) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        seen = self.folders.in_view(name)
+        if seen is not None:
+            yield "the calibration", seen
+        for method, files in self.methods.items():
+            if name in files and FORMATS[files[name].format].ignores:
+                yield method, ~self.folders.read_labels(name, files[name]).ignored
+
+
+def parse_place(text: str) -> tuple[Path, str | None]:
+    """Path of labels, and their format where it says one: PATH or FORMAT:PATH.
+
+    Raises:
+        InputError: There is no such file or folder.
+    """
+    word, _, rest = text.partition(":")
+    format, path = (word, Path(rest)) if word in FORMATS else (None, Path(text))
+    if not path.exists():
+        raise InputError(
+            f"{text}: no such file or folder; expected PATH, or FORMAT:PATH with one of {', '.join(FORMATS)}"
+        )
+    return path, format
+
+
+def read_pairs(files: Iterable[LabelFiles], counting: Counting) -> Iterator[Pair]:
     """Prediction and truth of each frame, with what is known of its points.
 
     There are `ranges_m` where points are given or SqueezeSeg's truth has them, and confidences in `.npz` files of ldls.
 
     Raises:
         FileFormatError: A file is broken.
-        InputError: A format needs points or calibration that `folders` does not name.
+        InputError: A format needs points or calibration whose folder is not known.
         ShapeError: Prediction and truth of a frame differ in length.
     """
-    folders = folders or FrameFolders()
     for frame in files:
-        points = None if folders.points is None else folders.read_points(frame.name)
-        prediction = _read(frame.name, frame.prediction, prediction_format, folders, points)
-        truth = _read(frame.name, frame.truth, truth_format, folders, points)
-        of_ldls = (prediction_format or guess_format(frame.prediction)) == "ldls"
-        confidence = read_confidence_npz(frame.prediction) if of_ldls else None
-        yield Pair(frame.name, prediction, truth, _ranges(frame, truth_format, points), confidence)
+        prediction = counting.folders.read_labels(frame.name, frame.prediction)
+        truth = counting.folders.read_labels(frame.name, frame.truth)
+        confidence = read_confidence_npz(frame.prediction.path) if frame.prediction.format == "npz" else None
+        with within(frame.prediction.path):
+            pair = Pair(frame.name, prediction, truth, _ranges(frame, counting.folders), confidence)
+        yield replace(pair, truth=counting.restricted(frame.name, truth))
 
 
-def read_bounds(
-    files: Sequence[LabelFiles],
-    *,
-    classes: ClassSet,
-    prediction_format: str | None = None,
-    truth_format: str | None = None,
-    folders: FrameFolders | None = None,
-) -> Iterator[Pair]:
+def read_bounds(files: Sequence[LabelFiles], counting: Counting, *, classes: ClassSet) -> Iterator[Pair]:
     """The best labels that the masks of each frame's result allow, beside its truth.
 
     Raises:
         UnsupportedFormatError: A prediction is no whole result of ldls, of which alone the masks are known.
         LdlsError: As `read_pairs`.
     """
-    formats = {"prediction_format": prediction_format, "truth_format": truth_format}
-    for frame, pair in zip(files, read_pairs(files, folders=folders, **formats), strict=True):
+    for frame, pair in zip(files, read_pairs(files, counting), strict=True):
         # a whole result has confidences
         if pair.confidence is None:
-            raise UnsupportedFormatError(f"{frame.prediction}: holds no masks, expected a result of ldls")
-        result = read_result(frame.prediction)
+            raise UnsupportedFormatError(f"{frame.prediction.path}: holds no masks, expected a result of ldls")
+        result = read_result(frame.prediction.path)
         names = [instance.name for instance in result.instances]
         labels = Labeling.from_instance_labels(bound_labels(result, pair.truth, classes), names)
         yield replace(pair, prediction=labels, confidence=None)
 
 
-def _read(name: str, path: Path, format: str | None, folders: FrameFolders, points: Points | None) -> Labeling:
-    chosen = format or guess_format(path)
-    if not FORMATS[chosen].needs_points:
-        return read_labeling(path, format=chosen)
-    cloud = folders.read_points(name) if points is None else points
-    return read_labeling(path, format=chosen, points=cloud, camera=folders.read_camera(name))
-
-
-def _ranges(frame: LabelFiles, truth_format: str | None, points: Points | None) -> NDArray[np.floating] | None:
-    if points is not None:
-        return ranges_of(points)
-    if (truth_format or guess_format(frame.truth)) == "squeezeseg":
-        return read_squeezeseg_ranges(frame.truth)
+def _ranges(frame: LabelFiles, folders: FrameFolders) -> NDArray[np.floating] | None:
+    if folders.points is not None:
+        return ranges_of(folders.read_points(frame.name))
+    if frame.truth.format == "squeezeseg":
+        return read_squeezeseg_ranges(frame.truth.path)
     return None

@@ -23,7 +23,7 @@ class Truth(StrEnum):
     """Kinds of truth to score by."""
 
     ANNOTATIONS = "annotations"
-    BOXES = "boxes"
+    KITTI_BOXES = "kitti-boxes"
 
 
 @speaks_plainly
@@ -45,7 +45,8 @@ def reproduce(
         ),
     ] = None,
     truth: Annotated[
-        Truth, typer.Option(help="Point annotations, or the 3D boxes of label_2, which are noisy.")
+        Truth,
+        typer.Option(metavar="|".join(Truth), help="Point annotations, or the 3D boxes of label_2, which are noisy."),
     ] = Truth.ANNOTATIONS,
     categories: ClassesOption = "Car,Pedestrian",
     cores: CoresOption = None,
@@ -60,7 +61,7 @@ def reproduce(
     Examples:
     ldls reproduce --suite validation --out tables
 
-    ldls reproduce kitti/training --truth boxes --out tables
+    ldls reproduce kitti/training --truth kitti-boxes --out tables
     """
     from ldls.datasets import KittiObjectSource
     from ldls.evaluation import ClassSet

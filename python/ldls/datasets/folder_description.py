@@ -41,7 +41,7 @@ points = "lidar/{frame}.bin"        # any format of docs/formats.md: x y z first
 columns = 4                         # floats a row of a .bin: 4 by default, 5 for .pcd.bin
 stamps = "lidar/stamps.txt"         # optional: lines `frame seconds`
 truth = "labels/{frame}.label"      # optional: any format that `ldls evaluate` reads
-truth_format = "semantic-kitti"     # only where the file's ending does not tell
+truth_format = "label"              # only where the file's ending does not tell
 
 # one table a camera; its calibration inline ...
 [cameras.front]

@@ -18,7 +18,7 @@ from ldls.io import read_camera, read_masks
 from ldls.io.images import read_image_size
 
 SPLITS = ("training", "testing")
-TRUTHS = {"annotations": ("annotations", "annotations"), "boxes": ("label_2", "kitti-boxes")}
+TRUTHS = {"annotations": ("annotations", "annotations"), "kitti-boxes": ("label_2", "kitti-boxes")}
 """Folder and format of each kind of truth, in the order in which they are looked for."""
 
 
@@ -56,7 +56,8 @@ class KittiObjectSource(FileSource):
             camera: Number of the camera, 0 to 3, or several.
             split: "training" or "testing", if `path` is the parent of both.
             masks: Folder of stored masks beside the others, as "masks", with a `.json` a frame; of one camera.
-            truth: Give frames their truth, where it is there; "annotations" or "boxes": take the frames that have it.
+            truth: Give frames their truth, where it is there; "annotations" or "kitti-boxes": take the frames that
+                have it.
 
         Raises:
             SourceError: A folder is missing, or no frame is whole.

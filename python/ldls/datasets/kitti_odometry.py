@@ -74,7 +74,7 @@ class KittiOdometrySource(FileSource):
         return image_from_file(name, path, camera, stamp=self.stamps[index])
 
     def _truth_files(self, name: str) -> Iterable[tuple[Path, str]]:
-        return [(self.path / "labels" / f"{name}.label", "semantic-kitti")]
+        return [(self.path / "labels" / f"{name}.label", "label")]
 
 
 def _is_sequence(path: Path) -> bool:

@@ -17,6 +17,11 @@ from ldls.labeling import BACKGROUND, MAX_LABEL, Labeling
 DONT_CARE = "DontCare"
 
 
+def is_annotation(line: str) -> bool:
+    """True for a line of such a file, which begins with a whole number."""
+    return line.partition(" ")[0].removeprefix("-").isdecimal()
+
+
 def read_annotations(path: str | PathLike[str]) -> Labeling:
     """The labels of a file, one a line.
 

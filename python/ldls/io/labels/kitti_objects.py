@@ -93,6 +93,11 @@ class KittiObject:
         return inside
 
 
+def is_kitti_object(line: str) -> bool:
+    """True for a line of such a file, by its number of fields."""
+    return len(line.split()) in (N_FIELDS, N_FIELDS + 1)
+
+
 def read_kitti_objects(path: str | PathLike[str]) -> tuple[KittiObject, ...]:
     """The objects of a label_2 file, in its order; a file without a line has none.
 

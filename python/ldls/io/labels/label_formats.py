@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
 from ldls.errors import InputError, ParameterError, UnsupportedFormatError, some
-from ldls.io.labels.annotations import read_annotations
-from ldls.io.labels.kitti_objects import read_kitti_boxes
+from ldls.io.files import open_file
+from ldls.io.labels.annotations import is_annotation, read_annotations
+from ldls.io.labels.kitti_objects import is_kitti_object, read_kitti_boxes
 from ldls.io.labels.labeling_npz import read_labeling_npz
 from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
 from ldls.io.labels.semantic_kitti import read_semantic_kitti
@@ -29,27 +30,45 @@ class Format:
         ending: End of its files' names; the rest is the name of the frame.
         read: Reader of a file.
         needs_points: True where the reader needs the frame's points and camera.
+        ignores: True where a file can say that points do not count, as those out of view.
+        has_line: True for a line of such a file, where several formats have its ending.
     """
 
     ending: str
     read: Callable[..., Labeling]
     needs_points: bool = False
+    ignores: bool = False
+    has_line: Callable[[str], bool] = lambda line: False
 
 
 FORMATS: dict[str, Format] = {
-    "nuscenes-lidarseg": Format("_lidarseg.bin", read_lidarseg),
-    "nuscenes-panoptic": Format("_panoptic.npz", read_panoptic),
-    "ldls": Format(".npz", read_labeling_npz),
-    "semantic-kitti": Format(".label", read_semantic_kitti),
-    "squeezeseg": Format(".npy", read_squeezeseg),
-    "annotations": Format(".txt", read_annotations),
-    "kitti-boxes": Format(".txt", read_kitti_boxes, needs_points=True),
+    "lidarseg": Format("_lidarseg.bin", read_lidarseg),
+    "panoptic": Format("_panoptic.npz", read_panoptic),
+    "npz": Format(".npz", read_labeling_npz, ignores=True),
+    "label": Format(".label", read_semantic_kitti),
+    "squeezeseg": Format(".npy", read_squeezeseg, ignores=True),
+    "annotations": Format(".txt", read_annotations, has_line=is_annotation),
+    "kitti-boxes": Format(".txt", read_kitti_boxes, needs_points=True, ignores=True, has_line=is_kitti_object),
 }
 """Formats by name; longer endings come before the shorter ones that they end in."""
 
-SAY_WHICH = "say which by format=, or by --truth-format and --prediction-format"
+SAY_WHICH = "say which by format=, or as FORMAT:PATH on the command line"
 LISTED = 10
 """Number of frames that an error lists."""
+LONGEST_LINE_BYTES = 1 << 12
+
+
+@dataclass(frozen=True)
+class LabelFile:
+    """A file of labels.
+
+    Attributes:
+        path: The file.
+        format: Its format, one of `FORMATS`.
+    """
+
+    path: Path
+    format: str
 
 
 def read_labeling(
@@ -63,12 +82,12 @@ def read_labeling(
 
     Args:
         path: The file.
-        format: One of `FORMATS`; by default the one of the file's ending, if there is but one.
+        format: One of `FORMATS`; by default the one that the file's ending tells, or else its first line.
         points: (N, >= 3) the frame's points, which KITTI boxes need.
         camera: The frame's camera, which KITTI boxes need.
 
     Raises:
-        UnsupportedFormatError: The ending tells no format, or more than one.
+        UnsupportedFormatError: Neither the ending nor the first line tells the format.
         ParameterError: There is no such format.
         InputError: Points or camera are needed and missing.
         FileFormatError: The file is broken.
@@ -84,21 +103,32 @@ def read_labeling(
     return chosen.read(path, points=points, camera=camera)
 
 
-def guess_format(path: str | PathLike[str]) -> str:
-    """Name of the format of a file, by its ending.
+def guess_format(*paths: str | PathLike[str]) -> str:
+    """Name of the format of files of one kind, by the ending of the first; where several have it, by their first lines.
 
     Raises:
-        UnsupportedFormatError: No format has this ending, or several have.
+        UnsupportedFormatError: No format has this ending, or several have and no line tells which it is.
+        FileNotFoundError: A file whose first line is asked for is not there.
     """
-    name = Path(path).name
+    name = Path(paths[0]).name
     ending = next((each.ending for each in FORMATS.values() if name.endswith(each.ending)), None)
     fitting = [key for key, each in FORMATS.items() if each.ending == ending]
+    if not fitting:
+        known = ", ".join(f"{key} (*{each.ending})" for key, each in FORMATS.items())
+        raise UnsupportedFormatError(f"{paths[0]}: no format of labels has this name; expected {known}; {SAY_WHICH}")
     if len(fitting) == 1:
         return fitting[0]
-    if fitting:
-        raise UnsupportedFormatError(f"{path}: may be {' or '.join(fitting)}; {SAY_WHICH}")
-    known = ", ".join(f"{key} (*{each.ending})" for key, each in FORMATS.items())
-    raise UnsupportedFormatError(f"{path}: no format of labels has this name; expected {known}; {SAY_WHICH}")
+    # a frame without objects has an empty file, and the next one tells
+    lines = (line for path in paths if (line := _first_line(path)))
+    told = next((key for line in lines for key in fitting if FORMATS[key].has_line(line)), None)
+    if told is None:
+        raise UnsupportedFormatError(f"{paths[0]}: may be {' or '.join(fitting)}; {SAY_WHICH}")
+    return told
+
+
+def _first_line(path: str | PathLike[str]) -> str:
+    with open_file(path, "text file") as file:
+        return file.readline(LONGEST_LINE_BYTES).decode("utf-8-sig", "replace").strip()
 
 
 @dataclass(frozen=True)
@@ -112,8 +142,8 @@ class LabelFiles:
     """
 
     name: str
-    prediction: Path
-    truth: Path
+    prediction: LabelFile
+    truth: LabelFile
 
 
 def pair_files(
@@ -151,11 +181,16 @@ def pair_files(
     return tuple(LabelFiles(name, ours[name], theirs[name]) for name in both), tuple(lacking)
 
 
-def label_files(path: str | PathLike[str], format: str | None = None) -> dict[str, Path]:
+def label_files(path: str | PathLike[str], format: str | None = None) -> dict[str, LabelFile]:
     """Files of labels by the name of their frame: those of a folder, or `path` itself.
+
+    Args:
+        path: The folder, or a file.
+        format: One of `FORMATS`; by default what the files' endings tell, or else their first lines.
 
     Raises:
         InputError: The folder holds none.
+        UnsupportedFormatError: Neither ending nor first line tells the format.
         ParameterError: There is no such format.
         FileNotFoundError: There is no such path.
     """
@@ -163,14 +198,21 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
     wanted = list(FORMATS) if format is None else [_known(format)]
     endings = list(dict.fromkeys(FORMATS[name].ending for name in wanted))
     if path.is_file():
-        return {_frame_name(path, endings) or path.stem: path}
-    files: dict[str, Path] = {}
+        return {_frame_name(path, endings) or path.stem: LabelFile(path, format or guess_format(path))}
+    files: dict[str, LabelFile] = {}
     entries = [entry for entry in sorted(path.iterdir()) if entry.is_file() and not entry.name.startswith(".")]
     for ending in endings:
-        for entry in entries:
-            name = _frame_name(entry, endings)
-            if name and entry.name == name + ending:
-                files.setdefault(name, entry)
+        names = {entry: _frame_name(entry, endings) for entry in entries}
+        new = {name: entry for entry, name in names.items() if name and entry.name == name + ending}
+        if not new.keys() - files.keys():
+            continue
+        try:
+            of_all = format or guess_format(*new.values())
+        except UnsupportedFormatError:
+            if not files:
+                raise
+            continue  # notes beside labels
+        files = {name: LabelFile(entry, of_all) for name, entry in new.items()} | files
     if not files:
         raise InputError(f"{path}: holds no labels, expected files that end in {', '.join(endings)}")
     return files

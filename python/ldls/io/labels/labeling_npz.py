@@ -33,7 +33,7 @@ def read_labeling_npz(path: str | PathLike[str]) -> Labeling:
         except InputError as error:
             raise CorruptFileError(str(error)) from None
         raise UnsupportedFormatError(
-            f"found arrays {arrays.listed()}, expected labels and object_name (ldls), or classes and names"
+            f"found arrays {arrays.listed()}, expected labels and object_name (ldls.save), or classes and names"
         )
 
 
