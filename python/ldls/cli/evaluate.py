@@ -136,7 +136,7 @@ def evaluate(
         # labels alone have no masks
         with suppress(UnsupportedFormatError):
             bounds = read_bounds(own, counting, classes=scored)
-            by_method.setdefault(BOUND, score(progress(bounds, len(own), "bound")))
+            by_method.setdefault(BOUND, score(progress(bounds, len(own), "what the masks allow")))
             break
     _show(by_method, counting.by, out)
 
