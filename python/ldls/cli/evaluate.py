@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -14,7 +13,7 @@ from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import ClassesOption, words
 from ldls.cli.progress import progress
 from ldls.cli.reliability_files import draw_reliability
-from ldls.errors import ParameterError, UnsupportedFormatError
+from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
     from ldls.evaluation import Evaluation
@@ -105,7 +104,7 @@ def evaluate(
     ldls evaluate theirs labels --beside mine=results --beside boxes=kitti-boxes:detections --points velodyne
     --calib calib
     """
-    from ldls.cli.label_pairs import Counting, FrameFolders, parse_place, read_bounds, read_pairs
+    from ldls.cli.label_pairs import Counting, FrameFolders, have_masks, parse_place, read_bounds, read_pairs
     from ldls.evaluation import ClassSet, evaluate as score_pairs
     from ldls.evaluation.methods import BOUND
     from ldls.io.labels.label_formats import pair_files
@@ -124,7 +123,7 @@ def evaluate(
             path, true_path, prediction_format=format, truth_format=true_format, missing=missing.value
         )
         if lacking:
-            typer.echo(f"{method}: left out for want of their pair: {_frames(len(lacking))}")
+            console().print(f"{method}: left out for want of their pair: {_frames(len(lacking))}", highlight=False)
     folders = FrameFolders(points=points, calib=calib, images=image)
     of_methods = {method: {each.name: each.prediction for each in own} for method, own in files.items()}
     counting = Counting(of_methods, folders)
@@ -132,12 +131,10 @@ def evaluate(
     by_method = {
         method: score(progress(read_pairs(own, counting), len(own), "scoring")) for method, own in files.items()
     }
-    for own in files.values():
-        # labels alone have no masks
-        with suppress(UnsupportedFormatError):
-            bounds = read_bounds(own, counting, classes=scored)
-            by_method.setdefault(BOUND, score(progress(bounds, len(own), "what the masks allow")))
-            break
+    # labels alone have no masks
+    whole = next((own for own in files.values() if have_masks(own)), None)
+    if whole is not None and BOUND not in by_method:
+        by_method[BOUND] = score(progress(read_bounds(whole, counting, classes=scored), len(whole), "bound"))
     _show(by_method, counting.by, out)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.errors import InputError, ShapeError, UnsupportedFormatError, within
+from ldls.errors import InputError, ShapeError, within
 from ldls.evaluation.bound import bound_labels
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.pair import Pair, ranges_of
@@ -19,7 +19,7 @@ from ldls.io import read_camera, read_points, read_result
 from ldls.io.images import read_image_size
 from ldls.io.labels.kitti_objects import IMAGE_SIZE
 from ldls.io.labels.label_formats import FORMATS, LabelFile, LabelFiles, read_labeling
-from ldls.io.labels.labeling_npz import read_confidence_npz
+from ldls.io.labels.labeling_npz import holds_result, read_confidence_npz
 from ldls.io.labels.squeezeseg import read_squeezeseg_ranges
 from ldls.labeling import Labeling
 from ldls.stages import project
@@ -171,6 +171,11 @@ def read_pairs(files: Iterable[LabelFiles], counting: Counting) -> Iterator[Pair
         yield replace(pair, truth=counting.restricted(frame.name, truth))
 
 
+def have_masks(files: Iterable[LabelFiles]) -> bool:
+    """True where every prediction is a whole result of ldls, with the masks that it came from."""
+    return all(frame.prediction.format == "npz" and holds_result(frame.prediction.path) for frame in files)
+
+
 def read_bounds(files: Sequence[LabelFiles], counting: Counting, *, classes: ClassSet) -> Iterator[Pair]:
     """The best labels that the masks of each frame's result allow, beside its truth.
 
@@ -179,9 +184,6 @@ def read_bounds(files: Sequence[LabelFiles], counting: Counting, *, classes: Cla
         LdlsError: As `read_pairs`.
     """
     for frame, pair in zip(files, read_pairs(files, counting), strict=True):
-        # a whole result has confidences
-        if pair.confidence is None:
-            raise UnsupportedFormatError(f"{frame.prediction.path}: holds no masks, expected a result of ldls")
         result = read_result(frame.prediction.path)
         names = [instance.name for instance in result.instances]
         labels = Labeling.from_instance_labels(bound_labels(result, pair.truth, classes), names)
