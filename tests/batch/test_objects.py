@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
@@ -101,3 +102,11 @@ def test_boxes_of_kitti_are_a_format(few, settings, tmp_path):
     assert outcome.exit_code == 0, outcome.output
     ldls.save(ldls.read_result(tmp_path / "out/000001.npz"), tmp_path / "expected.txt")
     assert (tmp_path / "out/000001.txt").read_bytes() == (tmp_path / "expected.txt").read_bytes() != b""
+
+
+def test_a_format_that_is_added_changes_nothing_of_the_table(few, settings, expected, tmp_path):
+    batch.run(few, tmp_path / "out", settings, frames=slice(5))
+    added = replace(settings, formats=("npz", "kitti-boxes"))
+    summary = batch.run(few, tmp_path / "out", added, objects=tmp_path / "objects.json")
+    assert (summary.n_done, (tmp_path / "objects.json").read_bytes()) == (12, expected["json"])
+    assert len(list((tmp_path / "out").glob("*.txt"))) == 12
