@@ -65,21 +65,6 @@ def test_quick_start(own_demo, run, tmp_path, capsys):
     assert (tmp_path / "street.ply").stat().st_size > 12 * len(names["points"])
 
 
-def test_own_sensors(own_demo, run, tmp_path):
-    folder = tmp_path / "mine"
-    for source, target in (("points.bin", "lidar/a.bin"), ("image.png", "front/a.png"), ("masks.npz", "masks/a.npz")):
-        (folder / target).parent.mkdir(parents=True)
-        (tmp_path / "ldls-demo/input" / source).rename(folder / target)
-    (recipe, _) = pages.recipes(pages.ROOT / "docs/own-sensors.md")
-    (folder / "ldls.toml").write_text(recipe.commands.partition("<<'END'\n")[2].partition("END\n")[0])
-    names = run("docs/own-sensors.md")
-    assert sum(found.n_points > 0 for found in names["result"].objects) == 15
-    # the page's transform is that of the demo, put together from a pose and a turn
-    image = names["frame"].images[0]
-    np.testing.assert_allclose(names["T_camera_lidar"], image.camera.T_camera_lidar, atol=1e-12)
-    assert image.read().shape[:2] == names["camera"].image_size
-
-
 def test_errors(run, tmp_path, capsys):
     (tmp_path / "000571.bin").write_bytes(b"cut")
     names = run("docs/errors.md")
