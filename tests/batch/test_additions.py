@@ -11,7 +11,7 @@ from ldls import batch
 from ldls.errors import BatchError, ChangedFileWarning, UnsafePathError
 from ldls.label_diffusion import LabelDiffusion
 
-ALL = ("npz", "label", "ply", "png")
+ALL = ("npz", "label", "ply", "png", "pcd", "csv", "kitti-boxes", "lidarseg", "panoptic")
 
 
 def run(source, out, *formats, masks=None, **options):
@@ -48,9 +48,9 @@ def whole(few, tmp_path):
     ("first", "then", "n_labelled"),
     [
         pytest.param(("npz",), ALL, 0, id="from npz"),
-        pytest.param(("npz", "label"), ("ply", "png"), 0, id="others instead"),
+        pytest.param(("npz", "label"), ALL[2:], 0, id="others instead"),
         pytest.param(("label", "png"), ALL, 12, id="without npz"),
-        pytest.param(("png", "npz", "ply"), ("label",), 0, id="to pictures"),
+        pytest.param(("png", "npz", "ply"), ("label", *ALL[4:]), 0, id="to pictures"),
     ],
 )
 def test_formats_that_are_added_end_with_the_same_bytes(few, tmp_path, whole, labelled, first, then, n_labelled):

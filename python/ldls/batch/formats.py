@@ -15,6 +15,8 @@ from ldls.io.results import FORMATS
 from ldls.segmentation import Segmentation
 from ldls.viewing import overlay, save_picture
 
+BAG = "bag"
+"""The labelled ROS bag of a whole run."""
 PICTURE = "png"
 """The image with masks and points."""
 RESULT = "npz"
@@ -23,18 +25,25 @@ ENDINGS: dict[str, str] = {**{word: each.ending for word, each in FORMATS.items(
 """Endings of the names of files, by the words that choose them."""
 
 
-def check_formats(formats: Sequence[str]) -> None:
+def check_formats(formats: Sequence[str], *, of_run: bool = False) -> None:
     """Refuse words that choose no file.
+
+    Args:
+        formats: The words.
+        of_run: True if files of a whole run may be among them.
 
     Raises:
         ParameterError: There is such a word, or none at all.
     """
     if not formats:
         raise ParameterError("formats: expected at least one, as label")
+    known = [*ENDINGS, BAG] if of_run else [*ENDINGS]
     for word in formats:
-        if word not in ENDINGS:
-            near = get_close_matches(word.lstrip("."), ENDINGS, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"expected some of {', '.join(ENDINGS)}"
+        if word == BAG and not of_run:
+            raise ParameterError(f"formats: {BAG} is of a whole run; label the ROS bag with `ldls run`")
+        if word not in known:
+            near = get_close_matches(word.lstrip("."), known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"expected some of {', '.join(known)}"
             raise ParameterError(f"formats: {word!r} is unknown; {hint}")
 
 

@@ -140,7 +140,7 @@ class FrameWork:
         if self._stored is not None:
             self._stored.check_names(source)
         self._segmenter = None if settings.segmenter is None else _segmenters(settings.segmenter, settings.min_score)
-        self._reads_images = self._segmenter is not None or PICTURE in settings.formats
+        self._reads_images = self._segmenter is not None or PICTURE in settings.frame_formats
         self._digest = lru_cache(DIGESTS_KEPT)(_digest)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -238,7 +238,7 @@ class FrameWork:
                     "folder"
                 )
         files = record["files"]
-        names = [file_name(record["frame"], word) for word in self._settings.formats]
+        names = [file_name(record["frame"], word) for word in self._settings.frame_formats]
         # what a killed run wrote and could not record is written again
         there = [name for name in names if name in files and (self.out / name).is_file()]
         is_foreign = bool(files.keys() - file_names(record["frame"]))
@@ -253,7 +253,7 @@ class FrameWork:
             return
         work.earlier = record
         own = file_names(work.name)
-        asked = {file_name(work.name, word) for word in self._settings.formats}
+        asked = {file_name(work.name, word) for word in self._settings.frame_formats}
         work.kept = {
             name: state
             for name, state in record["files"].items()
@@ -265,7 +265,7 @@ class FrameWork:
 
     def _missing(self, work: Work) -> list[str]:
         """The formats that are to be written of a frame."""
-        return [word for word in self._settings.formats if file_name(work.name, word) not in work.kept]
+        return [word for word in self._settings.frame_formats if file_name(work.name, word) not in work.kept]
 
     def _of_files(self, work: Work, stored: StoredMasks) -> tuple[InstanceMasks, ...]:
         assert work.frame is not None

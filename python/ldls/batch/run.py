@@ -13,11 +13,12 @@ from typing import Any
 
 import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
-from ldls.batch.formats import written_formats
+from ldls.batch.formats import BAG, RESULT, file_name, written_formats
 from ldls.batch.frame_work import Earlier, FrameWork, Outcome
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
 from ldls.batch.plan import check_names
+from ldls.batch.run_bag import RunBag
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
 from ldls.datasets import Source, open_source
@@ -85,14 +86,17 @@ def run(
     runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
     chosen = list(zip(range(len(opened))[frames], opened.names[frames], strict=True))
     names = [name for _, name in chosen]
-    check_names(names, settings.formats)
+    check_names(names, settings.frame_formats)
     write_objects = None if objects is None else objects_writer(objects)
+    bag = RunBag(opened, Path(out)) if BAG in settings.formats else None
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     if objects is not None:
         check_folder(objects)
     with only_run(folder):
         sweep(folder)
+        if bag is not None:
+            bag.check_place()
         work = FrameWork(opened, settings, folder)
         header = {
             "settings": settings.record() | {"masks_sha256": work.masks_sha256},
@@ -100,7 +104,7 @@ def run(
         }
         journal = Journal(folder, header)
         try:
-            check_names(sorted({*names, *journal.frames}), written_formats(journal.endings, settings.formats))
+            check_names(sorted({*names, *journal.frames}), written_formats(journal.endings, settings.frame_formats))
             # what an earlier run did must still be there, and of the same input
             pending = _pending(chosen, work, journal)
             work.records = journal.kept(name for _, name in pending)
@@ -130,6 +134,8 @@ def run(
             write_objects(objects_of(journal.records(names)))
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
+        if bag is not None:
+            bag.write(_stored(journal, opened.names, folder), anew=n_finished - n_failed > n_earlier)
     doubts = doubts_of(journal.records(names))
     for doubt, frames_in_doubt in doubts.items():
         message = f"{len(frames_in_doubt):,} of {len(names):,} frames ({some(frames_in_doubt)}): {doubt}"
@@ -144,6 +150,12 @@ def run(
         seconds=dict(seconds),
         elapsed=elapsed,
     )
+
+
+def _stored(journal: Journal, names: Sequence[str], folder: Path) -> list[str]:
+    """The frames of which a whole result is in the folder."""
+    done = (record["frame"] for record in journal.records(names) if "error" not in record)
+    return [name for name in done if (folder / file_name(name, RESULT)).is_file()]
 
 
 def _pending(chosen: Sequence[tuple[int, str]], work: FrameWork, journal: Journal) -> list[tuple[int, str]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import ldls._ldls as _ldls
-from ldls.batch.formats import check_formats
+from ldls.batch.formats import BAG, RESULT, check_formats
 from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
@@ -28,7 +28,8 @@ class RunSettings:
         categories: Categories that count, by name or id; all without them.
         params: Parameters of the method; their number of threads does not matter to the result.
         formats: Files written for each frame, by the words of `ldls.batch.formats`: npz, label, ply and so on, and png
-            for the image with masks and points.
+            for the image with masks and points; bag for one labelled bag of all frames of a ROS bag, which is made of
+            their npz, so that these are written too.
         same_object: See `ldls.segment`.
 
     Raises:
@@ -46,7 +47,13 @@ class RunSettings:
     def __post_init__(self) -> None:
         if self.masks is not None and self.segmenter is not None:
             raise ParameterError("masks, segmenter: give one of them, got both")
-        check_formats(self.formats)
+        check_formats(self.formats, of_run=True)
+
+    @property
+    def frame_formats(self) -> tuple[str, ...]:
+        """The formats of each frame; those that the bag of the run is made of are among them."""
+        needed = (RESULT,) if BAG in self.formats else ()
+        return tuple(dict.fromkeys([*(word for word in self.formats if word != BAG), *needed]))
 
     def segmenter_file(self, frame: str, camera: str) -> Path | None:
         """The file that the segmenter of an image is made of, as a model or boxes; None where there is none."""

@@ -29,7 +29,8 @@ FormatsOption = Annotated[
     typer.Option(
         metavar="WORDS",
         help="Files to write for each frame: npz (all fields), label (SemanticKITTI), lidarseg, panoptic (nuScenes), "
-        "ply, pcd, las, laz (coloured clouds), parquet, csv (a row a point), kitti-boxes (label_2), png (picture).",
+        "ply, pcd, las, laz (coloured clouds), parquet, csv (a row a point), kitti-boxes (label_2), png (picture); of "
+        "a run over a ROS bag also bag (one labelled bag).",
     ),
 ]
 FramesOption = Annotated[

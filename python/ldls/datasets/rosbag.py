@@ -45,6 +45,7 @@ class RosBag:
         topics: The topics that are read.
         max_offset_s: The tolerance.
         unpaired: Number of sweeps with no image within the tolerance.
+        recover: True if the whole messages of a truncated bag are read.
     """
 
     kind = "rosbag"
@@ -90,7 +91,7 @@ class RosBag:
         if unknown:
             raise ParameterError(f"fields: got {', '.join(unknown)}, expected {', '.join(READ_FIELDS)}")
         self.path, self.max_offset_s = Path(path), max_offset_s
-        self._recover = recover
+        self.recover = recover
         self._fields = dict(fields or {})
         self._bag = open_bag(self.path, recover=recover)
         self.topics = choose_topics(self._bag, points_topic, image_topics, info_topics)
@@ -138,6 +139,22 @@ class RosBag:
     def header(self, index: int) -> Header:
         """Stamp, to the nanosecond, and frame of a sweep, for what is written about it."""
         return self._sweeps[index].header
+
+    def received_ns(self, index: int) -> int:
+        """Time of the reception of a sweep, in nanoseconds."""
+        return self._sweeps[index].received_ns
+
+    @property
+    def storage(self) -> str:
+        """The kind of bag: "rosbag1", "rosbag2" (SQLite) or "mcap"."""
+        if not self._bag.ros2:
+            return "rosbag1"
+        return "rosbag2" if any(file.suffix == ".db3" for file in storage_files(self.path)) else "mcap"
+
+    def companions(self) -> tuple[str, ...]:
+        """The topics that play beside the clouds: images, their calibrations, and transforms."""
+        moves = [topic.name for topic in self._bag.topics.values() if topic.type in (TRANSFORMS, OLD_TRANSFORMS)]
+        return tuple(dict.fromkeys([*self.topics.images, *self.topics.infos, *moves]))
 
     def cloud(self, index: int) -> PointCloud:
         """A sweep with all its fields, as ring and time, of which `Frame.points` has x y z and intensity.
@@ -235,7 +252,7 @@ class RosBag:
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
-        self._bag = open_bag(self.path, recover=self._recover)
+        self._bag = open_bag(self.path, recover=self.recover)
 
     def __repr__(self) -> str:
         return f"RosBag({str(self.path)!r}, {len(self)} frames, {self.topics})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -73,13 +74,21 @@ class LabelledBag(BagWriter):
         message = encode(self.types, labelled_columns(result), header)
         self.write_message(self.topic, message, header.stamp_ns if received_ns is None else received_ns)
 
-    def copy(self, path: str | PathLike[str], *, topics: Collection[str] | None = None, recover: bool = False) -> None:
+    def copy(
+        self,
+        path: str | PathLike[str],
+        *,
+        topics: Collection[str] | None = None,
+        recover: bool = False,
+        span_ns: tuple[int, int] | None = None,
+    ) -> None:
         """Copy topics of another bag, all by default, so that images and transforms play beside the labels.
 
         Args:
             path: The bag to copy from, of the same version of ROS.
             topics: Names of the topics.
             recover: As in `RosBag`.
+            span_ns: First and last time of reception, in nanoseconds, of what is copied, save of latched topics.
 
         Raises:
             UnsupportedFormatError: The bag is of the other version of ROS.
@@ -95,7 +104,10 @@ class LabelledBag(BagWriter):
             chosen = [name for name in source.topics if topics is None or name in topics]
             for name in chosen:
                 self.add_topic(source.topics[name], source.types)
-            for message in source.messages(chosen):
+            whole = [name for name in chosen if span_ns is None or source.topics[name].latched]
+            parts = [name for name in chosen if name not in whole]
+            start_ns, stop_ns = (None, None) if span_ns is None else (span_ns[0], span_ns[1] + 1)
+            for message in chain(source.messages(whole), source.messages(parts, start_ns, stop_ns)):
                 self.write_raw(message.topic, message.raw, message.received_ns)
         finally:
             source.close()

@@ -17,6 +17,8 @@ from ldls.io.ros.messages import Message, Topic, Types, serialize, standard_type
 STORAGES = {"rosbag2": "SQLITE3", "mcap": "MCAP"}
 KINDS = ("rosbag1", *STORAGES)
 """A ROS 1 file; a ROS 2 folder with SQLite storage; a ROS 2 folder with MCAP storage."""
+UNFINISHED_BAG = ".part"
+"""Ending of the folders in which bags are written."""
 METADATA_VERSION = 8
 """Of metadata.yaml: the last that ROS 2 Humble and Jazzy both read."""
 
@@ -50,7 +52,7 @@ class BagWriter:
         self._connections: dict[str, tuple[Any, str]] = {}
 
     def __enter__(self) -> Self:
-        self._folder = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.", suffix=".part", dir=self.path.parent))
+        self._folder = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.", suffix=UNFINISHED_BAG, dir=self.path.parent))
         self._writer = self._opened(self._folder / self.path.name)
         return self
 

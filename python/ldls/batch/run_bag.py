@@ -1,0 +1,102 @@
+"""The labelled bag of a run: one for all frames of a ROS bag, made of their stored results when they are done."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from ldls.batch.formats import RESULT, file_name
+from ldls.datasets import Source
+from ldls.datasets.rosbag import RosBag
+from ldls.errors import BatchError, FileFormatError, ParameterError
+from ldls.io import read_result
+from ldls.io.labelled_bag import TOPIC, LabelledBag
+from ldls.io.ros.bags import open_bag
+from ldls.io.ros.writer import UNFINISHED_BAG
+
+NAME = "labelled"
+MARGIN_NS = 1_000_000_000
+"""Images and transforms from so long before the first sweep to so long after the last are copied."""
+
+
+class RunBag:
+    """The labelled bag in the folder of a run; under its name it is whole.
+
+    Its labelled clouds have the stamps and frames of their sweeps, and are received when these were. Beside them are
+    the images, calibrations and transforms that the frames are made of, over the same time.
+
+    Attributes:
+        path: A folder, or a file for ROS 1.
+    """
+
+    def __init__(self, source: Source, folder: Path) -> None:
+        """The bag of the frames of `source` in `folder`.
+
+        Raises:
+            ParameterError: The source is no ROS bag.
+        """
+        if not isinstance(source, RosBag):
+            raise ParameterError(
+                f"formats: bag is a ROS bag with labels, made of one without; {source.path} is of kind {source.kind}; "
+                "leave it out, and write npz, pcd or ply"
+            )
+        self._source, self._folder = source, folder
+        self.path = folder / (NAME if source.storage != "rosbag1" else f"{NAME}.bag")
+
+    def check_place(self) -> None:
+        """Refuse to write where there is something else than an earlier bag of the run; sweep what was left of one.
+
+        Raises:
+            BatchError: There is.
+        """
+        for left in self._folder.glob(f".{self.path.name}.*{UNFINISHED_BAG}"):
+            shutil.rmtree(left, ignore_errors=True)
+        if self.path.exists() and self._n_clouds() is None:
+            raise BatchError(
+                f"{self.path}: is there and is no bag of labelled clouds; remove it, or choose another folder"
+            )
+
+    def write(self, frames: Sequence[str], *, anew: bool) -> None:
+        """Write the bag of the frames that are done, in the order of the source.
+
+        Args:
+            frames: Their names.
+            anew: True if some were done since the bag was written; otherwise one with as many frames stays.
+
+        Raises:
+            CorruptFileError: The source is damaged.
+            LimitError: A category id is beyond 255.
+            OSError: It cannot be written, as on a full disk; nothing of it stays.
+        """
+        if not anew and self._n_clouds() == len(frames):
+            return
+        if self.path.is_dir():
+            shutil.rmtree(self.path)
+        self.path.unlink(missing_ok=True)
+        if not frames:
+            return
+        done = set(frames)
+        chosen = [index for index, name in enumerate(self._source.names) if name in done]
+        received = [self._source.received_ns(index) for index in chosen]
+        with LabelledBag(self.path, self._source.storage) as bag:
+            bag.copy(
+                self._source.path,
+                topics=self._source.companions(),
+                recover=self._source.recover,
+                span_ns=(min(received) - MARGIN_NS, max(received) + MARGIN_NS),
+            )
+            for index, received_ns in zip(chosen, received, strict=True):
+                result = read_result(self._folder / file_name(self._source.names[index], RESULT))
+                bag.write(result, self._source.header(index), received_ns=received_ns)
+
+    def _n_clouds(self) -> int | None:
+        """Number of labelled clouds in the bag that is there; None without any."""
+        try:
+            bag = open_bag(self.path)
+        except (FileFormatError, FileNotFoundError):
+            return None
+        try:
+            return bag.topics[TOPIC].count if TOPIC in bag.topics else None
+        finally:
+            bag.close()

@@ -1,0 +1,166 @@
+"""The labelled bag of a run over a bag: whole or not there, with the labels of all frames."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+
+
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+import ldls
+from batch import runs
+from datasets import layouts
+from datasets.ros_samples import START_NS, STEP_NS, Recording
+from ldls import batch
+from ldls.datasets import RosBag
+from ldls.errors import BatchError, ParameterError
+from ldls.io.labelled_bag import LabelledBag
+from ldls.io.ros.point_cloud2 import decode
+
+KINDS = {"rosbag1": ("drive.bag", "labelled.bag"), "rosbag2": ("drive", "labelled"), "mcap": ("drive", "labelled")}
+
+
+class Ahead(Recording):
+    """A recording whose clouds lie before the camera, another for each sweep."""
+
+    def cloud(self, number):
+        ahead = np.random.default_rng(number).uniform([8, -2, -2], [12, 2, 2], (60 + number, 3)).astype(np.float32)
+        return {"x": ahead[:, 0], "y": ahead[:, 1], "z": ahead[:, 2], "intensity": ahead[:, 0] / 12}
+
+
+def recorded(folder, kind, sweeps=4):
+    """A bag with masks beside it."""
+    bag = Ahead(kind=kind, sweeps=sweeps).write(folder / KINDS[kind][0])
+    for number in range(sweeps):
+        path = folder / f"masks/{START_NS + number * STEP_NS}.json"
+        layouts.write_text(path, json.dumps(layouts.coco(20 + number)))
+    return bag
+
+
+def command(bag, out, *more):
+    return runs.resumed(["run", str(bag), "--masks", str(bag.parent / "masks"), "--out", str(out), *more])
+
+
+def messages(path, topic=None):
+    """(topic, time of reception, message) of a bag, by the library alone."""
+    store = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)
+    with AnyReader([path], default_typestore=store) as reader:
+        chosen = [c for c in reader.connections if topic in (None, c.topic)]
+        return [(c.topic, at, reader.deserialize(raw, c.msgtype)) for c, at, raw in reader.messages(chosen)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_labels_of_all_frames_come_back_with_stamps_and_frames(tmp_path, kind):
+    bag, out = recorded(tmp_path, kind), tmp_path / "out"
+    outcome = command(bag, out, "--formats", "bag")
+    assert outcome.exit_code == 0, outcome.output
+    path = out / KINDS[kind][1]
+    clouds = messages(path, "/points_labelled")
+    sweeps = messages(bag, "/points")
+    assert len(clouds) == len(sweeps) == 4
+    found = set()
+    for number, ((_, received, cloud), (_, expected, sweep)) in enumerate(zip(clouds, sweeps, strict=True)):
+        assert received == expected == START_NS + number * STEP_NS + 1_000_000
+        assert cloud.header.stamp == sweep.header.stamp
+        assert cloud.header.frame_id == sweep.header.frame_id == "lidar"
+        result = ldls.read_result(out / f"{START_NS + number * STEP_NS}.npz")
+        fields = decode(cloud).fields
+        assert fields.dtype.names == ("x", "y", "z", "intensity", "instance_id", "class_id", "probability", "rgb")
+        assert len(fields) == cloud.width * cloud.height == 60 + number
+        np.testing.assert_array_equal(fields["instance_id"], np.maximum(result.labels, 0))
+        np.testing.assert_array_equal(fields["class_id"], result.categories)
+        np.testing.assert_array_equal(fields["probability"], result.confidence)
+        np.testing.assert_array_equal(fields["x"], decode(sweep).fields["x"])
+        found |= set(fields["class_id"].tolist())
+    assert found == {0, 1, 3}
+    beside = {topic for topic, _, _ in messages(path)} - {"/points_labelled"}
+    assert beside == {"/camera/image_raw", "/camera/camera_info", "/tf_static"}
+    again = RosBag(path, points_topic="/points_labelled")
+    np.testing.assert_array_equal(again[2].images[0].read(), RosBag(bag)[2].images[0].read())
+
+
+def test_a_bag_that_is_whole_stays_and_one_that_lacks_frames_is_written_anew(tmp_path):
+    bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
+    assert command(bag, out, "--formats", "bag", "--frames", "1:3").exit_code == 0
+    assert [at for _, at, _ in messages(out / "labelled", "/points_labelled")] == [
+        START_NS + number * STEP_NS + 1_000_000 for number in (1, 2)
+    ]
+    inode = (out / "labelled/metadata.yaml").stat().st_ino
+    assert "2 of them by earlier runs" in command(bag, out, "--formats", "bag", "--frames", "1:3").output
+    assert (out / "labelled/metadata.yaml").stat().st_ino == inode
+    assert command(bag, out, "--formats", "bag,label").exit_code == 0
+    assert len(messages(out / "labelled", "/points_labelled")) == 4
+    # a run that was killed before the bag was written
+    shutil.rmtree(out / "labelled")
+    (out / ".labelled.abc.part").mkdir()
+    assert command(bag, out, "--formats", "bag").exit_code == 0
+    assert len(messages(out / "labelled", "/points_labelled")) == 4
+    assert not list(out.glob(".*"))
+
+
+def test_the_bag_of_a_finished_run_is_added(tmp_path):
+    bag, out = recorded(tmp_path, "rosbag1"), tmp_path / "out"
+    assert command(bag, out, "--formats", "label").exit_code == 0
+    assert command(bag, out, "--formats", "bag").exit_code == 0
+    assert len(messages(out / "labelled.bag", "/points_labelled")) == 4
+
+
+def test_frames_that_fail_are_not_in_the_bag(tmp_path):
+    bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
+    (tmp_path / f"masks/{START_NS + STEP_NS}.json").unlink()
+    assert command(bag, out, "--formats", "bag").exit_code == 2
+    assert len(messages(out / "labelled", "/points_labelled")) == 3
+
+
+def test_what_is_copied_lies_in_the_time_of_the_frames(tmp_path):
+    bag, out = recorded(tmp_path, "mcap", sweeps=40), tmp_path / "out"
+    assert command(bag, out, "--formats", "bag", "--frames", "0:2").exit_code == 0
+    images = [at for _, at, _ in messages(out / "labelled", "/camera/image_raw")]
+    assert len(images) == 12  # to a second after the last sweep
+
+
+def test_a_failure_leaves_no_bag(tmp_path, monkeypatch):
+    bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
+    write = LabelledBag.write
+
+    def full(self, result, header, **options):
+        if header.stamp_ns > START_NS:
+            raise OSError(28, "No space left on device", str(self.path))
+        write(self, result, header, **options)
+
+    monkeypatch.setattr(LabelledBag, "write", full)
+    outcome = command(bag, out, "--formats", "bag")
+    assert outcome.exit_code == 1 and "No space left on device" in outcome.output
+    assert not [path for path in out.iterdir() if "labelled" in path.name]
+    monkeypatch.undo()
+    assert command(bag, out, "--formats", "bag").exit_code == 0
+    assert len(messages(out / "labelled", "/points_labelled")) == 4
+
+
+def test_what_is_in_the_place_of_the_bag_and_none_of_ours_stays(tmp_path):
+    bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
+    layouts.write_text(out / "labelled/notes.txt", "the user's own")
+    settings = batch.RunSettings(masks=str(tmp_path / "masks"), formats=("bag",))
+    with pytest.raises(BatchError, match=r"labelled: is there and is no bag of labelled clouds"):
+        batch.run(bag, out, settings)
+    assert (out / "labelled/notes.txt").exists()
+    assert not list(out.glob("*.npz"))
+
+
+def test_other_sources_are_refused(few, tmp_path):
+    settings = batch.RunSettings(masks=str(few / "masks"), formats=("npz", "bag"))
+    with pytest.raises(ParameterError, match=r"bag is a ROS bag with labels, .* is of kind kitti-object; leave it"):
+        batch.run(few, tmp_path / "out", settings)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_single_frame_has_no_bag():
+    from ldls.batch.formats import check_formats
+
+    with pytest.raises(ParameterError, match="bag is of a whole run; label the ROS bag with `ldls run`"):
+        check_formats(["npz", "bag"])
