@@ -6,9 +6,11 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import ldls
-from datasets import layouts
+from datasets import layouts, ros_samples
 from ldls.cli import app
 from ldls.datasets.inspection import check_stamps, field_of_view_deg, sample
+from ldls.io.ros.messages import TRANSFORMS, Topic
+from ldls.io.ros.writer import BagWriter
 
 
 def run(*arguments):
@@ -121,3 +123,33 @@ def test_real_frames_look_sound(data_folder):
 def _stamps(drive, sensor, seconds):
     lines = [f"2011-09-26 13:02:{text}\n" for text in seconds]
     layouts.write_text(drive / sensor / "timestamps.txt", "".join(lines))
+
+
+def test_a_bag_of_clouds_alone_is_looked_at_and_told_what_it_lacks(tmp_path):
+    pytest.importorskip("rosbags")
+    bag = ros_samples.Recording(image_topics=(), info_topics=()).write(tmp_path / "clouds.bag")
+    done = CliRunner().invoke(app, ["info", str(bag)])
+    assert done.exit_code == 0, done.output
+    for topic, kind, count in (("/points", "PointCloud2", 3), ("/tf_static", "TFMessage", 1), ("/tf", "TFMessage", 0)):
+        (line,) = [line for line in done.output.splitlines() if f" {topic} " in line]
+        assert kind in line and line.split()[-2] == str(count)
+    assert "2.0% of its points are not finite" in done.output
+    assert "no images, so that `ldls run` has no camera to label the points by; record a topic of images" in done.output
+
+
+def test_the_topics_of_a_bag_are_listed(tmp_path):
+    pytest.importorskip("rosbags")
+    bag = ros_samples.Recording().write(tmp_path / "small.bag")
+    done = CliRunner().invoke(app, ["info", str(bag)])
+    assert "/camera/camera_info" in done.output and "sensor_msgs/msg/Image" in done.output
+    assert "no images, so that" not in done.output
+
+
+def test_a_bag_without_clouds_is_refused_with_its_topics(tmp_path):
+    pytest.importorskip("rosbags")
+    with BagWriter(tmp_path / "other.bag", "rosbag1") as bag:
+        bag.add_topic(Topic("/tf", TRANSFORMS, 0))
+        bag.write_message("/tf", ros_samples.transforms(bag.types, (("base", "lidar"),), 5), 5)
+    done = CliRunner().invoke(app, ["info", str(tmp_path / "other.bag")])
+    assert done.exit_code == 1
+    assert "no topics of PointCloud2, so none is guessed; the bag has /tf (tf2_msgs/msg/TFMessage, 1)" in done.output

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 LOOKED_AT = 8
 """Frames that are read without --all."""
+NO_IMAGES = (
+    "no images, so that `ldls run` has no camera to label the points by; record a topic of images and its camera_info "
+    "beside the clouds, or give masks and a camera of your own: ldls.segment(frame.points, masks, camera)"
+)
 SHOWN = 30
 """Findings that are listed."""
 
@@ -47,23 +51,24 @@ def info(
 
     Prints kind, time, cameras, points and truth, then whatever is not as it should be: files that cannot be read,
     clouds without points, cameras that see none, images of another size than their calibration, gaps and steps back in
-    time. Exit status 1 if something is broken.
+    time. Exit status 1 if something is broken. Of a bag all topics are listed, and one without images is looked at too.
 
     Example: ldls info 2011_09_26/2011_09_26_drive_0001_sync --picture check.png
     """
-    from ldls.datasets import open_source
     from ldls.datasets.inspection import check_stamps, inspect, sample
 
-    frames = open_source(source, kind=dataset, **parse_options(option or []))
+    frames = opened(source, dataset, parse_options(option or []))
     indices = list(range(len(frames))) if every else sample(len(frames), LOOKED_AT)
     facts = [inspect(frames, at) for at in progress(indices, len(indices), "looking at frames")]
     stamps = stamps_of(frames)
     findings = [finding for each in facts for finding in each.findings] + check_stamps(frames.names, stamps)
     screen = console()
     screen.print(summary_table(frames, facts, stamps))
-    cameras = camera_table(frames, facts)
-    if cameras is not None:
-        screen.print(cameras)
+    for table in (topic_table(frames), camera_table(frames, facts)):
+        if table is not None:
+            screen.print(table)
+    if not frames.camera_names:
+        screen.print(NO_IMAGES, highlight=False, soft_wrap=True)
     screen.print(
         finding_table(findings) if findings else f"looked at {len(facts)} of {len(frames)} frames, found nothing wrong"
     )
@@ -72,6 +77,39 @@ def info(
         screen.print(f"wrote {picture}", highlight=False, soft_wrap=True)
     if any(finding.broken for finding in findings):
         raise typer.Exit(1)
+
+
+def opened(path: Path, dataset: str | None, options: dict[str, Any]) -> Source:
+    """The source at a path; of a bag without a topic of images the clouds alone.
+
+    Raises:
+        LdlsError: It is no source.
+    """
+    from ldls.datasets import open_source
+    from ldls.datasets.registry import guess_kind
+    from ldls.datasets.rosbag import RosBag, has_images
+
+    is_bag = path.exists() and (guess_kind(path) if dataset is None else dataset) == RosBag.kind
+    if is_bag and "image_topics" not in options and not has_images(path, recover=bool(options.get("recover"))):
+        options = {**options, "image_topics": ()}
+    return open_source(path, kind=dataset, **options)
+
+
+def topic_table(source: Source) -> Table | None:
+    """Name, type and number of messages of each topic of a bag; None of other sources."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from ldls.datasets.rosbag import RosBag
+
+    if not isinstance(source, RosBag):
+        return None
+    table = Table(title="topics")
+    for heading in ("topic", "type", "messages"):
+        table.add_column(heading, justify="right" if heading == "messages" else "left", overflow="fold")
+    for topic in source.all_topics:
+        table.add_row(escape(topic.name), escape(topic.type), f"{topic.count:,}")
+    return table
 
 
 def stamps_of(source: Source) -> tuple[float | None, ...]:

@@ -21,7 +21,17 @@ from ldls.errors import CalibrationError, ParameterError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
 from ldls.io.ros.images import decode_compressed, decode_image
-from ldls.io.ros.messages import COMPRESSED_IMAGE, NANOSECONDS, OLD_TRANSFORMS, TRANSFORMS, Header, Message, seconds
+from ldls.io.ros.messages import (
+    COMPRESSED_IMAGE,
+    IMAGE,
+    NANOSECONDS,
+    OLD_TRANSFORMS,
+    TRANSFORMS,
+    Header,
+    Message,
+    Topic,
+    seconds,
+)
 from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud, decode as decode_points
 
 STATIC_TRANSFORMS, MOVING_TRANSFORMS = "/tf_static", "/tf"
@@ -135,6 +145,11 @@ class RosBag:
 
     def __iter__(self) -> Iterator[Frame]:
         return (self[index] for index in range(len(self)))
+
+    @property
+    def all_topics(self) -> tuple[Topic, ...]:
+        """Every topic of the bag, by name."""
+        return tuple(topic for _, topic in sorted(self._bag.topics.items()))
 
     def header(self, index: int) -> Header:
         """Stamp, to the nanosecond, and frame of a sweep, for what is written about it."""
@@ -256,6 +271,15 @@ class RosBag:
 
     def __repr__(self) -> str:
         return f"RosBag({str(self.path)!r}, {len(self)} frames, {self.topics})"
+
+
+def has_images(path: Path, *, recover: bool = False) -> bool:
+    """True if a bag has a topic of images; errors as of `RosBag`."""
+    bag = open_bag(path, recover=recover)
+    try:
+        return any(topic.type in (IMAGE, COMPRESSED_IMAGE) for topic in bag.topics.values())
+    finally:
+        bag.close()
 
 
 def _camera_name(topic: str) -> str:
