@@ -743,7 +743,7 @@ PARSERS: dict[str, Parser] = {
     ),
     "masks SAM": Parser(("a.json",), sam, ldls.read_masks, text=True, gentle=0.5),
     "masks YOLO": Parser(("a.txt",), texts(YOLO), lambda path: ldls.read_masks(path, image_size=(60, 80)), text=True),
-    "masks Cityscapes": Parser(("a_instanceIds.png",), cityscapes, ldls.read_masks),
+    "masks Cityscapes": Parser(("a_instanceIds.png",), cityscapes, ldls.read_masks, gentle=0.4),
     "camera OpenCV XML": Parser(("a.xml",), texts(XML), read_camera(T_camera_lidar=T_CAMERA_LIDAR), text=True),
     "extrinsic": Parser(("a.json",), texts(EXTRINSIC, EXTRINSIC_JSON), as_extrinsic, text=True),
     "masks .npz": Parser(

@@ -72,7 +72,8 @@ def from_quaternion(place: str, wxyz: Matrix) -> Matrix:
     Raises:
         CalibrationError: Its length is not 1.
     """
-    length = float(np.linalg.norm(wxyz))
+    with np.errstate(over="ignore"):  # of numbers that are no rotation's
+        length = float(np.linalg.norm(wxyz))
     if not abs(length - 1) <= ROTATION_LIMIT:
         raise CalibrationError(f"{place}: quaternion {wxyz.tolist()} has length {length:.6g}, expected 1 (w x y z)")
     w, x, y, z = wxyz / length

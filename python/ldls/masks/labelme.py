@@ -72,7 +72,9 @@ def _polygon(shape: Mapping[str, Any]) -> list[float]:
 
 def _circle(center: NDArray[np.float64], edge: NDArray[np.float64]) -> NDArray[np.float64]:
     angles = np.linspace(0, 2 * np.pi, CIRCLE_CORNERS, endpoint=False)
-    around: NDArray[np.float64] = center + np.hypot(*(edge - center)) * np.column_stack(
-        [np.cos(angles), np.sin(angles)]
-    )
+    # what is too large becomes infinite, and is refused with the polygon
+    with np.errstate(over="ignore", invalid="ignore"):
+        around: NDArray[np.float64] = center + np.hypot(*(edge - center)) * np.column_stack(
+            [np.cos(angles), np.sin(angles)]
+        )
     return around
