@@ -22,7 +22,8 @@ def read(path: Path) -> NDArray[np.float64]:
     """(N, >= 3) float64 points of a text file, in its own units.
 
     A first line with the names x, y and z, behind a comment sign or not, says which columns are meant; without one all
-    columns are taken as they stand, x y z first. Other lines that begin with # or // are comments.
+    columns are taken as they stand, x y z first, up to three that are colours (whole numbers to 255) or normals. Other
+    lines that begin with # or // are comments.
 
     Raises:
         TruncatedFileError: The file is empty, its last line has too few cells, or it ends with its last number, without
@@ -62,7 +63,27 @@ def _parse_nameless(rows: list[Row]) -> NDArray[np.float64]:
         raise CorruptFileError(f"line {number}: expected x y z or their names, got {first.strip()[:80]!r}")
     if n_columns > MAX_COLUMNS:
         raise UnsupportedFormatError(f"line {number}: {n_columns} columns, expected at most {MAX_COLUMNS}")
-    return read_rows(rows, range(n_columns), delimiter)
+    return _without_colours(read_rows(rows, range(n_columns), delimiter))
+
+
+def _without_colours(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns up to colours or normals, which are no intensity: three side by side behind x y z, or behind a fourth."""
+    for start in (4, 3):
+        beside = columns[:, start : start + 3]
+        if beside.shape[1] == 3 and len(beside) and (_are_colours(beside) or _are_normals(beside)):
+            return columns[:, :start]
+    return columns
+
+
+def _are_colours(values: NDArray[np.float64]) -> bool:
+    """True for whole numbers from 0 to 255, in each column some larger than numbers of classes or returns."""
+    are_bytes = (values >= 0) & (values <= 255) & (values == np.floor(values))
+    return bool(are_bytes.all() and (values > 32).any(axis=0).all())
+
+
+def _are_normals(values: NDArray[np.float64]) -> bool:
+    """True for vectors of length 1."""
+    return bool((np.abs(np.linalg.norm(values, axis=1) - 1) < 0.01).all())
 
 
 def _delimiter(line: str) -> str | None:
