@@ -478,6 +478,17 @@ LABELME = json.dumps(
         "imageWidth": 80,
     }
 )
+CITYSCAPES_POLYGONS = json.dumps(
+    {
+        "objects": [
+            {"label": "road", "polygon": [[0, 0], [80, 0], [80, 60]]},
+            {"label": "car", "polygon": [[1, 2], [9, 3.5], [4, 8]]},
+            {"label": "object--vehicle--bus", "polygon": [[11, 2], [19, 3.5], [14, 8]]},
+        ],
+        "imgHeight": 60,
+        "imgWidth": 80,
+    }
+)
 YOLO = "2 0.25 0.25 0.5 0.25 0.5 0.5\n0 0.1 0.1 0.2 0.1 0.2 0.3 0.1 0.3 0.75\n"
 
 
@@ -733,7 +744,7 @@ PARSERS: dict[str, Parser] = {
         ("a.yaml",), texts(CAMERA_INFO_YAML), read_camera(T_camera_lidar=T_CAMERA_LIDAR), text=True
     ),
     "masks .json": Parser(("a.json",), coco, ldls.read_masks, text=True, gentle=0.5),
-    "masks labelme": Parser(("a.json",), texts(LABELME), ldls.read_masks, text=True, gentle=0.5),
+    "masks labelme": Parser(("a.json",), texts(LABELME, CITYSCAPES_POLYGONS), ldls.read_masks, text=True, gentle=0.5),
     "masks panoptic": Parser(
         ("a.json", "a.png"),
         panoptic_masks,

@@ -64,6 +64,31 @@ def test_shapes_of_labelme(tmp_path):
         ldls.read_masks(tmp_path / "a.json")
 
 
+@pytest.mark.parametrize(
+    ("size", "thing", "surface", "name"),
+    [
+        pytest.param({"imgHeight": 60, "imgWidth": 80}, "car", "road", "car", id="Cityscapes"),
+        pytest.param({"imgHeight": 60, "imgWidth": 80}, "caravan", "cargroup", "caravan", id="Cityscapes' own class"),
+        pytest.param(
+            {"height": 60, "width": 80}, "object--vehicle--car", "construction--flat--road", "car", id="Mapillary"
+        ),
+        pytest.param({"height": 60, "width": 80}, "human--person--individual", "nature--sky", "person", id="v2"),
+        pytest.param({"height": 60, "width": 80}, "object--street-light", "void--static", "street light", id="other"),
+    ],
+)
+def test_polygons_of_cityscapes_and_mapillary(tmp_path, size, thing, surface, name):
+    whole = [[0, 0], [80, 0], [80, 60], [0, 60]]
+    corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
+    objects = [{"label": surface, "polygon": whole}, {"label": thing, "polygon": corners}]
+    (tmp_path / "a.json").write_text(json.dumps(size | {"objects": objects}))
+    masks = ldls.read_masks(tmp_path / "a.json")
+    np.testing.assert_array_equal(pixels(masks), [SQUARE])
+    assert [mask.name for mask in masks] == [name]
+    (tmp_path / "a.json").write_text(json.dumps(size | {"objects": [{"label": thing, "polygon": corners[:2]}]}))
+    with pytest.raises(ldls.MaskError, match=r"a\.json: object 0: polygon of 2 points"):
+        ldls.read_masks(tmp_path / "a.json")
+
+
 @pytest.mark.parametrize("wrapped", [False, True], ids=["list", "SA-1B"])
 def test_records_of_segment_anything(tmp_path, wrapped):
     rle = ldls.InstanceMasks.from_array(SQUARE[None]).to_coco()["annotations"][0]["segmentation"]
@@ -83,6 +108,11 @@ def test_a_folder_of_one_png_an_instance(tmp_path):
         )
     masks = ldls.read_masks(tmp_path)
     np.testing.assert_array_equal(pixels(masks), [SQUARE[:, ::-1], SQUARE])
+    (tmp_path / "metadata.csv").write_text("id,area,predicted_iou\n2,300,1.01\n10,300,0.875\n")
+    assert ldls.read_masks(tmp_path).scores.tolist() == [1.0, 0.875]
+    (tmp_path / "metadata.csv").write_text("id,area,predicted_iou\n2,300,1.01\n")
+    with pytest.raises(ldls.MaskError, match=r"metadata\.csv: has no row of 10\.png"):
+        ldls.read_masks(tmp_path)
     with pytest.raises(ldls.MaskError, match="a folder without .png"):
         (tmp_path / "empty").mkdir()
         ldls.read_masks(tmp_path / "empty")
@@ -169,3 +199,9 @@ def test_names_of_yolo_lie_beside_its_labels(tmp_path, name, text, above):
     (labels.parents[above - 1] / name if above else labels / name).write_text(text)
     masks = ldls.read_masks(labels / "a.txt", image_size=(60, 80))
     assert [masks.names[each] for each in masks.categories.tolist()] == ["forklift", "person"]
+
+
+def test_xml_of_cvat_is_refused_with_what_it_exports_besides(tmp_path):
+    (tmp_path / "annotations.xml").write_text("<annotations/>")
+    with pytest.raises(ldls.UnsupportedFormatError, match=r"annotations\.xml: cannot read.*of CVAT, export COCO 1\.0"):
+        ldls.read_masks(tmp_path / "annotations.xml")

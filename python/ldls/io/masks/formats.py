@@ -49,10 +49,10 @@ def read_masks(
     """Instance masks of a file; its suffix tells the format.
 
     Args:
-        path: `.json` (COCO, COCO panoptic beside its PNG, labelme, Segment Anything), `.png` (instance numbers; those
-            of Cityscapes by the name _instanceIds.png), `.npz` (of ldls, or of the LDLS research code), `.npy` (stack
-            of masks), `.txt` (polygons of YOLO, or KITTI label_2, whose boxes become masks), or a folder of one PNG
-            an instance.
+        path: `.json` (COCO, COCO panoptic beside its PNG, polygons of labelme, Cityscapes or Mapillary, Segment
+            Anything), `.png` (instance numbers; those of Cityscapes by the name _instanceIds.png), `.npz` (of ldls, or
+            of the LDLS research code), `.npy` (stack of masks), `.txt` (polygons of YOLO, or KITTI label_2, whose boxes
+            become masks), or a folder of one PNG an instance.
         image_size: (height, width) in pixels; `.txt` needs it, and others must agree with it.
         image_id: Which image of a `.json` with several.
         instance_axis: Axis of a `.npy` that counts the masks, 0 or -1, where sizes do not tell.
@@ -108,5 +108,6 @@ def write_masks(path: str | PathLike[str], masks: InstanceMasks, **options: Any)
 def _of_suffix(path: Path, known: Mapping[str, _Function], verb: str) -> _Function:
     function = known.get(path.suffix.lower())
     if function is None:
-        raise UnsupportedFormatError(f"{path}: cannot {verb} {path.suffix!r} masks, expected {', '.join(known)}")
+        hint = "; of CVAT, export COCO 1.0" if path.suffix.lower() == ".xml" else ""
+        raise UnsupportedFormatError(f"{path}: cannot {verb} {path.suffix!r} masks, expected {', '.join(known)}{hint}")
     return function

@@ -1,4 +1,4 @@
-"""JSON files of masks: the content tells COCO, COCO panoptic, labelme and Segment Anything apart."""
+"""JSON files of masks: the content tells COCO, COCO panoptic, labelled polygons and Segment Anything apart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from ldls.io.files import open_file
 from ldls.io.masks import panoptic_png
 from ldls.io.masks.coco_json import MAX_FILE_BYTES
-from ldls.masks import InstanceMasks, adapters, coco, labelme
+from ldls.masks import InstanceMasks, adapters, coco, labelled_polygons
 
 
 def read(
@@ -49,7 +49,9 @@ def parse(
 ) -> InstanceMasks:
     """The masks of one image of the parsed `content` of the file `path`; arguments and errors as of `read`."""
     if isinstance(content, dict) and "shapes" in content:
-        return InstanceMasks(**labelme.arguments(content, names=names))
+        return InstanceMasks(**labelled_polygons.from_shapes(content, names=names))
+    if isinstance(content, dict) and "objects" in content:
+        return InstanceMasks(**labelled_polygons.from_objects(content, names=names))
     if isinstance(content, dict) and panoptic_png.is_panoptic(content):
         return panoptic_png.read(path, content, image_id=image_id)
     if _is_sam(_records(content)):

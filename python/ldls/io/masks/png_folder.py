@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -10,8 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ldls.errors import MaskError, within
+from ldls.io.files import open_file
 from ldls.io.images import read_image
 from ldls.masks import InstanceMasks
+
+METADATA = "metadata.csv"
+MAX_BYTES = 1 << 24
 
 
 def read(
@@ -26,16 +31,28 @@ def read(
     Args:
         path: Folder.
         categories: (M,) category ids; without them all are category 1, "object".
-        scores: (M,) scores from 0 to 1; all 1 without them.
+        scores: (M,) scores from 0 to 1; without them `predicted_iou` of the script's metadata.csv, or all 1.
         names: Name of each category id.
 
     Raises:
-        MaskError: There is no PNG, or they are of different sizes or no masks.
+        MaskError: There is no PNG, or they are of different sizes or no masks, or metadata.csv is of others.
     """
     files = sorted(Path(path).glob("*.png"), key=lambda file: (len(file.stem), file.stem))
     if not files:
         raise MaskError(f"{path}: a folder without .png, expected one an instance")
+    if scores is None and (Path(path) / METADATA).is_file():
+        scores = _scores(Path(path) / METADATA, [file.stem for file in files])
     with within(path):
         # one at a time: only run lengths are kept
         pixels = (np.asarray(read_image(file)).max(axis=-1) > 127 for file in files)
         return InstanceMasks.from_array(pixels, categories=categories, scores=scores, names=names)
+
+
+def _scores(path: Path, stems: Sequence[str]) -> list[float]:
+    """The predicted IoU of each mask; those of the network may lie a little above 1."""
+    with open_file(path, "text file", limit=MAX_BYTES) as file:
+        rows = {row["id"]: row for row in csv.DictReader(file.text().splitlines())}
+        missing = [stem for stem in stems if stem not in rows]
+        if missing:
+            raise MaskError(f"has no row of {missing[0]}.png; delete it, or give scores=")
+        return [min(float(rows[stem]["predicted_iou"]), 1.0) for stem in stems]

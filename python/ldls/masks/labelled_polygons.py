@@ -1,0 +1,127 @@
+"""Polygons with a label each, as parsed JSON: labelme's shapes, and the objects of Cityscapes and Mapillary Vistas.
+
+Sources: https://github.com/wkentaro/labelme, https://github.com/mcordts/cityscapesScripts and
+https://www.mapillary.com/dataset/vistas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import ldls._ldls as _ldls
+from ldls.categories import COCO_NAMES, category_ids
+from ldls.errors import CorruptFileError, MaskError, within
+from ldls.masks.pixels import checked_size
+
+CIRCLE_CORNERS = 64
+
+
+THINGS = frozenset(("person", "rider", "car", "truck", "bus", "caravan", "trailer", "train", "motorcycle", "bicycle"))
+"""Cityscapes' classes that come one by one; its others are surfaces, and groups of so many."""
+MAPILLARY_THINGS = ("animal", "human", "object")
+"""What the labels of Mapillary's things begin with: object--vehicle--car."""
+
+
+def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:
+    """Arguments of `InstanceMasks` from labelme's JSON of one image.
+
+    Shapes of one label that share a group_id are parts of one instance. Labels with the name of one of COCO's
+    categories, or of `names`, get its id; others 100 and their place in the alphabet.
+
+    Args:
+        content: The parsed JSON.
+        names: Name of each category id, for labels that COCO does not know.
+
+    Raises:
+        MaskError: A shape that covers nothing, such as a line.
+        CorruptFileError: It is not labelme's.
+    """
+    size = checked_size((content.get("imageHeight"), content.get("imageWidth")))
+    parts: dict[tuple[str, object], list[list[float]]] = {}
+    for i, shape in enumerate(_listed(content, "shapes")):
+        label, group = str(shape.get("label")), shape.get("group_id")
+        with within(f"shape {i}"):
+            parts.setdefault((label, ("alone", i) if group is None else group), []).append(_polygon(shape))
+    return _arguments(size, [label for label, _ in parts], list(parts.values()), names)
+
+
+def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:
+    """Arguments of `InstanceMasks` from Cityscapes' or Mapillary's polygons of one image; surfaces are background.
+
+    Categories are as of `from_shapes`; of a label such as object--vehicle--car the last part that COCO knows counts.
+
+    Args:
+        content: The parsed JSON.
+        names: Name of each category id, for labels that COCO does not know.
+
+    Raises:
+        MaskError: A polygon of fewer than three points.
+        CorruptFileError: It is of neither.
+    """
+    height, width = (content.get(f"img{side}", content.get(side.lower())) for side in ("Height", "Width"))
+    labels, polygons = [], []
+    for i, each in enumerate(_listed(content, "objects")):
+        parts = str(each.get("label")).split("--")
+        if each.get("deleted") or not (parts[0] in THINGS if len(parts) == 1 else parts[0] in MAPILLARY_THINGS):
+            continue
+        with within(f"object {i}"):
+            polygons.append([_polygon({"points": each.get("polygon", ())})])
+        plain = [part.replace("-", " ") for part in parts]
+        known = (part for part in reversed(plain) if part in COCO_NAMES.values())
+        labels.append(next(known, plain[-1]))
+    return _arguments(checked_size((height, width)), labels, polygons, names)
+
+
+def _listed(content: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
+    listed = content[key]
+    if not isinstance(listed, list) or not all(isinstance(each, dict) for each in listed):
+        raise CorruptFileError(f"expected {key} to be a list of objects")
+    return listed
+
+
+def _arguments(
+    size: tuple[int, int],
+    labels: Sequence[str],
+    polygons: Sequence[list[list[float]]],
+    names: Mapping[int, str] | None,
+) -> dict[str, Any]:
+    given = {name: category for category, name in (names or {}).items()}
+    others = sorted({label for label in labels if label not in given})
+    ids, own = category_ids(dict(enumerate(others)))
+    of_label = {label: ids[index] for index, label in enumerate(others)} | given
+    return {
+        "rles": [_ldls.Rle.from_polygons(*size, each) for each in polygons],
+        "image_size": size,
+        "categories": np.array([of_label[label] for label in labels], np.int64),
+        "names": COCO_NAMES | own | dict(names or {}),
+    }
+
+
+def _polygon(shape: Mapping[str, Any]) -> list[float]:
+    kind = shape.get("shape_type") or "polygon"
+    points = np.array(shape.get("points", ()), np.float64)
+    if points.ndim != 2 or points.shape[1:] != (2,) or not np.isfinite(points).all():
+        raise CorruptFileError("points: expected a list of x y")
+    if kind == "rectangle" and len(points) == 2:
+        (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
+        points = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+    elif kind == "circle" and len(points) == 2:
+        points = _circle(*points)
+    elif kind != "polygon" or len(points) < 3:
+        raise MaskError(f"{kind} of {len(points)} points, expected a polygon, a rectangle or a circle")
+    corners: list[float] = points.ravel().tolist()
+    return corners
+
+
+def _circle(center: NDArray[np.float64], edge: NDArray[np.float64]) -> NDArray[np.float64]:
+    angles = np.linspace(0, 2 * np.pi, CIRCLE_CORNERS, endpoint=False)
+    # what is too large becomes infinite, and is refused with the polygon
+    with np.errstate(over="ignore", invalid="ignore"):
+        around: NDArray[np.float64] = center + np.hypot(*(edge - center)) * np.column_stack(
+            [np.cos(angles), np.sin(angles)]
+        )
+    return around
