@@ -41,6 +41,7 @@ from ldls.io.images import read_image_size
 from ldls.io.labels import read_kitti_objects, read_labeling, write_annotations, write_labeling
 from ldls.io.labels.labeling_npz import read_confidence_npz
 from ldls.io.labels.squeezeseg import read_squeezeseg_ranges
+from ldls.io.masks.data_set import MaskDataSet
 from ldls.io.ros.bags import Bag, open_bag
 from ldls.io.ros.images import decode_compressed, decode_image
 from ldls.io.ros.messages import (
@@ -57,6 +58,7 @@ from ldls.io.ros.messages import (
 )
 from ldls.io.ros.point_cloud2 import decode, encode
 from ldls.labeling import Labeling
+from ldls.segmentation.object_rows import COLUMNS
 from ldls.segmenters.onnx_file import read_onnx
 from mask_samples import of_coco, random_masks
 from segmenters import graphs
@@ -467,6 +469,19 @@ def coco(folder):
     return [[(folder / name).read_bytes()] for name in ("a.json", "b.json")] + [[json.dumps(polygons).encode()]]
 
 
+def data_sets(folder):
+    """Data sets of two images each, with the annotations first and last."""
+    first, second = MASKS[0].to_coco(image_id=1, file_name="a/1.png"), MASKS[1].to_coco(image_id=2, file_name="2.jpg")
+    both = {key: first[key] + second[key] for key in ("annotations", "images")}
+    both["categories"] = first["categories"]
+    return [[json.dumps(both).encode()], [json.dumps(dict(reversed(both.items())), indent=1).encode()]]
+
+
+def read_data_set(path):
+    opened = MaskDataSet(path)
+    return [opened.masks(image_id) for image_id in opened.names]
+
+
 LABELME = json.dumps(
     {
         "shapes": [
@@ -675,7 +690,8 @@ def record(name):
         "frame": name,
         "files": {f"{name}.label": [400, "5d" * 32]},
         "inputs": {f"velodyne/{name}.bin": [1600, 1_792_000_000, "a7" * 32], f"masks/{name}.json": None},
-        "objects": {"car": 2, "person": 1},
+        "images": [["image_2", 60, 80]],
+        "objects": [dict.fromkeys(COLUMNS, 1)],
         "nothing_in_view": None,
     }
 
@@ -744,6 +760,7 @@ PARSERS: dict[str, Parser] = {
         ("a.yaml",), texts(CAMERA_INFO_YAML), read_camera(T_camera_lidar=T_CAMERA_LIDAR), text=True
     ),
     "masks .json": Parser(("a.json",), coco, ldls.read_masks, text=True, gentle=0.5),
+    "masks of all images .json": Parser(("a.json",), data_sets, read_data_set, text=True, gentle=0.5),
     "masks labelme": Parser(("a.json",), texts(LABELME, CITYSCAPES_POLYGONS), ldls.read_masks, text=True, gentle=0.5),
     "masks panoptic": Parser(
         ("a.json", "a.png"),
