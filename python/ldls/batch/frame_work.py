@@ -206,7 +206,7 @@ class FrameWork:
                 "frame": work.name,
                 "files": {**work.kept, **written},
                 "inputs": _known(work),
-                "images": objects.images,
+                "images": [list(image) for image in objects.images],
                 "objects": objects.rows,
                 "nothing_in_view": nothing_in_view(result),
             }
