@@ -4,6 +4,7 @@ Names and rooms are imported when they are first used, so that the command line 
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -82,24 +83,22 @@ _NAMES = {
     "ldls.view": ("SeenView", "View"),
 }
 """The public names, by the module that they come from."""
-_ROOMS = ("batch", "datasets", "evaluation", "segmenters", "simulation", "stages", "viewing")
-"""Modules that need no import of their own."""
 _HOMES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = sorted([*_HOMES, "stages"])
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public name
-    if name in _ROOMS:
+    if name in _HOMES:
+        value = globals()[name] = getattr(import_module(_HOMES[name]), name)
+        return value
+    if not name.startswith("__") and find_spec(f"ldls.{name}") is not None:
         return import_module(f"ldls.{name}")
-    if name not in _HOMES:
-        raise AttributeError(f"module 'ldls' has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_HOMES[name]), name)
-    return value
+    raise AttributeError(f"module 'ldls' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_ROOMS})
+    return sorted({*globals(), *__all__})
 
 
 def _html_of(result: "Segmentation") -> str:

@@ -235,7 +235,7 @@ class RosBag:
         """The messages of a topic of transforms, under any robot's prefix."""
         kinds = (TRANSFORMS, OLD_TRANSFORMS)
         topics = [t.name for t in self._bag.topics.values() if t.type in kinds and t.name.endswith(name)]
-        for message in self._bag.messages(topics):
+        for message in self._bag.read_all(topics):
             yield self._bag.decode(message.topic, message.raw)
 
     def _pixels(self, image: StampedMessage, image_size: tuple[int, int] | None) -> NDArray[np.uint8]:

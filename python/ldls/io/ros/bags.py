@@ -64,11 +64,22 @@ class Bag:
     ) -> Iterator[RawMessage]:
         """The messages of some topics in the order of their reception, all or those in [start_ns, stop_ns).
 
+        Other threads must not read meanwhile.
+
         Raises:
             CorruptFileError: The bag is damaged.
         """
         with _plain_errors(self.path):
             yield from self._read(topics, start_ns, stop_ns)
+
+    def read_all(self, topics: Collection[str]) -> list[RawMessage]:
+        """The messages of some topics in the order of their reception, read while no other thread does.
+
+        Raises:
+            CorruptFileError: The bag is damaged.
+        """
+        with self._lock:
+            return list(self.messages(topics))
 
     def read(self, topic: str, received_ns: int, rank: int = 0) -> bytes:
         """The message that is number `rank` among those of a topic received at that moment.
