@@ -13,7 +13,7 @@ import pytest
 
 import ldls
 from datasets import layouts
-from ldls.datasets import open_source
+from ldls.datasets import RosBag, open_source
 from ldls.io.images import read_image_size
 
 
@@ -71,6 +71,22 @@ def test_own_camera_own_lidar(follow, tmp_path, monkeypatch):
     np.testing.assert_allclose(names["T_camera_lidar"], right.T_camera_lidar, atol=1e-12)
     assert names["camera"].image_size == (375, 1242)
     assert len((tmp_path / "labels/objects.csv").read_text().splitlines()) == 1 + 15
+
+
+def test_a_ros_bag(follow, tmp_path):
+    pytest.importorskip("rosbags")
+    pytest.importorskip("embreex")
+    done = follow("ros.md")
+    assert "/velodyne_points" in done.stdout
+    assert "20 of 20 frames done" in done.stdout
+    with RosBag(tmp_path / "robot/labels/labelled", points_topic="/points_labelled") as labelled:
+        assert len(labelled) == 20
+        names = labelled.names
+        classes = labelled.cloud(0).fields["class_id"]
+    np.testing.assert_array_equal(classes, ldls.read_result(tmp_path / f"robot/labels/{names[0]}.npz").categories)
+    assert len(list((tmp_path / "robot/labels").glob("*.png"))) == 20
+    with (tmp_path / "robot/labels/objects.csv").open() as file:
+        assert {row["frame"] for row in csv.DictReader(file)} == {*names}
 
 
 def test_nuscenes_like_data(follow, tmp_path):
