@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from os import PathLike
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.checks import as_array
-from ldls.errors import DtypeError, ShapeError
+from ldls.errors import DtypeError, InputError, ShapeError
 
 MAX_COLUMNS = 64
 """Wider arrays are clouds lying on their side."""
@@ -23,10 +25,13 @@ def as_points(points: ArrayLike) -> Points:
     """`points` as a C-contiguous (N, >= 3) array of float32 or float64, copied only where it must be.
 
     Raises:
+        InputError: It is the name of a file.
         DtypeError: The values are not float32 or float64, or are masked.
         ShapeError: The array is not (N, >= 3).
         LimitError: More rows than labels can be numbered for; before any copy.
     """
+    if isinstance(points, str | PathLike):
+        raise InputError(f"points: got the text {str(points)[:80]!r}, expected an array; ldls.read_points reads files")
     array = as_array("points", points)
     if array.dtype.kind != "f" or array.dtype.itemsize not in (4, 8):
         fix = "a plain array of rows" if array.dtype.kind in "OV" else "points.astype(numpy.float32)"

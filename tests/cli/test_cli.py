@@ -193,3 +193,61 @@ def test_a_camera_of_opencv_and_the_lidar_beside_it_give_the_same(demo, tmp_path
     if command == "segment":
         with np.load(folder / "demo.npz") as expected, np.load(tmp_path / "points.npz") as stored:
             np.testing.assert_array_equal(stored["labels"], expected["labels"])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        pytest.param(
+            {"calib": "points.bin"},
+            "of a calibration; is it one?",
+            id="cloud as calibration",
+        ),
+        pytest.param({"masks": "image.png"}, "colours do not tell which instance", id="image as masks"),
+        pytest.param({"points": "image.png"}, "cannot read '.png' files, expected .bin", id="image as points"),
+        pytest.param({"points": "calib.txt"}, "calib.txt: line 1: expected a number", id="calibration as points"),
+    ],
+)
+def test_files_in_the_wrong_place_are_named(demo, tmp_path, words, message):
+    files = {option: demo[0] / "input" / name for option, name in words.items()}
+    outcome = run(app, arguments(demo[0], tmp_path / "out", **files))
+    assert outcome.exit_code == 1
+    assert message in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", [["view"], ["explain", "5"]], ids=["view", "explain"])
+def test_labels_without_points_are_refused_with_what_is_needed(demo, command):
+    outcome = run(app, [*command, str(demo[0] / "demo.label")])
+    assert outcome.exit_code == 1
+    assert "demo.label: expected the .npz of a result" in outcome.stderr
+
+
+def test_polygons_take_the_size_of_the_image_from_the_calibration(demo, tmp_path):
+    (tmp_path / "a.txt").write_text("2 0.275 0.429 0.208 0.669 0.370 0.611 0.342 0.429\n")
+    (tmp_path / "camera.json").write_text(
+        '{"K": [721.54, 0, 609.56, 0, 721.54, 172.85, 0, 0, 1], "D": [], "image_width": 1242, "image_height": 375}'
+    )
+    (tmp_path / "T.txt").write_text("0 -1 0 0.06 0 0 -1 -0.08 1 0 0 -0.27")
+    words = arguments(demo[0], tmp_path / "out", masks=tmp_path / "a.txt", calib=tmp_path / "camera.json")
+    at = words.index("--image")
+    outcome = run(app, [*words[:at], *words[at + 2 :], "--extrinsic", str(tmp_path / "T.txt"), "--formats", "npz"])
+    assert outcome.exit_code == 0, outcome.output
+    assert "1 of 1 objects found" in outcome.output
+    at = words.index("--calib") + 1
+    words[at] = str(demo[0] / "input/calib.txt")
+    at = words.index("--image")
+    outcome = run(app, [*words[:at], *words[at + 2 :]])
+    assert "a.txt: says nothing of the image's size; give the image, or image_size=" in outcome.stderr
+
+
+def test_errors_of_the_system_are_said_without_their_number(tmp_path):
+    outcome = run(
+        app, ["masks", "make", str(tmp_path / "a.png"), str(tmp_path / "b.json"), "--segmenter", "boxes:no.txt"]
+    )
+    assert outcome.exit_code == 2  # the image does not exist
+    Image.new("RGB", (40, 30)).save(tmp_path / "a.png")
+    outcome = run(
+        app, ["masks", "make", str(tmp_path / "a.png"), str(tmp_path / "b.json"), "--segmenter", "boxes:no.txt"]
+    )
+    assert outcome.stderr == "error: no.txt: no such file or directory\n"

@@ -303,8 +303,8 @@ def test_links_out_of_a_folder_are_refused_unless_they_are_allowed(tmp_path):
 @pytest.mark.parametrize(
     ("make", "options", "error", "message"),
     [
-        pytest.param(lambda p: None, {}, ldls.SourceError, "is no source of frames; looked for .*ldls.toml",
-                     id="empty folder"),
+        pytest.param(lambda p: None, {}, ldls.SourceError,
+                     "is no source of frames; `ldls init` describes .*; looked for .*ldls.toml", id="empty folder"),
         pytest.param(lambda p: (layouts.kitti_object(p), layouts.plain_folder(p)), {}, ldls.SourceError,
                      "may be kitti-object .* folder .*say which by kind=", id="two kinds in one folder"),
         pytest.param(layouts.kitti_object, {"kind": "kitti"}, ldls.ParameterError, "did you mean kitti-",

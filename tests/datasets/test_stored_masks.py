@@ -86,10 +86,11 @@ def test_masks_named_by_the_source_and_none(tmp_path):
     assert own_masks(open_source(layouts.kitti_raw(tmp_path / "raw"))) == {}
 
 
-@pytest.mark.parametrize("place", ["none", "all.txt", "masks.npz"])
-def test_places_that_are_none(tmp_path, place):
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [("none", "there is no"), ("all.txt", "is no folder and has no {frame} in it"), ("masks.npz", "there is no")],
+)
+def test_places_that_are_none(tmp_path, place, message):
     layouts.write_text(tmp_path / "all.txt", "0 0.1 0.1 0.2 0.2 0.3 0.3\n")
-    with pytest.raises(
-        InputError, match=r"is no folder and has no {frame} in it; .* or one \.json with the masks of all"
-    ):
+    with pytest.raises(InputError, match=rf"{message}.*; .* or one \.json with the masks of all"):
         StoredMasks(str(tmp_path / place))

@@ -57,6 +57,10 @@ class Camera:
     distortion: Distortion = field(default_factory=Distortion)
 
     def __post_init__(self) -> None:
+        if getattr(self.projection, "shape", None) == (4, 4):
+            raise CalibrationError(
+                "projection: expected K (3, 3) or P (3, 4), got (4, 4); is it the extrinsic? Pass T_camera_lidar="
+            )
         projection = as_matrix("projection", self.projection, ((3, 4), (3, 3)))
         _check_not_transposed(projection)
         if projection.shape == (3, 3):

@@ -20,6 +20,8 @@ def as_transform(name: str, values: ArrayLike) -> Matrix:
     Raises:
         CalibrationError: They are no such matrix.
     """
+    if getattr(values, "shape", None) == (3, 4):
+        raise CalibrationError(f"{name}: expected shape (4, 4), got (3, 4); add the row 0 0 0 1")
     return as_matrix(name, values, ((4, 4),))
 
 

@@ -108,7 +108,7 @@ def explain(
         if points is None or calib is None or masks is None:
             raise InputError("RESULT: missing; give an .npz file of ldls, or --points, --calib and --masks, all three")
         seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
-        instances = masks_of(None, masks=masks, segmenter=None, image_id=image_id)
+        instances = masks_of(None, masks=masks, segmenter=None, image_id=image_id, image_size=seen_by.image_size)
         segmentation, view = segment(read_points(points), instances, seen_by), None
     chosen = chosen_point(point, segmentation, view, on)
     explanation = explain_point(segmentation, chosen.row)

@@ -40,6 +40,7 @@ def masks_of(
     masks: Path | None,
     segmenter: str | None,
     image_id: int | None = None,
+    image_size: tuple[int, int] | None = None,
     min_score: float | None = None,
     categories: str | None = None,
 ) -> InstanceMasks:
@@ -55,7 +56,7 @@ def masks_of(
     if masks is not None:
         from ldls.io import read_masks
 
-        size = None if image is None else (image.shape[0], image.shape[1])
+        size = image_size if image is None else (image.shape[0], image.shape[1])
         stored = read_masks(masks, image_id=image_id, image_size=size)
         return wanted(stored, min_score=min_score, categories=categories)
     from ldls.segmenters import open_segmenter

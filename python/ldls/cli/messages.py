@@ -63,7 +63,7 @@ def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
             try:
                 result = command(*args, **kwargs)
             except (LdlsError, OSError, ImportError) as error:
-                typer.secho(f"error: {error}", err=True, fg="red")
+                typer.secho(f"error: {_plain(error)}", err=True, fg="red")
                 raise typer.Exit(1) from None
             finally:
                 for warning in caught:
@@ -74,6 +74,13 @@ def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
     wrapped.__annotations__ = {each.name: each.annotation for each in parameters}
     wrapped.__doc__ = flowing(inspect.getdoc(command) or "")
     return wrapped
+
+
+def _plain(error: Exception) -> str:
+    """What went wrong; of the system's errors without their number."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
+    return str(error)
 
 
 def flowing(text: str) -> str:

@@ -103,17 +103,18 @@ def segment(
     check_formats(wanted)
     write_objects = None if objects is None else objects_writer(objects)
     pixels = None if image is None else read_image(image)
+    seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
     chosen = masks_of(
         pixels,
         masks=masks,
         segmenter=segmenter,
         image_id=image_id,
+        image_size=seen_by.image_size,
         min_score=min_score,
         categories=categories,
     )
     if save_masks is not None:
         save(chosen, save_masks)
-    seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
     result = label_points(read_points(points), chosen, seen_by, params=replace(params, threads=cores))
     name = points.stem.removesuffix(".pcd")
     out.mkdir(parents=True, exist_ok=True)

@@ -86,7 +86,7 @@ def view(
     target = rerun if picture is not None else rerun or default_target(name)
     check_recording(target)
     failures: list[str] = []
-    if path.is_file() and path.suffix.lower() == ".npz":
+    if path.is_file() and path.suffix.lower() in (".npz", ".label", ".ply", ".pcd", ".las", ".laz", ".csv", ".parquet"):
         of_sources = {"dataset": dataset, "option": option, "frames": frames, "masks": masks, "results": results}
         of_masks = {"segmenter": segmenter, "min-score": min_score, "categories": categories}
         refuse({**of_sources, **of_masks}, f"{path} is a result, which has its masks and labels")

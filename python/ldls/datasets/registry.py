@@ -97,4 +97,4 @@ def guess_kind(path: Path) -> str:
         what = "; ".join(f"{kind} ({SOURCES[kind].looks_for})" for kind in fitting)
         raise SourceError(f"{path}: may be {what}; say which by kind= or --dataset")
     what = "; ".join(f"{kind} ({source.looks_for})" for kind, source in SOURCES.items())
-    raise SourceError(f"{path}: is no source of frames; looked for {what}")
+    raise SourceError(f"{path}: is no source of frames; `ldls init` describes files of your own; looked for {what}")

@@ -11,6 +11,10 @@ from ldls.io import read_masks
 from ldls.io.masks.data_set import SHOWN, MaskDataSet
 from ldls.masks import InstanceMasks
 
+PLACES = (
+    "a folder with a file a frame, a path such as masks/{frame}.json, or one .json with the masks of all images and "
+    "their file names"
+)
 SUFFIXES = (".json", ".npz", ".png", ".npy", ".txt")
 """Suffixes looked for in a folder of masks, in this order."""
 
@@ -35,10 +39,9 @@ class StoredMasks:
         self.place = place
         path = Path(place)
         if "{frame}" not in place and not path.is_dir() and not (path.suffix == ".json" and path.is_file()):
-            raise InputError(
-                f"masks: {place!r} is no folder and has no {{frame}} in it; expected a folder with a file a frame, a "
-                "path such as masks/{frame}.json, or one .json with the masks of all images and their file names"
-            )
+            if not path.exists():
+                raise InputError(f"masks: there is no {place!r}; expected {PLACES}")
+            raise InputError(f"masks: {place!r} is no folder and has no {{frame}} in it; expected {PLACES}")
         self.data_set = MaskDataSet(path) if path.is_file() else None
 
     def check_names(self, source: Source) -> None:

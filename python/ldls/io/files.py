@@ -29,6 +29,8 @@ UNFINISHED = ".ldls-part"
 MAX_BYTES = 4 << 30
 """Largest file that is read where its reader states no limit of its own."""
 MAX_TEXT_BYTES = 1 << 30
+LARGE_BYTES = 1 << 28
+"""Of files that are to be smaller than this, a larger one is none."""
 DIGEST_BLOCK_BYTES = 1 << 16
 """Allocators use larger ones once and then keep them."""
 KINDS = (
@@ -143,7 +145,8 @@ def opened(path: Path, what: str, *, limit: int) -> InputFile:
         status = os.fstat(descriptor)
         _check_regular(status.st_mode)
         if status.st_size > limit:
-            raise LimitError(f"{status.st_size:,} bytes, expected at most {limit:,} of a {what}; split it")
+            mend = "split it" if limit >= LARGE_BYTES else "is it one?"
+            raise LimitError(f"{status.st_size:,} bytes, expected at most {limit:,} of a {what}; {mend}")
         return InputFile(path, descriptor, status.st_size)
     except BaseException:
         os.close(descriptor)

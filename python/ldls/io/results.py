@@ -50,6 +50,11 @@ def read_result(path: str | PathLike[str]) -> Segmentation:
         CorruptFileError: It is not whole, or its arrays do not fit one another.
         FileNotFoundError: There is no such file.
     """
+    if Path(path).suffix.lower() != ".npz" and Path(path).is_file():
+        raise UnsupportedFormatError(
+            f"{path}: expected the .npz of a result, which has its points, masks and cameras; `ldls run` and "
+            "`ldls segment` write it beside the other formats (--formats npz)"
+        )
     return result_npz.read(path)
 
 

@@ -123,5 +123,5 @@ def check_same_size(own: tuple[int, int], size: tuple[int, int]) -> None:
         MaskError: The size of the masks, `own`, is not that of the image.
     """
     if own != size:
-        hint = "; swapped?" if own == size[::-1] else ""
-        raise MaskError(f"masks of {own} (height, width), the image is {size}{hint}")
+        mend = "swapped?" if own == size[::-1] else "take masks of this image, or resize them with it"
+        raise MaskError(f"masks of {own} (height, width), the image is {size}; {mend}")
