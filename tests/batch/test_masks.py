@@ -136,5 +136,5 @@ def test_cameras_for_which_the_source_names_no_masks_are_left_out(folder, tmp_pa
 
 
 def test_a_place_without_masks(few, tmp_path):
-    with pytest.raises(InputError, match="no folder and has no"):
+    with pytest.raises(InputError, match="there is no"):
         run(few, tmp_path / "out", tmp_path / "none")

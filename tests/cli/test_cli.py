@@ -250,4 +250,4 @@ def test_errors_of_the_system_are_said_without_their_number(tmp_path):
     outcome = run(
         app, ["masks", "make", str(tmp_path / "a.png"), str(tmp_path / "b.json"), "--segmenter", "boxes:no.txt"]
     )
-    assert outcome.stderr == "error: no.txt: no such file or directory\n"
+    assert outcome.stderr == "error: no.txt: No such file or directory\n"

@@ -79,7 +79,7 @@ def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
 def _plain(error: Exception) -> str:
     """What went wrong; of the system's errors without their number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
+        return f"{error.filename}: {error.strerror}"
     return str(error)
 
 
