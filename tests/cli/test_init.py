@@ -90,7 +90,8 @@ def in_a_matrix_the_other_way_round(folder, camera):
 def in_parts_that_leave_it_open(folder, camera):
     translation, (x, y, z, w) = pose(camera)
     write(folder / "camera.yaml", intrinsics(camera))
-    write(folder / "mount.yaml", f"lidar_to_cam:\n  translation: {translation}\n  rotation: [{w}, {x}, {y}, {z}]\n")
+    rotation = f"{{x: {x}, y: {y}, z: {z}, w: {w}}}"
+    write(folder / "mount.yaml", f"lidar_to_cam:\n  translation: {translation}\n  rotation: {rotation}\n")
 
 
 def in_rows_of_numbers(folder, camera):
@@ -133,6 +134,20 @@ def test_what_was_guessed_is_a_question(rig, frame):
     questions = [line for line in (rig / "ldls.toml").read_text().splitlines() if line.startswith("# ?")]
     assert any("tf of config.json, turned round, one of 2 ways to read it" in line for line in questions)
     assert any("points are in view of front" in line for line in questions)
+
+
+def test_other_ways_to_read_a_transform_are_listed(rig, frame):
+    camera = frame.images[0].camera
+    translation, (x, y, z, w) = pose(camera)
+    write(rig / "camera.yaml", intrinsics(camera))
+    write(rig / "mount.yaml", f"translation: {translation}\nrotation: [{w}, {x}, {y}, {z}]\n")
+    assert run("init", rig).exit_code == 0
+    text = (rig / "ldls.toml").read_text()
+    listed = [line.removeprefix("# ") for line in text.splitlines() if "T_camera_lidar = " in line]
+    assert len(listed) > 1
+    matrices = [tomllib.loads(line)["T_camera_lidar"] for line in listed]
+    assert any(np.allclose(matrix, camera.T_camera_lidar, atol=1e-6) for matrix in matrices)
+    assert "quaternion_wxyz" in text
 
 
 def test_two_cameras_have_the_files_of_their_names(rig, frame):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
 import numpy as np
@@ -24,6 +24,8 @@ from ldls.io.cameras.opencv import MATRIX, camera_of
 from ldls.stages import project
 
 MAX_BYTES = 1 << 18
+NEARLY = 0.8
+SAME = 1e-3
 QUATERNIONS = ("quaternion_xyzw", "quaternion_wxyz")
 TRANSLATIONS = ("translation", "t", "T", "position", "trans")
 WAYS = ("rotation", *QUATERNIONS, "roll_pitch_yaw_deg")
@@ -102,16 +104,23 @@ def transforms_in(path: Path, pattern: str) -> list[FoundTransform]:
         return [each for name, table in _tables(path) for each in _of_table(name, table, pattern)]
 
 
-def best_transform(
+def plausible_transforms(
     found: Iterable[FoundTransform], camera: Camera, points: Points, size: tuple[int, int]
-) -> tuple[FoundTransform, float] | None:
-    """The transform by which the lidar stands upright and most points are in view, and the share of these."""
+) -> list[tuple[FoundTransform, float]]:
+    """The transforms by which the lidar stands upright and about the most points are in view, and these shares.
+
+    They come in the order in which they were found, the usual ways first; of equal ones there is the first.
+    """
     placed = [(each, *view_of(replace(camera, T_camera_lidar=each.matrix), points, size)) for each in found]
     seen = [each for each in placed if each[2] > 0]
-    if not seen:
-        return None
-    best, _, share = max(seen, key=lambda each: each[1:])
-    return best, share
+    upright = [each for each in seen if each[1]] or seen
+    most = max((share for _, _, share in upright), default=0.0)
+    different: list[tuple[FoundTransform, float]] = []
+    for each, _, share in upright:
+        known = (np.allclose(each.matrix, other.matrix, atol=SAME) for other, _ in different)
+        if share >= NEARLY * most and not any(known):
+            different.append((each, share))
+    return different
 
 
 def view_of(camera: Camera, points: Points, size: tuple[int, int]) -> tuple[bool, float]:
@@ -179,13 +188,16 @@ def _of_table(name: str, table: Mapping[str, Any], pattern: str) -> Iterator[Fou
     if shift is None or turn is None:
         return
     poses: tuple[Literal["camera", "lidar"], ...] = ("camera", "lidar")
-    for pose_of, optical, way in product(poses, (True, False), WAYS):
+    # where axes are named there is one order
+    ways = WAYS[1:2] if isinstance(turn, Mapping) else WAYS
+    place = pattern if name == PurePosixPath(pattern).name else f"{name} of {pattern}"
+    for pose_of, optical, way in product(poses, (True, False), ways):
         try:
             matrix = extrinsic(_values(shift), pose_of=pose_of, optical=optical, **{way: _values(turn)})
         except (LdlsError, TypeError, ValueError):
             continue
         frame = "" if optical else ", whose x looks ahead"
-        yield _found(matrix, f"{name} of {pattern}, as the pose of the {pose_of}{frame}, {way}")
+        yield _found(matrix, f"{place}, as the pose of the {pose_of}{frame}, {way}")
 
 
 def _rigid(fields: Fields, key: str) -> NDArray[np.float64] | None:

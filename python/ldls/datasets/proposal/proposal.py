@@ -12,8 +12,8 @@ from ldls.datasets.folder_description import FILE
 from ldls.datasets.proposal.calibrations import (
     MAX_BYTES,
     FoundCamera,
-    best_transform,
     camera_in,
+    plausible_transforms,
     transforms_in,
     view_of,
 )
@@ -30,6 +30,7 @@ IMAGES = (".png", ".jpg", ".jpeg")
 CALIBRATIONS = (".yaml", ".yml", ".xml", ".json", ".toml", ".txt")
 NO_IMAGE_WORDS = ("mask", "inst", "seg", "label", "panoptic", "birds-eye", "comparison")
 """Parts of the names of pictures that no camera took."""
+MOST_OTHERS = 3
 FEWEST_POINTS = 50
 """Rows of numbers that make a text a cloud."""
 
@@ -226,18 +227,21 @@ def _add_calibration(
         _judge(made, name, share, upright=upright)
         return
     transforms = [each for pattern in small for each in transforms_in(_file(pattern, sweeps), pattern.text)]
-    best = best_transform(transforms, found.camera, points, size)
-    if best is None:
+    plausible = plausible_transforms(transforms, found.camera, points, size)
+    if not plausible:
         turned = f", none of {len(transforms)} tried shows a point" if transforms else ""
         made.missing.append(f"where the lidar is, for {name}: found no transform{turned}; docs/own-sensors.md says how")
         made.lines.append("# T_camera_lidar = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]")
         made.ask("no file says where the lidar is")
         return
-    chosen, share = best
+    chosen, share = plausible[0]
     made.lines.append(chosen.line)
     made.found.append(f"{chosen.how}: where the lidar is, for {name}")
     if not chosen.is_sure:
         made.ask(f"T_camera_lidar is {chosen.how}, one of {len(transforms)} ways to read it; is it right?")
+        for another, also in plausible[1 : 1 + MOST_OTHERS]:
+            made.ask(f"it shows {also:.0%} of the points if it is {another.how}:")
+            made.lines.append(f"# {another.line}")
     _judge(made, name, share)
 
 
