@@ -96,12 +96,15 @@ fn stages(criterion: &mut Criterion) {
         let mut graph = PointGraph::<f32>::from_neighbors(points, &neighbors, params.sigma, never)
             .expect("a graph");
         graph.normalize_rows(&mut labels, never).expect("rows");
-        let exact = || {
+        let exact = |among: Option<&[u32]>| {
             let mut a = PointGraph::<f64>::from_neighbors(points, &neighbors, params.sigma, never)?;
             let mut b =
                 masks.pixel_labels(uv, params.window, params.pixel_weight, |_, _| true, never)?;
             a.normalize_rows(&mut b, never)?;
-            Ok((a, b))
+            Ok(match among {
+                Some(points) => (a.among(points), b.among(points)),
+                None => (a, b),
+            })
         };
         let diffused = diffuse(
             &graph,

@@ -76,8 +76,16 @@ pub fn segment(
     let (a, b) = timed(&mut t.graph, || {
         normalize(nearest, pixel_labels, heights, params, cancel)
     })?;
-    let pixels = || scene.pixel_labels(order, params, cancel);
-    let exact = || normalize(nearest, pixels()?, heights, params, cancel);
+    let exact = |among: Option<&[u32]>| {
+        let Some(places) = among else {
+            let pixels = scene.pixel_labels(order, params, cancel)?;
+            return normalize(nearest, pixels, heights, params, cancel);
+        };
+        let nearest = nearest.among(places, cancel)?;
+        let pixels = scene.pixel_labels(&nearest.order, params, cancel)?;
+        let heights = arrange(places, heights, cancel)?;
+        normalize(&nearest, pixels, &heights, params, cancel)
+    };
     let diffused = timed(&mut t.diffusion, || {
         diffuse(&a, &b, scene.n_labels(), params.iterations, exact, cancel)
     })?;

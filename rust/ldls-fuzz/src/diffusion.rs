@@ -112,7 +112,12 @@ fn check_winners(
         b,
         n_labels,
         Some(iterations),
-        || Ok(exact),
+        |among| {
+            Ok(match among {
+                Some(points) => (exact.0.among(points), exact.1.among(points)),
+                None => exact.clone(),
+            })
+        },
         Cancel::never(),
     )
     .expect("the system fits");

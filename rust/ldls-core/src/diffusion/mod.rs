@@ -2,12 +2,14 @@
 //!
 //! The products are not run one by one: their result is a polynomial of A times b, which a Chebyshev series
 //! reaches with a third of the sweeps, in single precision. Both leave an error, which is estimated; where two
-//! labels are nearer to one another than that, they are diffused again in double precision. Where the graph
-//! is such that the series cannot be trusted, the products are run as they stand.
+//! labels are nearer to one another than that, the point is decided in double precision: by the part of the graph that
+//! flows to it, or where that is much, by diffusing such labels again. Where the graph is such that the series cannot be
+//! trusted, the products are run as they stand.
 
 mod convergence;
 mod pass;
 mod products;
+mod reach;
 mod schedule;
 mod seeds;
 mod series;
@@ -19,6 +21,7 @@ pub use convergence::Convergence;
 pub use products::Products;
 
 use self::pass::Pass;
+use self::reach::Reach;
 use self::schedule::Schedule;
 use self::seeds::{Seeds, plan};
 use self::series::Series;
@@ -26,7 +29,7 @@ use self::sweep::{WIDTH_F32, WIDTH_F64};
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{filled, tabulate, zeros};
+use crate::memory::{collect, filled, tabulate, zeros};
 use crate::{Cancel, Real, Result};
 
 /// Share of the largest likelihood that a series in single precision may leave out.
@@ -47,7 +50,8 @@ pub struct Diffused {
 
 /// Diffuses labels 0 to `n_labels` - 1 from their seeds `b` over the graph `a` and picks the winner at every
 /// point. `iterations` is the number of products, `None` as many as it takes. `exact` yields `a` and `b` in
-/// double precision, for points at which single precision cannot decide.
+/// double precision, for points at which single precision cannot decide: the rows of all points, or of those given, with
+/// the edges among them, where rows are normalised with all their edges as far as these lead to points given.
 ///
 /// # Errors
 /// [`crate::Error::Mismatch`] where `b` does not fit `a` or `n_labels`, [`crate::Error::OutOfMemory`],
@@ -57,7 +61,7 @@ pub fn diffuse(
     b: &PixelLabels,
     n_labels: usize,
     iterations: Option<usize>,
-    exact: impl FnOnce() -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
     cancel: &Cancel,
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
@@ -67,12 +71,20 @@ pub fn diffuse(
     let mut convergence = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
     let contested = winners::contested(&best, convergence.error)?;
     if !contested.is_empty() {
-        let (a, b) = exact()?;
-        let labels = winners::candidates(&best, &contested, n_labels, convergence.error);
-        let mut refined = filled((0, f64::NEG_INFINITY), contested.len(), cancel)?;
-        let choose = |pass: &Pass<f64, WIDTH_F64>| winners::refine(&contested, &mut refined, pass);
-        for_each_pass(&a, &b, &labels, iterations, cancel, choose)?;
-        for (&point, &(label, _)) in contested.iter().zip(&refined) {
+        let reach = iterations.map(|products| Reach::of(a, &contested, products, cancel));
+        let labels = if let Some(reach) = reach.transpose()?.flatten() {
+            let (a, b) = exact(Some(&reach.points))?;
+            reach.winners((&a, &b), n_labels, contested.len(), cancel)?
+        } else {
+            let (a, b) = exact(None)?;
+            let labels = winners::candidates(&best, &contested, n_labels, convergence.error);
+            let mut refined = filled((0, f64::NEG_INFINITY), contested.len(), cancel)?;
+            let choose =
+                |pass: &Pass<f64, WIDTH_F64>| winners::refine(&contested, &mut refined, pass);
+            for_each_pass(&a, &b, &labels, iterations, cancel, choose)?;
+            collect(refined.iter().map(|&(label, _)| label), cancel)?
+        };
+        for (&point, label) in contested.iter().zip(labels) {
             best[point as usize].labels[0] = label;
         }
         convergence.refined = contested.len();
@@ -148,7 +160,7 @@ mod tests {
     use crate::test_support::pair;
     use proptest::prelude::*;
 
-    fn never() -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
+    fn never(_: Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)> {
         panic!("single precision tells the winner")
     }
 
@@ -322,7 +334,11 @@ mod tests {
         ) {
             let seen = &seen[..points.len()];
             let (a, b) = system::<f32>(&points, seen, lambda);
-            let double = || Ok(system::<f64>(&points, seen, lambda));
+            let exact = system::<f64>(&points, seen, lambda);
+            let double = |among: Option<&[u32]>| Ok(match among {
+                Some(points) => (exact.0.among(points), exact.1.among(points)),
+                None => exact.clone(),
+            });
             let found = diffuse(&a, &b, 30, Some(iterations), double, Cancel::never()).unwrap();
             let (a, b) = system::<f64>(&points, seen, lambda);
             let expected = plain_products(&a, &b, 30, iterations);

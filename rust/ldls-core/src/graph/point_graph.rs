@@ -232,6 +232,30 @@ impl<T: Real> PointGraph<T> {
         Ok(())
     }
 
+    /// The rows of `points`, in their order, with the edges that lead from one of them to another.
+    #[must_use]
+    pub fn among(&self, points: &[u32]) -> Self {
+        let mut place = vec![u32::MAX; self.len()];
+        for (at, &point) in (0..).zip(points) {
+            place[point as usize] = at;
+        }
+        let (mut offsets, mut columns, mut weights) = (vec![0], Vec::new(), Vec::new());
+        for &point in points {
+            for (column, weight) in self.row(point as usize) {
+                if place[column] != u32::MAX {
+                    columns.push(place[column]);
+                    weights.push(weight);
+                }
+            }
+            offsets.push(columns.len());
+        }
+        Self {
+            layout: Layout::Varied { offsets },
+            columns: Arc::new(columns),
+            weights,
+        }
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.layout.count()

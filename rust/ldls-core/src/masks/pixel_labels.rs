@@ -133,6 +133,23 @@ impl<T: Real> PixelLabels<T> {
         })
     }
 
+    /// The rows of `points`, in their order.
+    #[must_use]
+    pub fn among(&self, points: &[u32]) -> Self {
+        let mut some = Self {
+            offsets: vec![0],
+            ..Self::default()
+        };
+        for &point in points {
+            let row = self.offsets[point as usize]..self.offsets[point as usize + 1];
+            some.labels.extend_from_slice(&self.labels[row.clone()]);
+            some.weights.extend_from_slice(&self.weights[row]);
+            some.mass.push(self.mass[point as usize]);
+            some.offsets.push(some.labels.len());
+        }
+        some
+    }
+
     fn push(&mut self, counts: &WindowCounts, pixel_weight: f64) {
         for &(label, count) in &counts.labels {
             self.labels.push(label);

@@ -3,7 +3,7 @@
 
 use super::kdtree::{FAN, KdTree, arrange};
 use super::leaf_search::search_leaf;
-use crate::memory::zeros;
+use crate::memory::{filled, with_room, zeros};
 use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -57,6 +57,27 @@ impl Adjacency {
             order: tree.order,
             points,
             degree,
+            columns: Arc::new(columns),
+        })
+    }
+
+    /// The rows of the points at some `places`, in this order. Rows of which not all points are among them begin with the
+    /// point itself as ever, and hold it in the place of the others.
+    pub(crate) fn among(&self, places: &[u32], cancel: &Cancel) -> Result<Self> {
+        let mut new = filled(u32::MAX, self.points.len(), cancel)?;
+        for (at, &place) in (0..).zip(places) {
+            new[place as usize] = at;
+        }
+        let mut columns = with_room(places.len() * self.degree)?;
+        for (at, &place) in (0..).zip(places) {
+            let row = &self.columns[place as usize * self.degree..][..self.degree];
+            let known = row.iter().map(|&column| new[column as usize]);
+            columns.extend(known.map(|column| if column == u32::MAX { at } else { column }));
+        }
+        Ok(Self {
+            order: arrange(places, &self.order, cancel)?,
+            points: arrange(places, &self.points, cancel)?,
+            degree: self.degree,
             columns: Arc::new(columns),
         })
     }
