@@ -6,7 +6,7 @@
 
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{filled, push, zeros};
+use crate::memory::{collect, filled, push, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 
@@ -98,7 +98,7 @@ impl Reach {
         let within = self.ends[self.ends.len().saturating_sub(2)];
         let mut flow = zeros(self.points.len(), cancel)?;
         flow[point] = 1.0;
-        let mut sum: Vec<f64> = flow.clone();
+        let mut sum = collect(flow.iter().copied(), cancel)?;
         let mut next = zeros(self.points.len(), cancel)?;
         for &end in &self.ends[..self.ends.len().saturating_sub(2)] {
             next.fill(0.0);
