@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import ldls
-from ldls.batch.formats import ENDINGS
 from ldls.io.points import READERS
+from ldls.viewing.formats import ENDINGS
 
 PAGE = (Path(__file__).parents[1] / "docs/formats.md").read_text()
 POINTS, RESULTS, CAMERAS = PAGE.split("\n## ")[1:]

@@ -160,7 +160,7 @@ def test_other_sources_are_refused(few, tmp_path):
 
 
 def test_a_single_frame_has_no_bag():
-    from ldls.batch.formats import check_formats
+    from ldls.viewing.formats import check_formats
 
     with pytest.raises(ParameterError, match="bag is of a whole run; label the ROS bag with `ldls run`"):
         check_formats(["npz", "bag"])

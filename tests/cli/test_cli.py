@@ -11,8 +11,8 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import ldls
-from ldls.batch.formats import ENDINGS
 from ldls.cli import app
+from ldls.viewing.formats import ENDINGS
 
 run = CliRunner().invoke
 

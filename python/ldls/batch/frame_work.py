@@ -11,7 +11,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ldls.batch.formats import PICTURE, RESULT, file_name, file_names, write_formats
 from ldls.batch.journal import KeptRecords, Record
 from ldls.batch.settings import RunSettings
 from ldls.datasets import CameraImage, Frame, Source
@@ -25,6 +24,7 @@ from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
 from ldls.view import View
+from ldls.viewing.formats import PICTURE, RESULT, file_name, file_names, write_formats
 
 LARGEST_DIGESTED_BYTES = 1 << 26
 """Larger inputs hold many frames, as bags do, and are known by size and time of change alone."""

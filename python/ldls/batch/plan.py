@@ -7,8 +7,8 @@ import unicodedata
 from collections.abc import Sequence
 from pathlib import PureWindowsPath
 
-from ldls.batch.formats import file_name
 from ldls.errors import ParameterError, UnsafePathError
+from ldls.viewing.formats import file_name
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 

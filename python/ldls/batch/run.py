@@ -13,7 +13,6 @@ from typing import Any
 
 import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
-from ldls.batch.formats import BAG, RESULT, file_name, written_formats
 from ldls.batch.frame_work import Earlier, FrameWork, Outcome
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
@@ -25,6 +24,7 @@ from ldls.datasets import Source, open_source
 from ldls.errors import ChangedFileWarning, NothingInView, some
 from ldls.io.files import check_folder, sweep
 from ldls.io.objects import objects_writer
+from ldls.viewing.formats import BAG, RESULT, file_name, written_formats
 
 GROUP_S = 0.5
 """Frames finished within this time share a wait for the disk."""

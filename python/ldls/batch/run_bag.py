@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from ldls.batch.formats import RESULT, file_name
 from ldls.datasets import Source
 from ldls.datasets.rosbag import RosBag
 from ldls.errors import BatchError, FileFormatError, ParameterError
@@ -14,6 +13,7 @@ from ldls.io import read_result
 from ldls.io.labelled_bag import TOPIC, LabelledBag
 from ldls.io.ros.bags import open_bag
 from ldls.io.ros.writer import UNFINISHED_BAG
+from ldls.viewing.formats import RESULT, file_name
 
 NAME = "labelled"
 MARGIN_NS = 1_000_000_000

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import ldls._ldls as _ldls
-from ldls.batch.formats import BAG, RESULT, check_formats
 from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
+from ldls.viewing.formats import BAG, RESULT, check_formats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,9 +27,9 @@ class RunSettings:
         min_score: Lowest score of a mask that counts; the segmenter's own, or 0 of stored masks, without one.
         categories: Categories that count, by name or id; all without them.
         params: Parameters of the method; their number of threads does not matter to the result.
-        formats: Files written for each frame, by the words of `ldls.batch.formats`: npz, label, ply and so on, and png
-            for the image with masks and points; bag for one labelled bag of all frames of a ROS bag, which is made of
-            their npz, so that these are written too.
+        formats: Files written for each frame, by the words of `ldls.viewing.formats`: npz, label, ply and so on, and
+            png for the image with masks and points; bag for one labelled bag of all frames of a ROS bag, which is made
+            of their npz, so that these are written too.
         same_object: See `ldls.segment`.
 
     Raises:

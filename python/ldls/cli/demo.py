@@ -40,9 +40,9 @@ def demo(
     Example: ldls demo --out demo
     """
     import ldls
-    from ldls.batch.formats import write_formats
     from ldls.simulation import sample_frame, scene_frame
     from ldls.viewing import save_pictures
+    from ldls.viewing.formats import write_formats
 
     check_recording(rerun)
     frame = sample_frame() if seed is None else scene_frame(seed)

@@ -93,10 +93,10 @@ def segment(
     ldls segment --points sweep.pcd --calib camera.yaml --extrinsic lidar.yaml --image image.png --masks masks.json
     --out results
     """
-    from ldls.batch.formats import check_formats, write_formats
     from ldls.io import read_image, read_points, save
     from ldls.io.objects import FrameObjects, objects_writer
     from ldls.label_diffusion import segment as label_points
+    from ldls.viewing.formats import check_formats, write_formats
 
     check_recording(rerun)
     wanted = words(formats)

@@ -134,8 +134,8 @@ def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segm
 
 
 def _stored(source: Source, results: Path, index: int) -> tuple[Frame, Segmentation]:
-    from ldls.batch.formats import file_name
     from ldls.io import read_result
+    from ldls.viewing.formats import file_name
 
     path = results / file_name(source.names[index], "npz")
     return source[index], read_result(path)

@@ -139,7 +139,8 @@ def _covered(picture: Image.Image, shown: Shown, ground: Ground) -> NDArray[np.b
     covered = np.zeros((picture.height, picture.width), bool)
     x, y = at[((at >= 0) & (at < picture.size)).all(axis=1)].T
     covered[y, x] = True
-    return np.asarray(Image.fromarray(covered).convert("L").filter(ImageFilter.MaxFilter(9))) > 0
+    # any of 9 x 9 pixels leaves something in their mean
+    return np.asarray(Image.fromarray(covered).convert("L").filter(ImageFilter.BoxBlur(4))) > 0
 
 
 def _around(corners: NDArray[np.float64]) -> tuple[int, int, int, int]:

@@ -38,7 +38,15 @@ def stamp(canvas: Canvas, at_px: NDArray[np.int64], colours: NDArray[np.uint8] |
     """
     reach = mark.shape[0] // 2
     height, width = canvas.shape[:2]
-    own = np.broadcast_to(np.asarray(colours, np.uint8), (len(at_px), 3))
+    seen = ((at_px >= -reach) & (at_px < (width + reach, height + reach))).all(axis=1)
+    colours, at_px = np.asarray(colours, np.uint8), at_px[seen]
+    if colours.ndim == 1:
+        # in one colour it is all the same how many lie at a place
+        across = width + 2 * reach
+        places = np.unique((at_px + reach) @ (1, across))
+        at_px = np.stack([places % across, places // across], axis=1) - reach
+    own = colours[seen] if colours.ndim == 2 else np.broadcast_to(colours, (len(at_px), 3))
+    flat = canvas.reshape(-1, 3)
     # the faintest pixels of the mark first, so that no rim covers the middle of a neighbour
     for at in np.argsort(mark, axis=None):
         dy, dx = divmod(int(at), mark.shape[1])
@@ -47,8 +55,8 @@ def stamp(canvas: Canvas, at_px: NDArray[np.int64], colours: NDArray[np.uint8] |
             continue
         x, y = at_px[:, 0] + dx - reach, at_px[:, 1] + dy - reach
         inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-        x, y = x[inside], y[inside]
-        canvas[y, x] = np.round((1 - opacity) * canvas[y, x] + opacity * own[inside])
+        places, above = (y * width + x)[inside], own[inside]
+        flat[places] = above if opacity == 1 else np.round((1 - opacity) * flat[places] + opacity * above)
 
 
 def grid(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from os import PathLike
 from pathlib import Path
 
@@ -29,14 +31,17 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
         InputError: There are more or fewer images than cameras, or one has not the size of the masks.
     """
     path = Path(path)
-    pictures = {
-        path: overlay(result, images),
-        path.with_name(f"{path.stem}-birds-eye{path.suffix}"): birds_eye_view(result),
-        path.with_name(f"{path.stem}-comparison{path.suffix}"): comparison(result, images),
+    drawn: dict[Path, Callable[[], Image.Image]] = {
+        path: lambda: overlay(result, images),
+        path.with_name(f"{path.stem}-birds-eye{path.suffix}"): lambda: birds_eye_view(result),
+        path.with_name(f"{path.stem}-comparison{path.suffix}"): lambda: comparison(result, images),
     }
-    for file, picture in pictures.items():
-        save_picture(file, picture)
-    return list(pictures)
+    # one is packed while the next is drawn
+    with ThreadPoolExecutor(1) as packing:
+        saved = [packing.submit(save_picture, file, draw()) for file, draw in drawn.items()]
+    for each in saved:
+        each.result()
+    return list(drawn)
 
 
 def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:

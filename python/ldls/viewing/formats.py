@@ -13,7 +13,8 @@ from ldls.errors import ParameterError
 from ldls.io import save
 from ldls.io.results import FORMATS
 from ldls.segmentation import Segmentation
-from ldls.viewing import overlay, save_picture
+from ldls.viewing.files import save_picture
+from ldls.viewing.overlay import overlay
 
 BAG = "bag"
 """The labelled ROS bag of a whole run."""
