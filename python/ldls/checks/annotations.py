@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import sys
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -11,10 +12,7 @@ from numbers import Real
 from os import PathLike
 from typing import Any, Literal, TypeGuard, TypeVar, Union, cast, get_args, get_origin
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from ldls.checks.values import is_whole, shown
+from ldls.checks.values import is_of_numpy, is_whole, shown
 from ldls.errors import InputError, ParameterError
 
 MAKERS = {
@@ -103,13 +101,13 @@ def _kind(hint: Any) -> _Kind:  # noqa: ANN401
     simple = {
         int: _Kind(is_whole, "a whole number"),
         float: _Kind(_is_real, "a finite number"),
-        bool: _Kind(lambda value: isinstance(value, bool | np.bool_), "True or False"),
+        bool: _Kind(lambda value: isinstance(value, bool) or is_of_numpy(value, "bool_"), "True or False"),
         str: _Kind(lambda value: isinstance(value, str), "text"),
         None: _Kind(lambda value: value is None, "None"),
         type(None): _Kind(lambda value: value is None, "None"),
     }
     origin, parts = get_origin(hint), get_args(hint)
-    if hint == ArrayLike or hint is Any or hint is object:
+    if hint is Any or hint is object or _is_array_like(hint):
         return _ANYTHING
     if origin is None:
         if hint in simple:
@@ -127,6 +125,11 @@ def _kind(hint: Any) -> _Kind:  # noqa: ANN401
     if origin is Callable:
         return _Kind(callable, "a function", is_noun=True)
     return _container(origin, [_kind(part) for part in parts if part is not Ellipsis], Ellipsis in parts)
+
+
+def _is_array_like(hint: Any) -> bool:  # noqa: ANN401
+    typing = sys.modules.get("numpy.typing")
+    return typing is not None and hint == typing.ArrayLike
 
 
 def _either(choices: Sequence[object]) -> str:
@@ -157,7 +160,7 @@ def _container(origin: type, kinds: Sequence[_Kind], any_length: bool) -> _Kind:
             # no array holds instances of classes, least of all one without rows
             lambda value: (
                 _is_sequence(value)
-                and not (kind.is_noun and isinstance(value, np.ndarray))
+                and not (kind.is_noun and is_of_numpy(value, "ndarray"))
                 and all(map(kind.accepts, value))
             ),
             f"a list of {_plural(kind.name)}",
@@ -189,13 +192,13 @@ def _is_real(value: object) -> bool:
 
 
 def _is_sequence(value: object) -> bool:
-    if isinstance(value, np.ndarray):
-        return value.ndim > 0
+    if is_of_numpy(value, "ndarray"):
+        return bool(value.ndim)  # type: ignore[attr-defined]
     return isinstance(value, Sequence) and not isinstance(value, str | bytes)
 
 
 def _is_iterable(value: object) -> bool:
-    return isinstance(value, Iterable) and not isinstance(value, str | bytes | np.ndarray)
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes) and not is_of_numpy(value, "ndarray")
 
 
 def _bound(

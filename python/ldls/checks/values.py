@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import operator
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+import sys
+from typing import TYPE_CHECKING, Any, Literal
 
 from ldls.errors import DtypeError, InputError, LimitError, ParameterError, ShapeError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 MAX_ROWS = 2**31 - 1
 """Most rows of an array: points and labels are numbered by 32 bits with sign."""
@@ -49,6 +51,8 @@ def as_array(name: str, values: object, error: type[InputError] | None = None) -
         DtypeError: A masked array, or what cannot be made an array.
         LimitError: More rows than can be numbered.
     """
+    import numpy as np
+
     if isinstance(values, np.ma.MaskedArray):
         raise (error or DtypeError)(f"{name}: got a masked array; pass {name}.filled(...) with a value")
     try:
@@ -85,6 +89,8 @@ def numbers(
         InputError: A whole number that `dtype` cannot hold.
         LimitError: More rows than can be numbered.
     """
+    import numpy as np
+
     array = as_array(name, values, error)
     wanted = np.dtype(dtype)
     if array.size == 0 and not isinstance(values, np.ndarray):
@@ -106,7 +112,7 @@ def numbers(
 def shown(value: object) -> str:
     """`value` as messages show it: short, whatever it is."""
     try:
-        text = repr(value) if not isinstance(value, np.ndarray) else f"an array of shape {value.shape}"
+        text = repr(value) if not is_of_numpy(value, "ndarray") else f"an array of shape {value.shape}"  # type: ignore[attr-defined]
     except Exception:  # a whole number of thousands of digits, or an object that cannot say what it is
         return f"a value of type {type(value).__name__}"
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
@@ -118,7 +124,13 @@ def is_whole(value: object) -> bool:
         operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         return False
-    return not isinstance(value, bool | np.bool_ | np.ndarray)
+    return not isinstance(value, bool) and not is_of_numpy(value, "bool_") and not is_of_numpy(value, "ndarray")
+
+
+def is_of_numpy(value: object, name: Literal["bool_", "ndarray"]) -> bool:
+    """True for a bool or an array of NumPy, which is loaded where there is one and need not be for what has none."""
+    numpy = sys.modules.get("numpy")
+    return numpy is not None and isinstance(value, getattr(numpy, name))
 
 
 def _fits(found: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
