@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import threading
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -38,6 +39,8 @@ MAX_RATIO = 700
 BEST_RATIOS = {zipfile.ZIP_STORED: 1, zipfile.ZIP_DEFLATED: 1032}
 """The ways of packing that NumPy has, and how many times its size what they pack can have at most."""
 LISTED = 20
+_parsing_header = threading.Lock()
+"""NumPy parses headers as Python, of which CPython 3.11 confuses those of two threads."""
 KINDS = "biufU"
 """Kinds of the arrays that are read: flags, numbers and text."""
 
@@ -180,11 +183,16 @@ def _read_header(start: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], in
     """Shape, whether columns come first, type, and where the array begins, by the first bytes of an `.npy` file."""
     head = io.BytesIO(start)
     try:
-        version = npy.read_magic(head)
-        read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, in_columns, dtype = read_header(head)
+        with _parsing_header:
+            return _parsed_header(head)
     except LdlsError:
         raise
     except (Exception, MemoryError) as error:  # the parser of Python calls too many brackets a lack of memory
         raise CorruptFileError(f"not a whole .npy file ({error})") from None
+
+
+def _parsed_header(head: io.BytesIO) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
+    version = npy.read_magic(head)
+    read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, in_columns, dtype = read_header(head)
     return shape, in_columns, dtype, head.tell()
