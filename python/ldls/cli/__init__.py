@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from ldls.cli import annotate, demo, evaluate, explain, info, init, masks, reproduce, run, segment, simulate, view
-from ldls.cli.options import Command
+from ldls.cli.command import Command
 
 
 class Commands(TyperGroup):

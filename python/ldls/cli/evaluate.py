@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import ClassesOption, words
+from ldls.cli.options import ScoredOption, words
 from ldls.cli.progress import progress
 from ldls.cli.reliability_files import draw_reliability
 from ldls.errors import ParameterError
@@ -51,7 +51,7 @@ def evaluate(
         str | None,
         typer.Option(metavar="NAME", help="Name of the method of PREDICTIONS.", show_default="that of its folder"),
     ] = None,
-    categories: ClassesOption = "Car,Pedestrian",
+    categories: ScoredOption = "Car,Pedestrian",
     missing: Annotated[
         Missing, typer.Option(metavar="|".join(Missing), help="What becomes of a frame without its pair.")
     ] = Missing.ERROR,

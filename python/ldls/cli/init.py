@@ -61,5 +61,6 @@ def init(
     if made.missing:
         say(f"next: add what is missing to {path}, then: ldls info {folder} --picture check.png")
         raise typer.Exit(1)
+    # what is written must open
     open_source(folder)
     say(f"next: ldls info {folder} --picture check.png; do the colours change where objects end?")

@@ -15,10 +15,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ldls.masks import InstanceMasks
-
-if TYPE_CHECKING:
     from ldls.datasets import Source
+    from ldls.masks import InstanceMasks
 
 SEGMENTER_HELP = (
     "What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt."

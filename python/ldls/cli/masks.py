@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
+from ldls.cli.command import Command
 from ldls.cli.frame_files import IMAGE_ID
 from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of, wanted
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import Command
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 app = typer.Typer(help="Make, show and convert instance masks.", no_args_is_help=True)
 EXISTING = {"exists": True, "dir_okay": False, "readable": True}
 SUFFIXES = "COCO .json, .npz, instance .png, .npy stack"
+"""What masks are written as."""
 
-PictureOption = Annotated[
+MaskPictureOption = Annotated[
     Path | None,
     typer.Option(metavar="FILE.png", help="Picture of the masks on the image.", show_default=False, dir_okay=False),
 ]
-MasksArgument = Annotated[Path, typer.Argument(metavar="MASKS", help=f"{SUFFIXES}, or KITTI label_2 .txt.", **EXISTING)]
+MasksArgument = Annotated[
+    Path, typer.Argument(metavar="MASKS", help="File of any format of docs/masks.md.", **EXISTING)
+]
 OutArgument = Annotated[Path, typer.Argument(metavar="OUT", help=f"{SUFFIXES}: the suffix chooses.", dir_okay=False)]
 
 
@@ -152,7 +155,7 @@ def make(
     ],
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
-    picture: PictureOption = None,
+    picture: MaskPictureOption = None,
 ) -> None:
     """Make masks of an image with a segmenter.
 
@@ -174,7 +177,7 @@ def show(
     image: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The image they are of.", show_default=False, **EXISTING)
     ] = None,
-    picture: PictureOption = None,
+    picture: MaskPictureOption = None,
     image_id: Annotated[int | None, IMAGE_ID] = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,

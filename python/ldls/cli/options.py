@@ -5,21 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
 from ldls.errors import ParameterError
-
-
-class Command(TyperCommand):
-    """A command whose usage line names its arguments without braces."""
-
-    def collect_usage_pieces(self, ctx: Any) -> list[str]:  # noqa: ANN401 - the context of Typer's own copy of click
-        """Return options and arguments as the usage line has them."""
-        return [piece.strip("{}") for piece in super().collect_usage_pieces(ctx)]
-
 
 OutOption = Annotated[
     Path, typer.Option(metavar="FOLDER", help="Folder for the results; made if need be.", file_okay=False)
@@ -57,7 +47,7 @@ PictureOption = Annotated[
         dir_okay=False,
     ),
 ]
-ClassesOption = Annotated[
+ScoredOption = Annotated[
     str, typer.Option("--categories", metavar="WORDS", help="Categories to score: Car,Pedestrian.")
 ]
 

@@ -44,8 +44,8 @@ def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
                 return
             said = now
             rate = finished / max(now - start, 1e-9)
-            left = f", {failed:,} failed" if failed else ""
-            typer.echo(f"{title}: {finished:,} of {total:,} frames{left}, {rate:.1f} a second")
+            failures = f", {failed:,} failed" if failed else ""
+            typer.echo(f"{title}: {finished:,} of {total:,} frames{failures}, {rate:.1f} a second")
 
         yield update
 

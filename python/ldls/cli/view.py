@@ -82,11 +82,13 @@ def view(
 
     ldls view kitti/training --masks kitti/training/masks --frames 0:20 --rerun kitti.rrd
     """
+    from ldls.io.results import FORMATS
+
     name = path.resolve().stem
     target = rerun if picture is not None else rerun or default_target(name)
     check_recording(target)
     failures: list[str] = []
-    if path.is_file() and path.suffix.lower() in (".npz", ".label", ".ply", ".pcd", ".las", ".laz", ".csv", ".parquet"):
+    if path.is_file() and any(path.name.lower().endswith(each.ending) for each in FORMATS.values()):
         of_sources = {"dataset": dataset, "option": option, "frames": frames, "masks": masks, "results": results}
         of_masks = {"segmenter": segmenter, "min-score": min_score, "categories": categories}
         refuse({**of_sources, **of_masks}, f"{path} is a result, which has its masks and labels")

@@ -187,6 +187,7 @@ class Segmentation:
         )
 
     def _repr_html_(self) -> str:
+        # pictures lie above the nouns; the package, above all, knows where
         from ldls import _html_of
 
         return _html_of(self)

@@ -23,9 +23,10 @@ from ldls.io.cameras.field_file import read_fields
 from ldls.io.cameras.opencv import MATRIX, camera_of
 from ldls.stages import project
 
-MAX_BYTES = 1 << 18
 NEARLY = 0.8
+"""Share of the most points in view from which on a transform shows about as many."""
 SAME = 1e-3
+"""Difference of numbers up to which two transforms are one."""
 QUATERNIONS = ("quaternion_xyzw", "quaternion_wxyz")
 TRANSLATIONS = ("translation", "t", "T", "position", "trans")
 WAYS = ("rotation", *QUATERNIONS, "roll_pitch_yaw_deg")

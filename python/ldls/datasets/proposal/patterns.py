@@ -9,7 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-FRAME = "{frame}"
+from ldls.datasets.folder import FRAME
+
 DEEPEST = 4
 """Folders within folders that are looked into."""
 MOST_FILES = 200_000

@@ -8,29 +8,31 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from ldls.cloud import Points
+from ldls.datasets.file_source import IMAGE_SUFFIXES
+from ldls.datasets.folder import FRAME
 from ldls.datasets.folder_description import FILE
 from ldls.datasets.proposal.calibrations import (
-    MAX_BYTES,
     FoundCamera,
     camera_in,
     plausible_transforms,
     transforms_in,
     view_of,
 )
-from ldls.datasets.proposal.patterns import FRAME, Pattern, patterns_of
+from ldls.datasets.proposal.patterns import Pattern, patterns_of
 from ldls.errors import FileFormatError, LdlsError, SourceError
 from ldls.io import read_masks, read_points
+from ldls.io.cameras.field_file import MAX_BYTES
 from ldls.io.images import read_image_size
 from ldls.io.labels import read_labeling
 from ldls.io.masks.formats import READERS as MASK_READERS
 from ldls.io.points import READERS as POINT_READERS
 from ldls.io.points.float_rows import likeliest_columns
 
-IMAGES = (".png", ".jpg", ".jpeg")
 CALIBRATIONS = (".yaml", ".yml", ".xml", ".json", ".toml", ".txt")
 NO_IMAGE_WORDS = ("mask", "inst", "seg", "label", "panoptic", "birds-eye", "comparison")
 """Parts of the names of pictures that no camera took."""
 MOST_OTHERS = 3
+"""Other ways to read a transform that are listed."""
 FEWEST_POINTS = 50
 """Rows of numbers that make a text a cloud."""
 
@@ -66,13 +68,13 @@ def propose(folder: Path) -> Proposal:
         SourceError: The folder has no cloud that can be read.
     """
     patterns = [pattern for pattern in patterns_of(folder) if PurePosixPath(pattern.text).name != FILE]
-    clouds = [pattern for pattern in patterns if pattern.suffix in POINT_READERS and _cloud(pattern) is not None]
+    read = ((pattern, _cloud(pattern)) for pattern in patterns if pattern.suffix in POINT_READERS)
+    clouds = [(pattern, *cloud) for pattern, cloud in read if cloud is not None]
     if not clouds:
         seen = ", ".join(pattern.text for pattern in patterns[:8]) or "nothing"
         raise SourceError(f"{folder}: no file is a lidar sweep ({', '.join(POINT_READERS)}); found {seen}")
     pictures = [pattern for pattern in patterns if _is_picture(pattern)]
-    sweeps = max(clouds, key=lambda cloud: (_most_shared(cloud, pictures), cloud.n_bytes))
-    points, columns = _known(_cloud(sweeps))
+    sweeps, points, columns = max(clouds, key=lambda each: (_most_shared(each[0], pictures), each[0].n_bytes))
     made = Proposal()
     made.lines += [
         "# What `ldls init` found; lines with # ? are questions. Paths are relative to this folder; {frame} is",
@@ -83,10 +85,10 @@ def propose(folder: Path) -> Proposal:
     if columns is not None:
         made.lines.append(f"columns = {columns}")
         made.ask(f"the first file makes sense as rows of {columns} floats")
-    for other in clouds:
+    for other, _, _ in clouds:
         if other is not sweeps:
             made.ask(f"{other.text} ({_count(other, 'cloud')}) is not used")
-    _add_truth(made, sweeps, patterns, len(points))
+    _add_truth(made, sweeps, patterns, columns)
     cameras = [picture for picture in pictures if picture.shared(sweeps)]
     if not cameras:
         made.missing.append(_no_images(sweeps, pictures))
@@ -107,13 +109,8 @@ def _cloud(pattern: Pattern) -> tuple[Points, int | None] | None:
     return None
 
 
-def _known(cloud: tuple[Points, int | None] | None) -> tuple[Points, int | None]:
-    assert cloud is not None
-    return cloud
-
-
 def _is_picture(pattern: Pattern) -> bool:
-    if pattern.suffix not in IMAGES or any(word in pattern.text.lower() for word in NO_IMAGE_WORDS):
+    if pattern.suffix not in IMAGE_SUFFIXES or any(word in pattern.text.lower() for word in NO_IMAGE_WORDS):
         return False
     with suppress(FileFormatError):
         read_image_size(pattern.first[1])
@@ -135,13 +132,14 @@ def _no_images(sweeps: Pattern, pictures: Sequence[Pattern]) -> str:
     )
 
 
-def _add_truth(made: Proposal, sweeps: Pattern, patterns: Iterable[Pattern], n_points: int) -> None:
+def _add_truth(made: Proposal, sweeps: Pattern, patterns: Iterable[Pattern], columns: int | None) -> None:
     for pattern in patterns:
         common = pattern.shared(sweeps)
         if pattern.suffix not in (".label", ".txt") or not common or pattern is sweeps:
             continue
         with suppress(LdlsError, ImportError):
-            if len(read_labeling(pattern.files[min(sweeps.files)])) == n_points:
+            name = min(common)
+            if len(read_labeling(pattern.files[name])) == len(read_points(sweeps.files[name], columns=columns)):
                 made.lines.append(f'truth = "{pattern.text}"')
                 made.found.append(f"{pattern.text}: true labels")
                 return
@@ -175,7 +173,7 @@ def _add_masks(
     fitting = []
     for other in others:
         common = other.shared(picture)
-        if other.suffix not in MASK_READERS or not common or (other.suffix in IMAGES and _is_picture(other)):
+        if other.suffix not in MASK_READERS or not common or (other.suffix in IMAGE_SUFFIXES and _is_picture(other)):
             continue
         with suppress(LdlsError, ImportError, ValueError):
             read_masks(other.files[min(common)], image_size=size)
@@ -246,7 +244,7 @@ def _add_calibration(
 
 
 def _camera_of(pattern: Pattern, sweeps: Pattern, name: str) -> FoundCamera | None:
-    return camera_in(_file(pattern, sweeps), pattern.text, name.rpartition("_")[2] if "_" in name else name)
+    return camera_in(_file(pattern, sweeps), pattern.text, name.rpartition("_")[2])
 
 
 def _file(pattern: Pattern, sweeps: Pattern) -> Path:
@@ -261,7 +259,7 @@ def _judge(made: Proposal, name: str, share: float, *, upright: bool = True) -> 
 
 
 def _names(pattern: Pattern, name: str) -> bool:
-    return name.rpartition("/")[2].lower() in pattern.text.lower()
+    return name.lower() in pattern.text.lower()
 
 
 def _count(pattern: Pattern, what: str) -> str:

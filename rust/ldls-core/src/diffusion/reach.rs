@@ -86,7 +86,7 @@ impl Reach {
         (0..count).into_par_iter().map(winner).collect()
     }
 
-    /// Likelihoods of all labels at a point, before it is told from which the winner is.
+    /// Likelihoods of all labels at the point in this place of `self.points`, which is one of those asked for.
     fn values(
         &self,
         a: &PointGraph<f64>,
