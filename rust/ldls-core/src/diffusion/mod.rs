@@ -8,6 +8,7 @@
 
 mod convergence;
 mod pass;
+mod phases;
 mod products;
 mod reach;
 mod schedule;

@@ -7,9 +7,10 @@
 //! every step ("sparse tiling": Strout et al., Int. J. High Performance Computing Applications 18(1), 2004). The values
 //! do not depend on it.
 
+use super::phases;
 use crate::graph::PointGraph;
 use crate::memory::{filled, push, with_room, zeros};
-use crate::{Cancel, Error, Real, Result};
+use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
@@ -20,8 +21,6 @@ pub(super) const ROWS_A_TASK: usize = 2048;
 pub(super) const BLOCK: usize = 16;
 /// Rows of a tile.
 const TILE: usize = 4 * BLOCK;
-/// Fewest tiles for a task of the thread pool.
-const TILES_A_TASK: usize = 4;
 /// Blocks between two looks at the flag.
 const BLOCKS_A_LOOK: usize = 4096;
 /// Tiles of a region: some 16 MB of values and edges.
@@ -144,21 +143,28 @@ impl Schedule {
         cancel: &Cancel,
         work: impl Fn(Range<usize>, usize) + Sync,
     ) -> Result<()> {
-        for first in (0..steps).step_by(self.round) {
-            for (place, range) in self.offsets.windows(2).enumerate() {
-                let step = first + place % self.round;
-                if step < steps {
-                    let tiles = self.order[range[0]..range[1]].par_iter();
-                    tiles.with_min_len(TILES_A_TASK).try_for_each(|&tile| {
-                        cancel.check()?;
-                        let start = tile as usize * TILE;
-                        work(start..self.rows.min(start + TILE), step);
-                        Ok::<(), Error>(())
-                    })?;
-                }
+        let places = self.offsets.len() - 1;
+        let step = |phase: usize| phase / places * self.round + phase % places % self.round;
+        let tiles = |phase: usize| {
+            let place = phase % places;
+            // the last round may have fewer steps than the others
+            let is_asked_for = step(phase) < steps;
+            let begin = self.offsets[place];
+            let end = if is_asked_for {
+                self.offsets[place + 1]
+            } else {
+                begin
+            };
+            &self.order[begin..end]
+        };
+        let rounds = steps.div_ceil(self.round);
+        let count = |phase| tiles(phase).len();
+        phases::run(rounds * places, count, cancel, |phase, turn| {
+            for &tile in &tiles(phase)[turn] {
+                let start = tile as usize * TILE;
+                work(start..self.rows.min(start + TILE), step(phase));
             }
-        }
-        Ok(())
+        })
     }
 }
 
