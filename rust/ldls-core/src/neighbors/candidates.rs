@@ -18,8 +18,9 @@ pub(crate) fn precedes(a: Candidate, b: Candidate) -> bool {
     a.0 < b.0 || (a.0 == b.0 && a.1 < b.1)
 }
 
-/// Fills `row` with the nearest of `candidates`, by double precision; false if they are too few.
-pub(crate) fn decide(
+/// Fills `row` with the nearest of `candidates`, of which there are at most `LEN`, by double precision; false if they are
+/// too few.
+pub(crate) fn decide<const LEN: usize>(
     tree: &KdTree,
     points: &[[f64; 3]],
     candidates: &[Key],
@@ -27,7 +28,7 @@ pub(crate) fn decide(
     row: &mut [u32],
 ) -> bool {
     let from = points[position];
-    let mut exact = [(0.0, 0, 0); 288];
+    let mut exact = [(0.0, 0, 0); LEN];
     let mut count = 0;
     for other in candidates
         .iter()

@@ -73,7 +73,7 @@ fn search_with<const LEN: usize>(
     for slot in (0..FAN).filter(|slot| wanted >> slot & 1 == 1) {
         let position = leaf * FAN + slot;
         if search.overflow >> slot & 1 == 1
-            || !decide(
+            || !decide::<LEN>(
                 tree,
                 points,
                 search.candidates(slot),
