@@ -66,7 +66,11 @@ fn number_cells(places: &[[f64; 3]], cancel: &Cancel) -> Result<(Vec<u32>, Cells
 }
 
 fn cell([x, y, _]: &[f64; 3]) -> Cell {
-    let along = |axis: &f64| (axis / CELL_M).floor() as i64;
+    let along = |axis: &f64| {
+        // rounds down, which `floor` needs a call for on older processors
+        let cell = (axis / CELL_M) as i64;
+        cell - i64::from(axis / CELL_M < cell as f64)
+    };
     (along(x), along(y))
 }
 

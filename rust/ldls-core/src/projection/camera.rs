@@ -109,11 +109,13 @@ impl Camera {
     /// The position of a point of the lidar frame relative to an image of `height` x `width` pixels.
     #[inline]
     pub(crate) fn sight(&self, xyz: &[f64; 3], height: usize, width: usize) -> Sight {
-        let [u, v, depth] = self.project(xyz);
+        let depth = self.row(2, xyz);
         if !(depth > self.min_depth_m) {
-            Sight::Behind
-        } else if nearest_pixel([u, v], height, width).is_some() {
-            Sight::Seen([u, v])
+            return Sight::Behind;
+        }
+        let uv = self.pixel(xyz, depth);
+        if nearest_pixel(uv, height, width).is_some() {
+            Sight::Seen(uv)
         } else {
             Sight::Outside
         }
@@ -144,23 +146,30 @@ impl Camera {
     /// u and v in pixels, and the depth in metres, of a point in the lidar frame. Points beyond the reach of the lens
     /// have no pixel: u and v are NaN.
     #[inline]
-    pub fn project(&self, [x, y, z]: &[f64; 3]) -> [f64; 3] {
-        let m = &self.matrix;
-        let row = |i: usize| m[(i, 0)] * x + m[(i, 1)] * y + m[(i, 2)] * z + m[(i, 3)];
-        let w = row(2);
-        let [x, y] = [row(0) / w, row(1) / w];
+    pub fn project(&self, xyz: &[f64; 3]) -> [f64; 3] {
+        let depth = self.row(2, xyz);
+        let [u, v] = self.pixel(xyz, depth);
+        [u, v, depth]
+    }
+
+    /// u and v of a point at `depth`.
+    #[inline]
+    fn pixel(&self, xyz: &[f64; 3], depth: f64) -> [f64; 2] {
+        let [x, y] = [self.row(0, xyz) / depth, self.row(1, xyz) / depth];
         if self.lens.is_none() {
-            return [x, y, w];
+            return [x, y];
         }
         let k = &self.intrinsic;
-        match self.lens.bend([x, y]) {
-            Some([x, y]) => [
-                k[(0, 0)] * x + k[(0, 1)] * y + k[(0, 2)],
-                k[(1, 0)] * x + k[(1, 1)] * y + k[(1, 2)],
-                w,
-            ],
-            None => [f64::NAN, f64::NAN, w],
-        }
+        self.lens.bend([x, y]).map_or([f64::NAN; 2], |[x, y]| {
+            [0, 1].map(|row| k[(row, 0)] * x + k[(row, 1)] * y + k[(row, 2)])
+        })
+    }
+
+    /// A row of the matrix times a point.
+    #[inline]
+    fn row(&self, row: usize, [x, y, z]: &[f64; 3]) -> f64 {
+        let m = &self.matrix;
+        m[(row, 0)] * x + m[(row, 1)] * y + m[(row, 2)] * z + m[(row, 3)]
     }
 }
 
@@ -174,8 +183,8 @@ fn center(t_camera_lidar: &Matrix4<f64>) -> [f64; 3] {
 /// The pixel nearest to `uv`, as column and row, if it lies in an image of `height` x `width` pixels.
 #[inline]
 pub(crate) fn nearest_pixel([u, v]: [f64; 2], height: usize, width: usize) -> Option<[usize; 2]> {
-    let [column, row] = [u, v].map(|c| (c + 0.5).floor());
-    // written so that NaN fails
+    let [column, row] = [u + 0.5, v + 0.5];
+    // written so that NaN fails; from 0 on, a cast rounds down
     let inside = column >= 0.0 && column < width as f64 && row >= 0.0 && row < height as f64;
     inside.then_some([column as usize, row as usize])
 }

@@ -184,11 +184,12 @@ impl Counts {
     /// The point of a row, if it is usable; counts it otherwise.
     fn usable(&mut self, cloud: Cloud, row: usize, keep_origin: bool) -> Result<Option<[f64; 3]>> {
         let xyz = cloud.xyz(row);
-        if !xyz.iter().all(|c| c.is_finite()) {
-            self.nonfinite += 1;
-            return Ok(None);
-        }
-        if let Some(&value) = xyz.iter().find(|c| c.abs() > COORDINATE_LIMIT_M) {
+        // written so that NaN fails
+        if let Some(&value) = xyz.iter().find(|c| !(c.abs() <= COORDINATE_LIMIT_M)) {
+            if !xyz.iter().all(|c| c.is_finite()) {
+                self.nonfinite += 1;
+                return Ok(None);
+            }
             return Err(Error::CoordinateOutOfRange {
                 row,
                 value,
