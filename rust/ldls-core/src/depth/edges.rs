@@ -1,6 +1,6 @@
 //! How far pixels lie from the edge of a mask, inside and outside.
 
-use crate::memory::{collect, zeros};
+use crate::memory::{collect, filled};
 use crate::{Cancel, Result, Rle};
 use std::ops::Range;
 
@@ -31,13 +31,9 @@ impl Edges {
             side.start.saturating_sub(margin)..(side.end + margin).min(end)
         };
         let (columns, rows) = (around(columns, mask.width()), around(rows, mask.height()));
-        let mut inside = zeros(columns.len() * rows.len(), cancel)?;
-        for (column, span) in mask.column_spans() {
-            let start = (column - columns.start) * rows.len();
-            inside[start + span.start - rows.start..start + span.end - rows.start].fill(true);
-        }
-        let to_outside = steps_to(&inside, false, rows.len(), cancel)?;
-        let to_inside = steps_to(&inside, true, rows.len(), cancel)?;
+        let window = [columns.clone(), rows.clone()];
+        let to_outside = steps_to(&mask.complement(), &window, cancel)?;
+        let to_inside = steps_to(mask, &window, cancel)?;
         let signed = |(&out, &back): (&u8, &u8)| match (out, back) {
             (0, back) if usize::from(back) <= margin => -(back as i8),
             (out, _) => out.min(REACH as u8) as i8,
@@ -48,6 +44,11 @@ impl Edges {
             rows,
             steps,
         }))
+    }
+
+    /// Columns of the window.
+    pub(super) fn columns(&self) -> Range<usize> {
+        self.columns.clone()
     }
 
     /// Steps from the pixel `[column, row]` to the edge: positive inside the mask, negative beside it within the margin,
@@ -71,28 +72,51 @@ fn extent(mask: &Rle) -> Option<[Range<usize>; 2]> {
     all
 }
 
-/// Steps from each pixel to the nearest one of `wanted`, at most one more than [`REACH`], in columns of `height` pixels.
-fn steps_to(pixels: &[bool], wanted: bool, height: usize, cancel: &Cancel) -> Result<Vec<u8>> {
-    let start = |&pixel: &bool| if pixel == wanted { 0 } else { FARTHER };
-    let mut steps = collect(pixels.iter().map(start), cancel)?;
-    // two passes: what comes from the columns before and the pixels above, and then the other way around
-    for _ in 0..2 {
-        let mut before = vec![FARTHER; height];
-        for column in steps.chunks_exact_mut(height) {
-            let mut above = FARTHER;
-            for row in 0..height {
-                let beside = &before[row.saturating_sub(1)..(row + 2).min(height)];
-                let nearest = beside
-                    .iter()
-                    .fold(above, |nearest, &other| nearest.min(other));
-                above = column[row].min(nearest + 1);
-                column[row] = above;
-            }
-            before.copy_from_slice(column);
+/// Steps from each pixel of a window, columns and rows, to the nearest one of `mask` in it, at most [`FARTHER`].
+fn steps_to(mask: &Rle, [columns, rows]: &[Range<usize>; 2], cancel: &Cancel) -> Result<Vec<u8>> {
+    let mut steps = filled(FARTHER, columns.len() * rows.len(), cancel)?;
+    for (column, span) in mask.column_spans() {
+        let span = span.start.max(rows.start)..span.end.min(rows.end);
+        if columns.contains(&column) && !span.is_empty() {
+            let start = (column - columns.start) * rows.len();
+            let span = span.start - rows.start..span.end - rows.start;
+            surround(&mut steps[start..start + rows.len()], span);
         }
-        steps.reverse();
     }
+    spread(&mut steps, rows.len());
     Ok(steps)
+}
+
+/// Steps along a column to the pixels of a span, where none is nearer.
+fn surround(column: &mut [u8], span: Range<usize>) {
+    let (above, others) = column.split_at_mut(span.start);
+    let (own, below) = others.split_at_mut(span.len());
+    own.fill(0);
+    let nearer = |(step, pixel): (u8, &mut u8)| *pixel = step.min(*pixel);
+    (1..FARTHER).zip(above.iter_mut().rev()).for_each(nearer);
+    (1..FARTHER).zip(below).for_each(nearer);
+}
+
+/// Turns steps along each column, of `height` pixels, into those by any of the eight neighbours: over columns first, from
+/// one side and then from the other.
+fn spread(steps: &mut [u8], height: usize) {
+    for column in 1..steps.len() / height {
+        let (before, after) = steps.split_at_mut(column * height);
+        step_over(&before[(column - 1) * height..], &mut after[..height]);
+    }
+    for column in (1..steps.len() / height).rev() {
+        let (before, after) = steps.split_at_mut(column * height);
+        step_over(&after[..height], &mut before[(column - 1) * height..]);
+    }
+}
+
+/// Takes one step from a column `from` to the one beside it, straight or to a side.
+fn step_over(from: &[u8], to: &mut [u8]) {
+    let above = std::iter::once(&FARTHER).chain(from);
+    let below = from[1..].iter().chain(std::iter::once(&FARTHER));
+    for (((to, above), &straight), &below) in to.iter_mut().zip(above).zip(from).zip(below) {
+        *to = (*to).min(1 + straight.min(*above).min(below));
+    }
 }
 
 #[cfg(test)]

@@ -5,17 +5,16 @@
 
 mod edges;
 mod groups;
+mod pixels;
 
 use crate::masks::InstanceMasks;
-use crate::memory::{collect, push, with_room, zeros};
-use crate::projection::nearest_pixel;
+use crate::memory::{collect, push, zeros};
 use crate::{Cancel, Params, Result, Rle};
 use edges::Edges;
 use groups::{Member, object_of};
+use pixels::Pixels;
 use rayon::prelude::*;
 
-/// Points between two looks at the flag.
-const POINTS_A_BLOCK: usize = 1 << 16;
 /// Values above which the two halves are sorted by two threads.
 const PARALLEL: usize = 1 << 16;
 
@@ -59,26 +58,18 @@ impl InstanceMasks {
         params: &Params,
         cancel: &Cancel,
     ) -> Result<DepthGroups> {
-        let pixel = |(point, &uv): (usize, &[f64; 2])| {
-            let pixel = nearest_pixel(uv, self.height(), self.width())?;
-            standing[point].then_some((point, pixel))
-        };
-        let mut pixels = with_room(standing.iter().filter(|&&stands| stands).count())?;
-        for (block, uv) in uv.chunks(POINTS_A_BLOCK).enumerate() {
-            cancel.check()?;
-            pixels.extend((block * POINTS_A_BLOCK..).zip(uv).filter_map(pixel));
-        }
+        let pixels = Pixels::of(uv, standing, [self.height(), self.width()], cancel)?;
         let of_mask = |mask: &Rle| {
             cancel.check()?;
             let Some(edges) = Edges::of(mask, params.edge_margin, cancel)? else {
                 return Ok(None);
             };
             let (mut members, mut beside) = (Vec::new(), Vec::new());
-            for block in pixels.chunks(POINTS_A_BLOCK) {
+            for column in edges.columns() {
                 cancel.check()?;
-                for &(point, pixel) in block {
-                    let distance = distances[point];
-                    match edges.steps_at(pixel) {
+                for &(row, point) in pixels.of_column(column) {
+                    let distance = distances[point as usize];
+                    match edges.steps_at([column, row as usize]) {
                         0 => {}
                         steps @ 1.. => {
                             let weight = u64::from(steps.unsigned_abs());
@@ -102,7 +93,7 @@ impl InstanceMasks {
         let mut unsure = zeros(uv.len(), cancel)?;
         if params.edge_margin > 0.0 {
             let points = found.iter().flatten().flat_map(|(_, beside)| beside);
-            points.for_each(|&(_, point)| unsure[point] = true);
+            points.for_each(|&(_, point)| unsure[point as usize] = true);
         }
         let intervals = found
             .into_iter()

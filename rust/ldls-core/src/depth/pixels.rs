@@ -1,0 +1,60 @@
+//! The nearest pixels of points, column by column, so that a mask need not look at all of them.
+
+use crate::memory::{with_room, zeros};
+use crate::projection::nearest_pixel;
+use crate::{Cancel, Result};
+
+/// Points between two looks at the flag.
+const POINTS_A_BLOCK: usize = 1 << 16;
+
+/// Row of the nearest pixel and number of some points, by the column of the pixel.
+pub(super) struct Pixels {
+    /// Those of column c lie at `offsets[c]..offsets[c + 1]`.
+    offsets: Vec<usize>,
+    points: Vec<(u32, u32)>,
+}
+
+impl Pixels {
+    /// The pixels nearest to `uv` of the points that are `wanted`, in an image of `height` x `width` pixels.
+    pub(super) fn of(
+        uv: &[[f64; 2]],
+        wanted: &[bool],
+        [height, width]: [usize; 2],
+        cancel: &Cancel,
+    ) -> Result<Self> {
+        let mut seen = with_room(wanted.iter().filter(|&&wanted| wanted).count())?;
+        let mut offsets = zeros(width + 1, cancel)?;
+        for (block, uv) in uv.chunks(POINTS_A_BLOCK).enumerate() {
+            cancel.check()?;
+            let wanted = (block * POINTS_A_BLOCK..)
+                .zip(uv)
+                .filter(|(point, _)| wanted[*point]);
+            for (point, &uv) in wanted {
+                if let Some([column, row]) = nearest_pixel(uv, height, width) {
+                    offsets[column + 1] += 1;
+                    seen.push((column, (row as u32, point as u32)));
+                }
+            }
+        }
+        for column in 0..width {
+            offsets[column + 1] += offsets[column];
+        }
+        let mut points = zeros(seen.len(), cancel)?;
+        for block in seen.chunks(POINTS_A_BLOCK) {
+            cancel.check()?;
+            for &(column, point) in block {
+                points[offsets[column]] = point;
+                offsets[column] += 1;
+            }
+        }
+        // each column now begins where it ended
+        offsets.rotate_right(1);
+        offsets[0] = 0;
+        Ok(Self { offsets, points })
+    }
+
+    /// Rows and numbers of the points of a column.
+    pub(super) fn of_column(&self, column: usize) -> &[(u32, u32)] {
+        &self.points[self.offsets[column]..self.offsets[column + 1]]
+    }
+}
