@@ -29,19 +29,26 @@ pub fn calibrated_confidence(
     scores: &[f32],
     cancel: &Cancel,
 ) -> Result<Vec<f32>> {
-    let probability = |i: usize| {
-        let share = log_odds(shares[i], SHARES);
-        let odds = match (diffused[i], labels[i]) {
+    let scores: Vec<f64> = scores
+        .iter()
+        .map(|&score| log_odds(score, SCORES))
+        .collect();
+    let probability = |share: f32, diffused: u32, label: u32| {
+        let share = log_odds(share, SHARES);
+        let odds = match (diffused, label) {
             (0, _) => BACKGROUND[0] + BACKGROUND[1] * share,
             (_, 0) => REMOVED[0] + REMOVED[1] * share,
-            (_, label) => {
-                let score = log_odds(scores[label as usize - 1], SCORES);
-                OBJECT[0] + OBJECT[1] * share + OBJECT[2] * score
-            }
+            (_, label) => OBJECT[0] + OBJECT[1] * share + OBJECT[2] * scores[label as usize - 1],
         };
         (1.0 / (1.0 + (-odds).exp())) as f32
     };
-    tabulate(shares.len(), probability, cancel)
+    // most points are far from all objects
+    let surest = probability(1.0, 0, 0);
+    let of_point = |i: usize| match (diffused[i], shares[i]) {
+        (0, 1.0) => surest,
+        (diffused, share) => probability(share, diffused, labels[i]),
+    };
+    tabulate(shares.len(), of_point, cancel)
 }
 
 fn log_odds(probability: f32, [low, high]: [f64; 2]) -> f64 {

@@ -87,11 +87,21 @@ impl LabelImage {
         let rows = row.saturating_sub(reach)..(row + reach + 1).min(self.height);
         counts.pixels = (columns.len() * rows.len()) as u32;
         counts.sets.clear();
+        // pixels of one set come in runs
+        let (mut last, mut run) = (0, 0);
         for column in columns {
             let start = column * self.height;
             for &set in &self.pixels[start + rows.start..start + rows.end] {
-                add_count(&mut counts.sets, set, 1);
+                if set != last && run > 0 {
+                    add_count(&mut counts.sets, last, run);
+                    run = 0;
+                }
+                last = set;
+                run += 1;
             }
+        }
+        if run > 0 {
+            add_count(&mut counts.sets, last, run);
         }
         counts.labels.clear();
         for &(set, count) in &counts.sets {
