@@ -210,7 +210,7 @@ def nothing_in_view(result: Segmentation) -> str | None:
 
 def _expected_on_masks(views: Sequence[SeenView]) -> float:
     """Points that would fall on the masks if those in view were spread evenly over the images."""
-    areas = [(seen, sum(mask.area for mask in seen.view.masks)) for seen in views]
+    areas = [(seen, sum(seen.view.masks.core.areas())) for seen in views]
     return sum(len(seen.in_view) * area / (seen.view.masks.height * seen.view.masks.width) for seen, area in areas)
 
 
@@ -299,6 +299,6 @@ def _warning(message: str, category: type[Warning]) -> None:
 def _report(arrays: _ldls.SegmentationArrays, views: tuple[View, ...], instances: tuple[Instance, ...]) -> Report:
     counts = dict(arrays.report)
     del counts["bounds"], counts["only_islands"]
-    areas = [[mask.area for mask in view.masks] for view in views]
+    areas = [view.masks.core.areas() for view in views]
     empty = tuple(i.label for i in instances if not any(areas[number][mask] for number, mask in i.sources))
     return Report(n_points=len(arrays.labels), n_in_view=len(arrays.in_view), empty_masks=empty, **counts)

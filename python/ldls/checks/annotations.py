@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import itertools
 import sys
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -50,7 +51,9 @@ def _checked(callee: Checked, error: type[InputError] | None) -> Checked:
         # the class stays what it is, and its instances can be pickled
         type.__setattr__(callee, "__init__", _checked(callee.__init__, error))  # type: ignore[misc]
         return callee
-    signature = inspect.signature(callee)
+    parameters = inspect.signature(callee).parameters
+    by_place = [name for name, each in parameters.items() if each.kind in _BY_PLACE]
+    takes_all = any(each.kind is inspect.Parameter.VAR_KEYWORD for each in parameters.values())
     names: dict[str, Any] = callee.__globals__
 
     @functools.cache
@@ -58,14 +61,18 @@ def _checked(callee: Checked, error: type[InputError] | None) -> Checked:
         # the names in annotations are those of the module once it is whole
         return {
             name: _ANYTHING if each.kind in _COLLECTING else _kind(_resolved(each.annotation, names))
-            for name, each in signature.parameters.items()
+            for name, each in parameters.items()
         }
 
     @functools.wraps(callee)
     def call(*arguments: Any, **keywords: Any) -> Any:  # noqa: ANN401
-        for name, value in _bound(signature, callee, arguments, keywords).items():
-            if not kinds()[name].accepts(value):
-                raise _refused(name, value, kinds()[name], error)
+        # what is missing, too much or given twice is left to the call itself
+        for name, value in itertools.chain(zip(by_place, arguments, strict=False), keywords.items()):
+            kind = kinds().get(name, _ANYTHING if takes_all else None)
+            if kind is None:
+                raise _unknown(name, callee, parameters)
+            if not kind.accepts(value):
+                raise _refused(name, value, kind, error)
         return callee(*arguments, **keywords)
 
     return cast(Checked, call)
@@ -86,6 +93,7 @@ class _Kind:
 
 _ANYTHING = _Kind(lambda value: True, "")
 _COLLECTING = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+_BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 
 def _resolved(annotation: object, names: dict[str, Any]) -> object:
@@ -201,18 +209,12 @@ def _is_iterable(value: object) -> bool:
     return isinstance(value, Iterable) and not isinstance(value, str | bytes) and not is_of_numpy(value, "ndarray")
 
 
-def _bound(
-    signature: inspect.Signature, callee: Callable[..., Any], arguments: Sequence[Any], keywords: Mapping[str, Any]
-) -> dict[str, Any]:
-    unknown = [word for word in keywords if word not in signature.parameters]
-    takes_all = any(each.kind is inspect.Parameter.VAR_KEYWORD for each in signature.parameters.values())
-    if unknown and not takes_all:
-        near = get_close_matches(unknown[0], [name for name in signature.parameters if name != "self"], n=1, cutoff=0.5)
-        known = ", ".join(name for name in signature.parameters if name not in ("self", "cls"))
-        hint = f"did you mean {near[0]!r}?" if near else f"expected {known or 'none'}"
-        name = callee.__qualname__.removesuffix(".__init__")
-        raise TypeError(f"{name}() got an unexpected keyword argument {unknown[0]!r}; {hint}")
-    return signature.bind(*arguments, **keywords).arguments
+def _unknown(word: str, callee: Callable[..., Any], parameters: Iterable[str]) -> TypeError:
+    known = [name for name in parameters if name not in ("self", "cls")]
+    near = get_close_matches(word, known, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]!r}?" if near else f"expected {', '.join(known) or 'none'}"
+    name = callee.__qualname__.removesuffix(".__init__")
+    return TypeError(f"{name}() got an unexpected keyword argument {word!r}; {hint}")
 
 
 def _refused(name: str, value: object, kind: _Kind, error: type[InputError] | None) -> InputError:

@@ -283,7 +283,7 @@ class InstanceMasks:
         if categories is not None:
             kept &= np.isin(self.categories, find_categories(categories, self.names))
         if min_area > 0:
-            kept &= np.array([mask.area >= min_area for mask in self], np.bool_)
+            kept &= np.array(self.core.areas()) >= min_area
         return self if kept.all() else self.select(kept)
 
     @checked
@@ -299,7 +299,7 @@ class InstanceMasks:
         """
         keys = {
             "score": -self.scores,
-            "area": np.array([mask.area for mask in self]),
+            "area": np.array(self.core.areas()),
             "order": np.arange(len(self)),
         }
         if by not in keys:

@@ -170,6 +170,10 @@ impl Masks {
         self.0.len()
     }
 
+    fn areas(&self) -> Vec<usize> {
+        self.0.masks().iter().map(ldls_core::Rle::area).collect()
+    }
+
     fn paint(
         &self,
         py: Python<'_>,
