@@ -7,6 +7,7 @@
 //! trusted, the products are run as they stand.
 
 mod convergence;
+mod errors;
 mod pass;
 mod phases;
 mod products;
@@ -21,6 +22,7 @@ mod winners;
 pub use convergence::Convergence;
 pub use products::Products;
 
+use self::errors::Errors;
 use self::pass::Pass;
 use self::reach::Reach;
 use self::schedule::Schedule;
@@ -68,20 +70,36 @@ pub fn diffuse(
     b.check(a.len(), n_labels)?;
     let mut best = filled(Best::default(), a.len(), cancel)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let choose = |pass: &Pass<f32, WIDTH_F32>| winners::update(&mut best, pass);
+    let mut probed = Vec::new();
+    let choose = |pass: &Pass<f32, WIDTH_F32>| {
+        winners::update(&mut best, pass);
+        if let Some(errors) = pass.errors(cancel)? {
+            probed = errors;
+        }
+        Ok(())
+    };
     let mut convergence = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
-    let contested = winners::contested(&best, convergence.error)?;
+    let errors = Errors { a, probed };
+    let error = |point: u32| errors.at(point as usize);
+    let mut contested = winners::contested(&best, convergence.error)?;
+    contested.retain(|&point| best[point as usize].may_win(1, error(point)));
     if !contested.is_empty() {
-        let reach = iterations.map(|products| Reach::of(a, &contested, products, cancel));
+        // where the series of single precision was given up, that of double precision is no better
+        let held = iterations.filter(|&products| convergence.sweeps < products);
+        let series = held.and_then(|_| Series::of_graph(a, iterations, TOLERANCE_F64));
+        let reach =
+            iterations.map(|products| Reach::of(a, &contested, products, series.as_ref(), cancel));
         let labels = if let Some(reach) = reach.transpose()?.flatten() {
             let (a, b) = exact(Some(&reach.points))?;
             reach.winners((&a, &b), n_labels, contested.len(), cancel)?
         } else {
             let (a, b) = exact(None)?;
-            let labels = winners::candidates(&best, &contested, n_labels, convergence.error);
+            let labels = winners::candidates(&best, &contested, n_labels, error);
             let mut refined = filled((0, f64::NEG_INFINITY), contested.len(), cancel)?;
-            let choose =
-                |pass: &Pass<f64, WIDTH_F64>| winners::refine(&contested, &mut refined, pass);
+            let choose = |pass: &Pass<f64, WIDTH_F64>| {
+                winners::refine(&contested, &mut refined, pass);
+                Ok(())
+            };
             for_each_pass(&a, &b, &labels, iterations, cancel, choose)?;
             collect(refined.iter().map(|&(label, _)| label), cancel)?
         };
@@ -117,6 +135,7 @@ pub fn likelihoods(
                 row[label as usize] = values[lane];
             }
         }
+        Ok(())
     };
     let convergence = for_each_pass(a, b, &labels, iterations, cancel, write)?;
     Ok((all, convergence))
@@ -129,7 +148,7 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
     labels: &[u32],
     iterations: Option<usize>,
     cancel: &Cancel,
-    mut done: impl FnMut(&Pass<T, WIDTH>),
+    mut done: impl FnMut(&Pass<T, WIDTH>) -> Result<()>,
 ) -> Result<Convergence> {
     // in single precision, a probe shows how large the terms left out may be
     let probed = WIDTH == WIDTH_F32;
@@ -147,7 +166,7 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
             pass = Pass::run(a, &schedule, &seeds, None, iterations, cancel)?;
         }
         cancel.check()?;
-        done(&pass);
+        done(&pass)?;
         convergence.merge(pass.convergence);
     }
     Ok(convergence)

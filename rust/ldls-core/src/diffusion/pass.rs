@@ -7,6 +7,7 @@ use super::series::Series;
 use super::sweep::{Step, take_steps};
 use super::values::zeros;
 use crate::graph::PointGraph;
+use crate::memory::tabulate;
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 
@@ -25,6 +26,8 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     z: Vec<Vec<[T; WIDTH]>>,
     /// Values before the last step, which the next one overwrites.
     previous: Vec<Vec<[T; WIDTH]>>,
+    /// Sum of the magnitudes of the coefficients that a series leaves out.
+    left_out: f64,
     pub(super) convergence: Convergence,
 }
 
@@ -96,6 +99,7 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
             activity: Activity::new(schedule, seeds.groups(WIDTH, cancel)?, groups),
             z,
             previous,
+            left_out: 0.0,
             convergence: Convergence::default(),
         })
     }
@@ -113,7 +117,10 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         self.advance(&steps, cancel)?;
         self.convergence.sweeps = series.degree();
         // the probe has gone through the recurrence as the last term alone
-        self.convergence.error = series.tail * self.largest_probe();
+        self.left_out = series.tail;
+        let errors = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
+        let errors = errors.filter_map(|point| self.error(point));
+        self.convergence.error = errors.reduce(|| 0.0, f64::max);
         Ok(())
     }
 
@@ -165,12 +172,19 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         (0..self.z.len()).map(of_group).fold(0.0, f64::max)
     }
 
-    fn largest_probe(&self) -> f64 {
-        let Some(lane) = self.seeds.probe_lane() else {
-            return 0.0;
-        };
-        let values = self.z[lane / WIDTH].iter().map(|row| row[lane % WIDTH]);
-        values.map(|value| value.to_f64().abs()).fold(0.0, f64::max)
+    /// What the series may leave out at a point, going by the probe there; none where there is no series or no probe.
+    fn error(&self, point: usize) -> Option<f64> {
+        let lane = self.seeds.probe_lane().filter(|_| self.left_out > 0.0)?;
+        Some(self.left_out * self.z[lane / WIDTH][point][lane % WIDTH].to_f64().abs())
+    }
+
+    /// That of all points.
+    pub(super) fn errors(&self, cancel: &Cancel) -> Result<Option<Vec<f32>>> {
+        if self.a.is_empty() || self.error(0).is_none() {
+            return Ok(None);
+        }
+        let error = |point| self.error(point).unwrap_or_default() as f32;
+        tabulate(self.a.len(), error, cancel).map(Some)
     }
 
     /// True if little is left out, no likelihood is negative, and those of no point sum to more than `overlap`, the most

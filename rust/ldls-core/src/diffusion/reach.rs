@@ -1,23 +1,28 @@
 //! The likelihoods of a few points in double precision, by the part of the graph that flows to them.
 //!
-//! The value of label l at point i after T products is row i of 1 + A + ... + A^(T - 1), times column l of b. That row is
-//! a one at i diffused backwards, along the edges of each point that it has come to, and ends T - 1 edges away. So few points
-//! need few rows of A and b, and all labels come from one vector.
+//! The value of label l at point i is row i of a polynomial of A, times column l of b: of 1 + A + ... + A^(T - 1) after T
+//! products, or of the series that stands for it. That row is a one at i diffused backwards, along the edges of each point
+//! that it has come to, and ends as many edges away as the polynomial has powers. So few points need few rows of A and b,
+//! and all labels come from one vector.
 
+use super::series::Series;
+use super::sweep::Step;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect, filled, push, zeros};
+use crate::memory::{filled, push, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 
 /// Most work, in sweeps of one label over the whole graph, before it is diffused as a whole instead.
 const MOST_SWEEPS: usize = 32;
-/// Share of the largest value within which values are equal: what rounding leaves of equal ones.
+/// Share of the largest value within which values are equal: what a series and rounding leave of equal ones.
 const EQUAL: f64 = 1e-13;
 
 /// What some points may have labels from.
 #[derive(Debug)]
 pub(super) struct Reach {
+    /// The terms of the polynomial, each by the two before it.
+    terms: Vec<Step<f64>>,
     /// The points themselves, then all from which edges lead to them, those of the fewest edges first.
     pub(super) points: Vec<u32>,
     /// Number of points within 0, 1 and more edges.
@@ -25,8 +30,8 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// The reach of `from` in so many products over `a`, and what the rows that they need are normalised with; none
-    /// where that is much of a large graph.
+    /// The reach of `from` in so many products over `a`, or in the `series` that stands for them, and what the rows that
+    /// they need are normalised with; none where that is much of a large graph.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
@@ -34,8 +39,10 @@ impl Reach {
         a: &PointGraph<T>,
         from: &[u32],
         products: usize,
+        series: Option<&Series>,
         cancel: &Cancel,
     ) -> Result<Option<Self>> {
+        let terms = series.map_or_else(|| powers(products), chebyshev_terms);
         let most = MOST_SWEEPS.saturating_mul(a.len());
         let mut met = filled(false, a.len(), cancel)?;
         let (mut points, mut ends) = (Vec::new(), Vec::new());
@@ -45,7 +52,7 @@ impl Reach {
         }
         push(&mut ends, points.len())?;
         let (mut first, mut work) = (0, 0);
-        for _ in 0..products {
+        for _ in &terms {
             cancel.check()?;
             let last = points.len();
             work += from.len() * last;
@@ -62,7 +69,11 @@ impl Reach {
             first = last;
             push(&mut ends, points.len())?;
         }
-        Ok(Some(Self { points, ends }))
+        Ok(Some(Self {
+            terms,
+            points,
+            ends,
+        }))
     }
 
     /// The label that wins at each of the first `count` points, of equal ones the lowest. `a` and `b` are of `self.points`,
@@ -95,27 +106,26 @@ impl Reach {
         point: usize,
         cancel: &Cancel,
     ) -> Result<Vec<f64>> {
-        let within = self.ends[self.ends.len().saturating_sub(2)];
-        let mut flow = zeros(self.points.len(), cancel)?;
-        flow[point] = 1.0;
-        let mut sum = collect(flow.iter().copied(), cancel)?;
-        let mut next = zeros(self.points.len(), cancel)?;
-        for &end in &self.ends[..self.ends.len().saturating_sub(2)] {
-            next.fill(0.0);
-            for (at, &share) in flow[..end]
-                .iter()
-                .enumerate()
-                .filter(|(_, share)| **share != 0.0)
-            {
+        let size = self.points.len();
+        // a term, and the one before it, whose place the next one takes
+        let (mut term, mut before) = (zeros(size, cancel)?, zeros(size, cancel)?);
+        term[point] = 1.0;
+        let mut sum = zeros(size, cancel)?;
+        sum[point] = self.terms[0].seeds;
+        for (step, ends) in self.terms[1..].iter().zip(self.ends.windows(2)) {
+            cancel.check()?;
+            let next = before[..ends[1]].iter_mut().zip(&term);
+            next.for_each(|(next, term)| *next = -step.stay * term - step.back * *next);
+            for (at, share) in term[..ends[0]].iter().enumerate() {
                 for (column, weight) in a.row(at) {
-                    next[column] += share * weight;
+                    before[column] += step.along * share * weight;
                 }
             }
-            sum.iter_mut()
-                .zip(&next)
-                .for_each(|(sum, next)| *sum += next);
-            std::mem::swap(&mut flow, &mut next);
+            std::mem::swap(&mut term, &mut before);
+            let sums = sum[..ends[1]].iter_mut().zip(&term);
+            sums.for_each(|(sum, term)| *sum += step.seeds * term);
         }
+        let within = self.ends[self.terms.len() - 1];
         let mut values = vec![0.0; n_labels];
         for (at, share) in sum[..within].iter().enumerate() {
             for (label, weight) in b.row(at) {
@@ -124,6 +134,31 @@ impl Reach {
         }
         Ok(values)
     }
+}
+
+/// The terms of 1 + A + A^2 and so on.
+fn powers(count: usize) -> Vec<Step<f64>> {
+    let power = Step {
+        seeds: 1.0,
+        along: 1.0,
+        stay: 0.0,
+        back: 0.0,
+    };
+    vec![power; count]
+}
+
+/// The terms of a series: `T_k = 2 X T_(k-1) - T_(k-2)`, after 1 and X = (A - middle) / half width.
+fn chebyshev_terms(series: &Series) -> Vec<Step<f64>> {
+    let term = |(k, &seeds): (usize, &f64)| {
+        let [times, back] = if k < 2 { [1.0, 0.0] } else { [2.0, 1.0] };
+        Step {
+            seeds,
+            along: times / series.half_width,
+            stay: times * series.middle / series.half_width,
+            back,
+        }
+    };
+    series.coefficients.iter().enumerate().map(term).collect()
 }
 
 #[cfg(test)]
@@ -142,7 +177,7 @@ mod tests {
 
     #[test]
     fn it_ends_as_many_edges_away_as_there_are_products() {
-        let reach = Reach::of(&chain(9), &[5, 2], 2, Cancel::never())
+        let reach = Reach::of(&chain(9), &[5, 2], 2, None, Cancel::never())
             .unwrap()
             .unwrap();
         assert_eq!(reach.points, [5, 2, 6, 3, 7, 4]);
@@ -151,7 +186,8 @@ mod tests {
 
     #[test]
     fn what_is_much_of_the_graph_is_left_to_a_diffusion_of_all() {
-        let reach = |products| Reach::of(&chain(40), &[0], products, Cancel::never()).unwrap();
+        let reach =
+            |products| Reach::of(&chain(40), &[0], products, None, Cancel::never()).unwrap();
         assert!(reach(30).is_some());
         assert!(reach(200).is_none());
     }
@@ -166,12 +202,16 @@ mod tests {
             mass: vec![1.0; 6],
         };
         let from = [1, 2, 3, 5];
-        let reach = Reach::of(&a, &from, 3, Cancel::never()).unwrap().unwrap();
+        let reach = Reach::of(&a, &from, 3, None, Cancel::never())
+            .unwrap()
+            .unwrap();
         let (near_a, near_b) = (a.among(&reach.points), b.among(&reach.points));
         let found = reach.winners((&near_a, &near_b), 4, from.len(), Cancel::never());
         // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5
         assert_eq!(found.unwrap(), [1, 2, 2, 0]);
-        let one = Reach::of(&a, &[2], 1, Cancel::never()).unwrap().unwrap();
+        let one = Reach::of(&a, &[2], 1, None, Cancel::never())
+            .unwrap()
+            .unwrap();
         let near = (&a.among(&one.points), &b.among(&one.points));
         assert_eq!(one.winners(near, 4, 1, Cancel::never()).unwrap(), [1]);
     }

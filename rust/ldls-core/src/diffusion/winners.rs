@@ -40,7 +40,7 @@ impl Best {
     }
 
     /// True if the value at `rank` may really be the largest, where each may be off by `error`.
-    fn may_win(&self, rank: usize, error: f64) -> bool {
+    pub(super) fn may_win(&self, rank: usize, error: f64) -> bool {
         let behind = f64::from(self.values[0] - self.values[rank]);
         self.values[rank] > 0.0 && behind <= f64::from(ROUNDING * self.values[0]) + 2.0 * error
     }
@@ -74,10 +74,18 @@ pub(super) fn contested(best: &[Best], error: f64) -> Result<Vec<u32>> {
     Ok(points)
 }
 
-/// The labels that may win at any of `points`, ascending.
-pub(super) fn candidates(best: &[Best], points: &[u32], n_labels: usize, error: f64) -> Vec<u32> {
+/// The labels that may win at any of `points`, ascending, where each value may be off by the `error` of the point.
+pub(super) fn candidates(
+    best: &[Best],
+    points: &[u32],
+    n_labels: usize,
+    error: impl Fn(u32) -> f64,
+) -> Vec<u32> {
     let at = |&point: &u32| &best[point as usize];
-    if points.iter().any(|point| at(point).may_win(2, error)) {
+    if points
+        .iter()
+        .any(|point| at(point).may_win(2, error(*point)))
+    {
         return (0..n_labels as u32).collect();
     }
     let mut labels: Vec<u32> = points.iter().flat_map(|point| at(point).labels).collect();
@@ -153,10 +161,10 @@ mod tests {
     fn where_a_third_label_may_win_all_are_candidates() {
         let two = best(&[(1, 0.5), (4, 0.5), (6, 0.1)]);
         let three = best(&[(1, 0.5), (4, 0.5), (6, 0.5)]);
-        assert_eq!(candidates(&[two], &[0], 9, 0.0), [1, 4]);
-        assert_eq!(candidates(&[two, three], &[0], 9, 0.0), [1, 4]);
+        assert_eq!(candidates(&[two], &[0], 9, |_| 0.0), [1, 4]);
+        assert_eq!(candidates(&[two, three], &[0], 9, |_| 0.0), [1, 4]);
         let all: Vec<u32> = (0..9).collect();
-        assert_eq!(candidates(&[two, three], &[0, 1], 9, 0.0), all);
-        assert_eq!(candidates(&[two], &[0], 9, 0.2), all);
+        assert_eq!(candidates(&[two, three], &[0, 1], 9, |_| 0.0), all);
+        assert_eq!(candidates(&[two], &[0], 9, |_| 0.2), all);
     }
 }

@@ -11,9 +11,6 @@ use std::sync::Arc;
 /// Rows handled by one task of the thread pool.
 const ROWS_A_TASK: usize = 1024;
 
-/// Rows between two looks at the flag where one thread does the work.
-const ROWS_A_BLOCK: usize = 1 << 16;
-
 /// Weighted edges between points in compressed sparse rows: row i lists the points that label flows
 /// from to point i.
 #[derive(Debug, Clone, PartialEq)]
@@ -141,19 +138,14 @@ impl<T: Real> PointGraph<T> {
                 problem,
             });
         }
-        for (i, &here) in ground.iter().enumerate() {
-            if i % ROWS_A_BLOCK == 0 {
-                cancel.check()?;
-            }
-            let range = self.layout.range(i..i + 1);
-            let edges = self.weights[range.clone()]
-                .iter_mut()
-                .zip(&self.columns[range]);
-            for (weight, _) in edges.filter(|(_, j)| ground[**j as usize] != here) {
+        let range = |rows| self.layout.range(rows);
+        let weaken = |i: usize, weights: &mut [T]| {
+            let edges = weights.iter_mut().zip(&self.columns[range(i..i + 1)]);
+            for (weight, _) in edges.filter(|(_, j)| ground[**j as usize] != ground[i]) {
                 *weight = T::from_f64(weight.to_f64() * factor);
             }
-        }
-        Ok(())
+        };
+        for_each_row(&mut self.weights, ground.len(), range, weaken, cancel)
     }
 
     /// A graph from the three arrays of a sparse matrix.
@@ -308,27 +300,40 @@ impl<T: Real> PointGraph<T> {
 
 /// Multiplies the values of each row, which lie at `range` of it, by its scale.
 fn scale_rows<T: Real>(
-    mut values: &mut [T],
+    values: &mut [T],
     scales: &[f64],
     range: impl Fn(Range<usize>) -> Range<usize> + Sync,
     cancel: &Cancel,
 ) -> Result<()> {
-    let mut tasks = Vec::with_capacity(scales.len().div_ceil(ROWS_A_TASK));
-    for (task, scales) in scales.chunks(ROWS_A_TASK).enumerate() {
-        let first = task * ROWS_A_TASK;
-        let (head, tail) = values.split_at_mut(range(first..first + scales.len()).len());
-        tasks.push((head, first, scales));
+    let scale = |i: usize, row: &mut [T]| {
+        for value in row {
+            rescale(value, scales[i]);
+        }
+    };
+    for_each_row(values, scales.len(), range, scale, cancel)
+}
+
+/// Calls `work` with each of `count` rows and its values, which lie at `range` of it, on all threads of the pool.
+fn for_each_row<T: Real>(
+    mut values: &mut [T],
+    count: usize,
+    range: impl Fn(Range<usize>) -> Range<usize> + Sync,
+    work: impl Fn(usize, &mut [T]) + Sync,
+    cancel: &Cancel,
+) -> Result<()> {
+    let mut tasks = Vec::with_capacity(count.div_ceil(ROWS_A_TASK));
+    for first in (0..count).step_by(ROWS_A_TASK) {
+        let rows = first..count.min(first + ROWS_A_TASK);
+        let (head, tail) = values.split_at_mut(range(rows.clone()).len());
+        tasks.push((head, rows));
         values = tail;
     }
-    let tasks = tasks.into_par_iter();
-    tasks.try_for_each(|(values, first, scales)| {
+    tasks.into_par_iter().try_for_each(|(values, rows)| {
         cancel.check()?;
-        let start = range(first..first).start;
-        for (i, &scale) in (first..).zip(scales) {
+        let start = range(rows.start..rows.start).start;
+        for i in rows {
             let row = range(i..i + 1);
-            values[row.start - start..row.end - start]
-                .iter_mut()
-                .for_each(|value| rescale(value, scale));
+            work(i, &mut values[row.start - start..row.end - start]);
         }
         Ok(())
     })

@@ -1,0 +1,45 @@
+//! How far off the values of a series may be at a point.
+//!
+//! What a series leaves out is about as large as its last term, which the probe has gone through as. That differs by
+//! orders of magnitude from one part of a cloud to another, and where it passes zero at a point it does not around it.
+
+use crate::graph::PointGraph;
+
+/// By how many times the terms left out may be larger than the last one around a point.
+const SAFETY: f64 = 4.0;
+
+/// What the series may leave out at each point, going by the probe there.
+#[derive(Debug)]
+pub(super) struct Errors<'a> {
+    pub(super) a: &'a PointGraph,
+    /// Nothing where no series was used.
+    pub(super) probed: Vec<f32>,
+}
+
+impl Errors<'_> {
+    /// By how much values at a point may be off, going by the probe at all points within two edges.
+    pub(super) fn at(&self, point: usize) -> f64 {
+        if self.probed.is_empty() {
+            return 0.0;
+        }
+        let next = |from| self.a.row(from).map(|(to, _)| to);
+        let around = next(point).flat_map(next).chain([point]);
+        SAFETY * f64::from(around.map(|at| self.probed[at]).fold(0.0, f32::max))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_those_within_two_edges() {
+        let rows = [vec![0, 1], vec![1, 2], vec![2, 3], vec![3]];
+        let offsets = vec![0, 2, 4, 6, 7];
+        let a = PointGraph::from_csr(offsets, rows.concat(), vec![0.25; 7]).unwrap();
+        let errors = |probed| Errors { a: &a, probed };
+        let probed = errors(vec![0.25, 0.0, 0.5, 1.0]);
+        assert_eq!([0, 1, 3].map(|point| probed.at(point)), [2.0, 4.0, 4.0]);
+        assert_eq!(errors(Vec::new()).at(0), 0.0);
+    }
+}
