@@ -28,7 +28,7 @@ use self::reach::Reach;
 use self::schedule::Schedule;
 use self::seeds::{Seeds, plan};
 use self::series::Series;
-use self::sweep::{WIDTH_F32, WIDTH_F64};
+use self::sweep::{Step, WIDTH_F32, WIDTH_F64};
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
@@ -84,25 +84,31 @@ pub fn diffuse(
     let mut contested = winners::contested(&best, convergence.error)?;
     contested.retain(|&point| best[point as usize].may_win(1, error(point)));
     if !contested.is_empty() {
+        let candidates = winners::candidates(&best, &contested, n_labels, error);
         // where the series of single precision was given up, that of double precision is no better
-        let held = iterations.filter(|&products| convergence.sweeps < products);
-        let series = held.and_then(|_| Series::of_graph(a, iterations, TOLERANCE_F64));
-        let reach =
-            iterations.map(|products| Reach::of(a, &contested, products, series.as_ref(), cancel));
-        let labels = if let Some(reach) = reach.transpose()?.flatten() {
-            let (a, b) = exact(Some(&reach.points))?;
-            reach.winners((&a, &b), n_labels, contested.len(), cancel)?
-        } else {
-            let (a, b) = exact(None)?;
-            let labels = winners::candidates(&best, &contested, n_labels, error);
-            let mut refined = filled((0, f64::NEG_INFINITY), contested.len(), cancel)?;
-            let choose = |pass: &Pass<f64, WIDTH_F64>| {
-                winners::refine(&contested, &mut refined, pass);
-                Ok(())
-            };
-            for_each_pass(&a, &b, &labels, iterations, cancel, choose)?;
-            collect(refined.iter().map(|&(label, _)| label), cancel)?
+        let held = iterations.is_some_and(|products| convergence.sweeps < products);
+        let series = held.then(|| Series::of_graph(a, iterations, TOLERANCE_F64));
+        let polynomial = match (series.flatten(), iterations) {
+            (Some(series), _) => Some((series.coefficients[series.degree()], series.steps())),
+            (None, products) => products.map(|products| (1.0, vec![Step::product(); products - 1])),
         };
+        let reach = polynomial
+            .as_ref()
+            .map(|(_, steps)| Reach::of(a, &contested, steps.len(), cancel));
+        let labels =
+            if let Some((reach, (first, steps))) = reach.transpose()?.flatten().zip(polynomial) {
+                let (a, b) = exact(Some(&reach.points))?;
+                reach.winners((&a, &b), &candidates, (first, &steps), cancel)?
+            } else {
+                let (a, b) = exact(None)?;
+                let mut refined = filled((0, f64::NEG_INFINITY), contested.len(), cancel)?;
+                let choose = |pass: &Pass<f64, WIDTH_F64>| {
+                    winners::refine(&contested, &mut refined, pass);
+                    Ok(())
+                };
+                for_each_pass(&a, &b, &candidates, iterations, cancel, choose)?;
+                collect(refined.iter().map(|&(label, _)| label), cancel)?
+            };
         for (&point, label) in contested.iter().zip(labels) {
             best[point as usize].labels[0] = label;
         }

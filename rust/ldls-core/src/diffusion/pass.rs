@@ -48,13 +48,13 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         match (series, iterations) {
             (Some(series), _) => pass.run_series(series, cancel)?,
             (None, Some(products)) => {
-                pass.advance(&vec![product(); products.saturating_sub(1)], cancel)?;
+                pass.advance(&vec![Step::product(); products.saturating_sub(1)], cancel)?;
                 pass.convergence.sweeps = products;
             }
             (None, None) => {
                 pass.convergence.sweeps = 1;
                 while pass.largest_change() > CONVERGED && pass.convergence.sweeps < MOST_SWEEPS {
-                    pass.advance(&[product()], cancel)?;
+                    pass.advance(&[Step::product()], cancel)?;
                     pass.convergence.sweeps += 1;
                 }
             }
@@ -104,17 +104,8 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         })
     }
 
-    /// Clenshaw's recurrence: `y_k = c_k b + 2 X y_(k+1) - y_(k+2)`, `X = (A - middle) / half width`.
     fn run_series(&mut self, series: &Series, cancel: &Cancel) -> Result<()> {
-        let step_of = |k: usize| {
-            // the last step takes X once, all others twice
-            let times = if k == 0 { 1.0 } else { 2.0 };
-            let along = times / series.half_width;
-            let stay = times * series.middle / series.half_width;
-            step(series.coefficients[k], along, stay, 1.0)
-        };
-        let steps: Vec<Step<T>> = (0..series.degree()).rev().map(step_of).collect();
-        self.advance(&steps, cancel)?;
+        self.advance(&series.steps(), cancel)?;
         self.convergence.sweeps = series.degree();
         // the probe has gone through the recurrence as the last term alone
         self.left_out = series.tail;
@@ -144,7 +135,7 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     /// One more product, for the residual; the values are those before it.
     fn measure_residual(&mut self, cancel: &Cancel) -> Result<()> {
-        self.advance(&[product()], cancel)?;
+        self.advance(&[Step::product()], cancel)?;
         self.convergence.sweeps += 1;
         self.convergence.residual = Some(self.largest_change());
         std::mem::swap(&mut self.z, &mut self.previous);
@@ -202,21 +193,6 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         };
         let points = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
         self.convergence.error <= LARGEST_ERROR && points.all(row_is_sound)
-    }
-}
-
-/// z <- A z + b as it stands.
-fn product<T: Real>() -> Step<T> {
-    step(1.0, 1.0, 0.0, 0.0)
-}
-
-fn step<T: Real>(seeds: f64, along: f64, stay: f64, back: f64) -> Step<T> {
-    let [seeds, along, stay, back] = [seeds, along, stay, back].map(T::from_f64);
-    Step {
-        seeds,
-        along,
-        stay,
-        back,
     }
 }
 

@@ -1,28 +1,25 @@
 //! The likelihoods of a few points in double precision, by the part of the graph that flows to them.
 //!
-//! The value of label l at point i is row i of a polynomial of A, times column l of b: of 1 + A + ... + A^(T - 1) after T
-//! products, or of the series that stands for it. That row is a one at i diffused backwards, along the edges of each point
-//! that it has come to, and ends as many edges away as the polynomial has powers. So few points need few rows of A and b,
-//! and all labels come from one vector.
+//! A step takes values one edge farther, so before the last step only the points themselves and those that they have edges
+//! from matter, before the one before it those two edges away, and so on: a tenth of a frame on average.
 
-use super::series::Series;
-use super::sweep::Step;
+use super::sweep::{Step, WIDTH_F64};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{filled, push, zeros};
-use crate::{Cancel, Real, Result};
+use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 
-/// Most work, in sweeps of one label over the whole graph, before it is diffused as a whole instead.
-const MOST_SWEEPS: usize = 32;
-/// Share of the largest value within which values are equal: what a series and rounding leave of equal ones.
+/// Share of the work of diffusing the whole graph from which on that is done instead.
+const MUCH: f64 = 0.5;
+/// Share of the largest value within which values are equal: what rounding leaves of equal ones.
 const EQUAL: f64 = 1e-13;
+/// Rows handled by one task of the thread pool.
+const ROWS_A_TASK: usize = 1024;
 
 /// What some points may have labels from.
 #[derive(Debug)]
 pub(super) struct Reach {
-    /// The terms of the polynomial, each by the two before it.
-    terms: Vec<Step<f64>>,
     /// The points themselves, then all from which edges lead to them, those of the fewest edges first.
     pub(super) points: Vec<u32>,
     /// Number of points within 0, 1 and more edges.
@@ -30,20 +27,18 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// The reach of `from` in so many products over `a`, or in the `series` that stands for them, and what the rows that
-    /// they need are normalised with; none where that is much of a large graph.
+    /// The reach of `from` in so many steps over `a`, and what the rows that they need are normalised with; none where
+    /// that is much of the graph.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
-    pub(super) fn of<T: Real>(
-        a: &PointGraph<T>,
+    pub(super) fn of(
+        a: &PointGraph,
         from: &[u32],
-        products: usize,
-        series: Option<&Series>,
+        steps: usize,
         cancel: &Cancel,
     ) -> Result<Option<Self>> {
-        let terms = series.map_or_else(|| powers(products), chebyshev_terms);
-        let most = MOST_SWEEPS.saturating_mul(a.len());
+        let much = MUCH * steps.max(1) as f64 * a.len() as f64;
         let mut met = filled(false, a.len(), cancel)?;
         let (mut points, mut ends) = (Vec::new(), Vec::new());
         for &point in from {
@@ -52,11 +47,11 @@ impl Reach {
         }
         push(&mut ends, points.len())?;
         let (mut first, mut work) = (0, 0);
-        for _ in &terms {
+        for _ in 0..=steps {
             cancel.check()?;
             let last = points.len();
-            work += from.len() * last;
-            if work > most {
+            work += last;
+            if work as f64 > much {
                 return Ok(None);
             }
             for at in first..last {
@@ -69,150 +64,128 @@ impl Reach {
             first = last;
             push(&mut ends, points.len())?;
         }
-        Ok(Some(Self {
-            terms,
-            points,
-            ends,
-        }))
+        Ok(Some(Self { points, ends }))
     }
 
-    /// The label that wins at each of the first `count` points, of equal ones the lowest. `a` and `b` are of `self.points`,
-    /// in this order; rows of the outermost of them do not matter.
+    /// Which of `labels`, ascending, wins at each of the points themselves, of equal ones the lowest, after `steps` from
+    /// `first` times the seeds. `a` and `b` are of `self.points`, in this order; rows of the outermost do not matter.
     pub(super) fn winners(
         &self,
         (a, b): (&PointGraph<f64>, &PixelLabels<f64>),
-        n_labels: usize,
-        count: usize,
+        labels: &[u32],
+        (first, steps): (f64, &[Step<f64>]),
         cancel: &Cancel,
     ) -> Result<Vec<u32>> {
-        let winner = |point| {
-            cancel.check()?;
-            let values = self.values(a, b, n_labels, point, cancel)?;
-            let best = values.iter().copied().fold(0.0, f64::max);
-            let first = values
-                .iter()
-                .position(|&value| value >= best * (1.0 - EQUAL));
-            Ok(first.unwrap_or(0) as u32)
+        let groups = labels.chunks(WIDTH_F64);
+        let values = groups.map(|labels| self.values(a, b, labels, (first, steps), cancel));
+        let values = values.collect::<Result<Vec<_>>>()?;
+        let winner = |at: usize| {
+            let of_labels = || values.iter().flat_map(|group| group[at]).zip(labels);
+            let best = of_labels().fold(0.0, |best: f64, (value, _)| best.max(value));
+            let mut winners = of_labels().filter(|(value, _)| *value >= best * (1.0 - EQUAL));
+            winners.next().map_or(0, |(_, &label)| label)
         };
-        (0..count).into_par_iter().map(winner).collect()
+        Ok((0..self.ends[0]).map(winner).collect())
     }
 
-    /// Likelihoods of all labels at the point in this place of `self.points`, which is one of those asked for.
+    /// Likelihoods of a group of labels at the points themselves.
     fn values(
         &self,
         a: &PointGraph<f64>,
         b: &PixelLabels<f64>,
-        n_labels: usize,
-        point: usize,
+        labels: &[u32],
+        (first, steps): (f64, &[Step<f64>]),
         cancel: &Cancel,
-    ) -> Result<Vec<f64>> {
-        let size = self.points.len();
-        // a term, and the one before it, whose place the next one takes
-        let (mut term, mut before) = (zeros(size, cancel)?, zeros(size, cancel)?);
-        term[point] = 1.0;
-        let mut sum = zeros(size, cancel)?;
-        sum[point] = self.terms[0].seeds;
-        for (step, ends) in self.terms[1..].iter().zip(self.ends.windows(2)) {
-            cancel.check()?;
-            let next = before[..ends[1]].iter_mut().zip(&term);
-            next.for_each(|(next, term)| *next = -step.stay * term - step.back * *next);
-            for (at, share) in term[..ends[0]].iter().enumerate() {
-                for (column, weight) in a.row(at) {
-                    before[column] += step.along * share * weight;
+    ) -> Result<Vec<[f64; WIDTH_F64]>> {
+        let mut seeds: Vec<[f64; WIDTH_F64]> = zeros(self.ends[steps.len()], cancel)?;
+        for (at, seeds) in seeds.iter_mut().enumerate() {
+            for (label, weight) in b.row(at) {
+                if let Some(lane) = labels.iter().position(|&own| own as usize == label) {
+                    seeds[lane] = weight;
                 }
             }
-            std::mem::swap(&mut term, &mut before);
-            let sums = sum[..ends[1]].iter_mut().zip(&term);
-            sums.for_each(|(sum, term)| *sum += step.seeds * term);
         }
-        let within = self.ends[self.terms.len() - 1];
-        let mut values = vec![0.0; n_labels];
-        for (at, share) in sum[..within].iter().enumerate() {
-            for (label, weight) in b.row(at) {
-                values[label] += share * weight;
-            }
+        let [mut values, mut next] = [zeros(seeds.len(), cancel)?, zeros(seeds.len(), cancel)?];
+        for (value, seed) in values.iter_mut().zip(&seeds) {
+            *value = seed.map(|seed| first * seed);
         }
+        for (step, &end) in steps.iter().zip(self.ends[..steps.len()].iter().rev()) {
+            let rows = next[..end]
+                .par_iter_mut()
+                .enumerate()
+                .with_min_len(ROWS_A_TASK);
+            rows.try_for_each(|(at, next)| {
+                cancel.check()?;
+                let mut sum = [0.0; WIDTH_F64];
+                for (column, weight) in a.row(at) {
+                    for lane in 0..WIDTH_F64 {
+                        sum[lane] += weight * values[column][lane];
+                    }
+                }
+                for lane in 0..WIDTH_F64 {
+                    next[lane] = step.seeds * seeds[at][lane] + step.along * sum[lane]
+                        - step.stay * values[at][lane]
+                        - step.back * next[lane];
+                }
+                Ok::<(), Error>(())
+            })?;
+            std::mem::swap(&mut values, &mut next);
+        }
+        values.truncate(self.ends[0]);
         Ok(values)
     }
-}
-
-/// The terms of 1 + A + A^2 and so on.
-fn powers(count: usize) -> Vec<Step<f64>> {
-    let power = Step {
-        seeds: 1.0,
-        along: 1.0,
-        stay: 0.0,
-        back: 0.0,
-    };
-    vec![power; count]
-}
-
-/// The terms of a series: `T_k = 2 X T_(k-1) - T_(k-2)`, after 1 and X = (A - middle) / half width.
-fn chebyshev_terms(series: &Series) -> Vec<Step<f64>> {
-    let term = |(k, &seeds): (usize, &f64)| {
-        let [times, back] = if k < 2 { [1.0, 0.0] } else { [2.0, 1.0] };
-        Step {
-            seeds,
-            along: times / series.half_width,
-            stay: times * series.middle / series.half_width,
-            back,
-        }
-    };
-    series.coefficients.iter().enumerate().map(term).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Real;
 
     /// A chain whose every point has edges to itself and to the next one, the last to itself alone.
-    fn chain(n: u32) -> PointGraph<f64> {
+    fn chain<T: Real>(n: u32) -> PointGraph<T> {
         let rows = (0..n).map(|i| if i + 1 < n { vec![i, i + 1] } else { vec![i] });
         let rows: Vec<Vec<u32>> = rows.collect();
         let offsets = (0..=n as usize).map(|i| rows[..i].iter().map(Vec::len).sum());
         let columns = rows.concat();
-        let weights = vec![0.25; columns.len()];
+        let weights = vec![T::from_f64(0.25); columns.len()];
         PointGraph::from_csr(offsets.collect(), columns, weights).unwrap()
     }
 
     #[test]
-    fn it_ends_as_many_edges_away_as_there_are_products() {
-        let reach = Reach::of(&chain(9), &[5, 2], 2, None, Cancel::never())
-            .unwrap()
-            .unwrap();
-        assert_eq!(reach.points, [5, 2, 6, 3, 7, 4]);
-        assert_eq!(reach.ends, [2, 4, 6]);
+    fn it_ends_as_many_edges_away_as_there_are_steps_and_one_more() {
+        let reach = Reach::of(&chain(90), &[5, 2], 2, Cancel::never());
+        let reach = reach.unwrap().unwrap();
+        assert_eq!(reach.points, [5, 2, 6, 3, 7, 4, 8]);
+        assert_eq!(reach.ends, [2, 4, 6, 7]);
     }
 
     #[test]
     fn what_is_much_of_the_graph_is_left_to_a_diffusion_of_all() {
-        let reach =
-            |products| Reach::of(&chain(40), &[0], products, None, Cancel::never()).unwrap();
+        let reach = |steps| Reach::of(&chain(40), &[0], steps, Cancel::never()).unwrap();
         assert!(reach(30).is_some());
         assert!(reach(200).is_none());
     }
 
     #[test]
     fn winners_are_those_of_the_products_and_of_equal_labels_the_lowest() {
-        let a = chain(6);
-        let b = PixelLabels {
-            offsets: vec![0, 1, 2, 4, 5, 6, 6],
+        let (a, n) = (chain(600), 600);
+        let mut b = PixelLabels {
+            offsets: vec![0, 1, 2, 4, 5, 6],
             labels: vec![3, 1, 1, 2, 2, 0],
             weights: vec![0.01, 0.5, 0.5, 0.5, 0.5, 0.75],
-            mass: vec![1.0; 6],
+            mass: vec![1.0; n],
         };
-        let from = [1, 2, 3, 5];
-        let reach = Reach::of(&a, &from, 3, None, Cancel::never())
-            .unwrap()
-            .unwrap();
-        let (near_a, near_b) = (a.among(&reach.points), b.among(&reach.points));
-        let found = reach.winners((&near_a, &near_b), 4, from.len(), Cancel::never());
+        b.offsets.resize(n + 1, 6);
+        let winners = |from: &[u32], products: usize| {
+            let reach = Reach::of(&chain(600), from, products - 1, Cancel::never());
+            let reach = reach.unwrap().unwrap();
+            let near = (&a.among(&reach.points), &b.among(&reach.points));
+            let steps = vec![Step::product(); products - 1];
+            let found = reach.winners(near, &[0, 1, 2, 3], (1.0, &steps), Cancel::never());
+            found.unwrap()
+        };
         // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5
-        assert_eq!(found.unwrap(), [1, 2, 2, 0]);
-        let one = Reach::of(&a, &[2], 1, None, Cancel::never())
-            .unwrap()
-            .unwrap();
-        let near = (&a.among(&one.points), &b.among(&one.points));
-        assert_eq!(one.winners(near, 4, 1, Cancel::never()).unwrap(), [1]);
+        assert_eq!(winners(&[1, 2, 3, 5], 3), [1, 2, 2, 0]);
+        assert_eq!(winners(&[2], 1), [1]);
     }
 }

@@ -6,6 +6,7 @@
 
 use super::convergence::MOST_SWEEPS;
 use super::schedule::ROWS_A_TASK;
+use super::sweep::Step;
 use crate::Real;
 use crate::graph::PointGraph;
 use rayon::prelude::*;
@@ -100,6 +101,19 @@ impl Series {
             coefficients,
             tail,
         }
+    }
+
+    /// Clenshaw's recurrence, from the last coefficient times b: `y_k = c_k b + 2 X y_(k+1) - y_(k+2)`, where X is
+    /// (A - middle) / half width.
+    pub(super) fn steps<T: Real>(&self) -> Vec<Step<T>> {
+        let step = |k: usize| {
+            // the last step takes X once, all others twice
+            let times = if k == 0 { 1.0 } else { 2.0 };
+            let along = times / self.half_width;
+            let stay = times * self.middle / self.half_width;
+            Step::new(self.coefficients[k], along, stay, 1.0)
+        };
+        (0..self.degree()).rev().map(step).collect()
     }
 
     /// Highest k of `T_k`.

@@ -31,6 +31,23 @@ pub(super) struct Step<T> {
     pub(super) back: T,
 }
 
+impl<T: Real> Step<T> {
+    /// z <- A z + b as it stands.
+    pub(super) fn product() -> Self {
+        Self::new(1.0, 1.0, 0.0, 0.0)
+    }
+
+    pub(super) fn new(seeds: f64, along: f64, stay: f64, back: f64) -> Self {
+        let [seeds, along, stay, back] = [seeds, along, stay, back].map(T::from_f64);
+        Self {
+            seeds,
+            along,
+            stay,
+            back,
+        }
+    }
+}
+
 /// Takes `steps` one after the other, each from the first of `values` to the second, which change places after it.
 pub(super) fn take_steps<T: Real, const WIDTH: usize>(
     a: &PointGraph<T>,

@@ -9,13 +9,16 @@ use rayon::prelude::*;
 /// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
 const ROUNDING: f32 = 2.5e-5;
 
+/// Labels of a point that are told apart from one another; any more that may win and all labels are looked at.
+const RANKS: usize = 3;
+
 /// The best labels of a point so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Best {
-    /// The winner and the one behind it; of equal ones the lowest first.
-    pub(super) labels: [u32; 2],
-    /// Their values and that of the third.
-    values: [f32; 3],
+    /// The winner and those behind it; of equal ones the lowest first.
+    pub(super) labels: [u32; RANKS],
+    /// Their values and that of the next one.
+    values: [f32; RANKS + 1],
     sum: f32,
 }
 
@@ -23,19 +26,19 @@ impl Best {
     #[inline]
     fn offer(&mut self, label: u32, value: f32) {
         self.sum += value;
-        if value <= self.values[2] {
+        if value <= self.values[RANKS] {
             return;
         }
-        let beats =
-            |other: f32, other_label: u32| value > other || (value == other && label < other_label);
-        if beats(self.values[0], self.labels[0]) {
-            self.values = [value, self.values[0], self.values[1]];
-            self.labels = [label, self.labels[0]];
-        } else if beats(self.values[1], self.labels[1]) {
-            self.values = [self.values[0], value, self.values[1]];
-            self.labels[1] = label;
-        } else {
-            self.values[2] = value;
+        let precedes = |rank: usize| {
+            let other = self.values[rank];
+            other > value || (other == value && self.labels[rank] < label)
+        };
+        let rank = (0..RANKS).find(|&rank| !precedes(rank)).unwrap_or(RANKS);
+        self.values.copy_within(rank..RANKS, rank + 1);
+        self.values[rank] = value;
+        if rank < RANKS {
+            self.labels.copy_within(rank..RANKS - 1, rank + 1);
+            self.labels[rank] = label;
         }
     }
 
@@ -81,14 +84,15 @@ pub(super) fn candidates(
     n_labels: usize,
     error: impl Fn(u32) -> f64,
 ) -> Vec<u32> {
-    let at = |&point: &u32| &best[point as usize];
-    if points
-        .iter()
-        .any(|point| at(point).may_win(2, error(*point)))
-    {
-        return (0..n_labels as u32).collect();
+    let mut labels = Vec::new();
+    for &point in points {
+        let (best, error) = (&best[point as usize], error(point));
+        if best.may_win(RANKS, error) {
+            return (0..n_labels as u32).collect();
+        }
+        let may_win = (0..RANKS).filter(|&rank| best.may_win(rank, error));
+        labels.extend(may_win.map(|rank| best.labels[rank]));
     }
-    let mut labels: Vec<u32> = points.iter().flat_map(|point| at(point).labels).collect();
     labels.sort_unstable();
     labels.dedup();
     labels
@@ -132,7 +136,7 @@ mod tests {
             [(0, 0.5), (3, 0.5), (7, 0.25)],
             [(7, 0.25), (3, 0.5), (0, 0.5)],
         ] {
-            assert_eq!(best(&values).labels, [0, 3]);
+            assert_eq!(best(&values).labels, [0, 3, 7]);
         }
     }
 
@@ -158,13 +162,13 @@ mod tests {
     }
 
     #[test]
-    fn where_a_third_label_may_win_all_are_candidates() {
+    fn where_a_fourth_label_may_win_all_are_candidates() {
         let two = best(&[(1, 0.5), (4, 0.5), (6, 0.1)]);
-        let three = best(&[(1, 0.5), (4, 0.5), (6, 0.5)]);
+        let four = best(&[(1, 0.5), (4, 0.5), (6, 0.5), (8, 0.5)]);
         assert_eq!(candidates(&[two], &[0], 9, |_| 0.0), [1, 4]);
-        assert_eq!(candidates(&[two, three], &[0], 9, |_| 0.0), [1, 4]);
+        assert_eq!(candidates(&[two], &[0], 9, |_| 0.2), [1, 4, 6]);
+        assert_eq!(candidates(&[two, four], &[0], 9, |_| 0.0), [1, 4]);
         let all: Vec<u32> = (0..9).collect();
-        assert_eq!(candidates(&[two, three], &[0, 1], 9, |_| 0.0), all);
-        assert_eq!(candidates(&[two], &[0], 9, |_| 0.2), all);
+        assert_eq!(candidates(&[two, four], &[0, 1], 9, |_| 0.0), all);
     }
 }
