@@ -112,10 +112,17 @@ fn spread(steps: &mut [u8], height: usize) {
 
 /// Takes one step from a column `from` to the one beside it, straight or to a side.
 fn step_over(from: &[u8], to: &mut [u8]) {
-    let above = std::iter::once(&FARTHER).chain(from);
-    let below = from[1..].iter().chain(std::iter::once(&FARTHER));
-    for (((to, above), &straight), &below) in to.iter_mut().zip(above).zip(from).zip(below) {
-        *to = (*to).min(1 + straight.min(*above).min(below));
+    let last = from.len() - 1;
+    for row in [0, last] {
+        let beside = &from[row.saturating_sub(1)..(row + 2).min(from.len())];
+        let nearest = beside
+            .iter()
+            .fold(FARTHER, |nearest, &steps| nearest.min(steps));
+        to[row] = to[row].min(nearest + 1);
+    }
+    for (to, beside) in to[1..last.max(1)].iter_mut().zip(from.windows(3)) {
+        let nearest = beside[0].min(beside[1]).min(beside[2]);
+        *to = (*to).min(nearest + 1);
     }
 }
 

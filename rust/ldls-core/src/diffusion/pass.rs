@@ -148,6 +148,12 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         lanes.map(|(label, lane)| (label, &self.z[lane / WIDTH][..], lane % WIDTH))
     }
 
+    /// Values at all points and labels of the lanes of each group; no label for the probe.
+    pub(super) fn groups(&self) -> impl Iterator<Item = (&[[T; WIDTH]], &[Option<u32>])> {
+        let values = self.z.iter().map(Vec::as_slice);
+        values.zip(self.seeds.lanes.chunks(WIDTH))
+    }
+
     fn largest_change(&self) -> f64 {
         let probe = self.seeds.probe_lane();
         let of_group = |group: usize| {

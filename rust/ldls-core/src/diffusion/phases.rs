@@ -15,16 +15,16 @@ const ITEMS_A_TURN: usize = 4;
 /// Looks at the others' progress before a waiting thread offers its core to whoever else has work.
 const LOOKS_A_SPIN: usize = 1 << 10;
 
-/// Calls `work` with the number of each phase and with turns of its items, which are `items(phase)` for each phase below
-/// `phases`, on all threads of the pool that come. Whatever was written in a phase is visible in those after it.
+/// Calls `work` with each of `phases` and with turns of its items, so many as `items` says, on all threads of the pool that
+/// come. Whatever was written in a phase is visible in those after it.
 ///
 /// # Errors
 /// [`Error::Cancelled`]: some items have not been worked on then.
-pub(super) fn run(
-    phases: usize,
-    items: impl Fn(usize) -> usize + Sync,
+pub(super) fn run<P>(
+    phases: &(impl Iterator<Item = P> + Clone + Sync),
+    items: impl Fn(&P) -> usize + Sync,
     cancel: &Cancel,
-    work: impl Fn(usize, Range<usize>) + Sync,
+    work: impl Fn(&P, Range<usize>) + Sync,
 ) -> Result<()> {
     let crew = Crew {
         shares: (0..rayon::current_num_threads())
@@ -34,7 +34,7 @@ pub(super) fn run(
         done: AtomicUsize::new(0),
         left: AtomicBool::new(false),
     };
-    let member = || crew.go_through(phases, &items, cancel, &work);
+    let member = || crew.go_through(phases.clone(), &items, cancel, &work);
     rayon::scope(|scope| {
         for _ in 1..crew.shares.len() {
             scope.spawn(|_| member());
@@ -59,32 +59,33 @@ struct Crew {
 }
 
 impl Crew {
-    fn go_through(
+    fn go_through<P>(
         &self,
-        phases: usize,
-        items: &impl Fn(usize) -> usize,
+        phases: impl Iterator<Item = P>,
+        items: &impl Fn(&P) -> usize,
         cancel: &Cancel,
-        work: &impl Fn(usize, Range<usize>),
+        work: &impl Fn(&P, Range<usize>),
     ) {
         let leaving = Leaving(self);
         let (me, count) = (self.here.fetch_add(1, Relaxed), self.shares.len());
         let mut before = 0;
-        for phase in 0..phases {
-            let items = items(phase);
+        for (number, phase) in phases.enumerate() {
+            let items = items(&phase);
             if !self.wait_for(before) {
                 return;
             }
+            let mut taken = 0;
             for share in (me..me + count).map(|share| share % count) {
                 let [start, end] = [share, share + 1].map(|share| items * share / count);
-                while let Some(turn) = self.shares[share].take(phase, start..end) {
+                while let Some(turn) = self.shares[share].take(number, start..end) {
                     if cancel.check().is_err() {
                         return;
                     }
-                    let taken = turn.len();
-                    work(phase, turn);
-                    self.done.fetch_add(taken, AcqRel);
+                    taken += turn.len();
+                    work(&phase, turn);
                 }
             }
+            self.done.fetch_add(taken, AcqRel);
             before += items;
         }
         std::mem::forget(leaving);
@@ -164,7 +165,7 @@ mod tests {
                 .map(|&size| (0..size).map(|_| AtomicUsize::new(0)).collect())
                 .collect();
             let early = AtomicUsize::new(0);
-            let work = |phase: usize, items: Range<usize>| {
+            let work = |&phase: &usize, items: Range<usize>| {
                 let all =
                     |phase: &Vec<AtomicUsize>| phase.iter().all(|item| item.load(SeqCst) == 1);
                 early.fetch_add(usize::from(!worked[..phase].iter().all(all)), SeqCst);
@@ -173,7 +174,12 @@ mod tests {
                 }
             };
             let ran = on_threads(threads, || {
-                run(sizes.len(), |phase| sizes[phase], Cancel::never(), work)
+                run(
+                    &(0..sizes.len()),
+                    |&phase| sizes[phase],
+                    Cancel::never(),
+                    work,
+                )
             });
             ran.unwrap();
             assert_eq!(early.into_inner(), 0);
@@ -187,7 +193,7 @@ mod tests {
         on_threads(2, || {
             rayon::join(
                 || {
-                    run(50, |_| 20, Cancel::never(), |_, _| ()).unwrap();
+                    run(&(0..50), |_| 20, Cancel::never(), |_, _| ()).unwrap();
                     finished.store(true, SeqCst);
                 },
                 || {
@@ -205,10 +211,10 @@ mod tests {
             let cancel = Cancel::default();
             let ran = on_threads(threads, || {
                 run(
-                    1000,
+                    &(0..1000),
                     |_| 100,
                     &cancel,
-                    |phase, _| {
+                    |&phase, _| {
                         if phase == 500 {
                             cancel.cancel();
                         }
@@ -224,10 +230,10 @@ mod tests {
         let panicked = std::panic::catch_unwind(|| {
             on_threads(4, || {
                 run(
-                    1000,
+                    &(0..1000),
                     |_| 100,
                     Cancel::never(),
-                    |phase, items| {
+                    |&phase, items| {
                         assert!(phase < 500 || !items.contains(&50), "item 50");
                     },
                 )

@@ -143,26 +143,19 @@ impl Schedule {
         cancel: &Cancel,
         work: impl Fn(Range<usize>, usize) + Sync,
     ) -> Result<()> {
-        let places = self.offsets.len() - 1;
-        let step = |phase: usize| phase / places * self.round + phase % places % self.round;
-        let tiles = |phase: usize| {
-            let place = phase % places;
-            // the last round may have fewer steps than the others
-            let is_asked_for = step(phase) < steps;
-            let begin = self.offsets[place];
-            let end = if is_asked_for {
-                self.offsets[place + 1]
-            } else {
-                begin
-            };
-            &self.order[begin..end]
-        };
-        let rounds = steps.div_ceil(self.round);
-        let count = |phase| tiles(phase).len();
-        phases::run(rounds * places, count, cancel, |phase, turn| {
-            for &tile in &tiles(phase)[turn] {
+        let places = self.offsets.windows(2).enumerate();
+        let phases = (0..steps).step_by(self.round).flat_map(|first| {
+            let steps_of_round = places.clone().map(move |(place, range)| {
+                let tiles = &self.order[range[0]..range[1]];
+                (first + place % self.round, tiles)
+            });
+            steps_of_round.filter(|(step, _)| *step < steps)
+        });
+        let count = |(_, tiles): &(usize, &[u32])| tiles.len();
+        phases::run(&phases, count, cancel, |&(step, tiles), turn| {
+            for &tile in &tiles[turn] {
                 let start = tile as usize * TILE;
-                work(start..self.rows.min(start + TILE), step(phase));
+                work(start..self.rows.min(start + TILE), step);
             }
         })
     }

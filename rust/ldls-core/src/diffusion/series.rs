@@ -125,15 +125,15 @@ impl Series {
 /// An interval on which the real parts of all eigenvalues lie, if no weight is negative.
 fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
     let row = |i: usize| {
-        let (mut sum, mut diagonal) = (0.0, 0.0);
-        for (j, weight) in a.row(i) {
-            if weight < T::default() {
-                return None;
-            }
-            sum += weight.to_f64();
-            diagonal += if i == j { weight.to_f64() } else { 0.0 };
-        }
-        Some([2.0 * diagonal - sum, sum])
+        let (columns, weights) = a.slices(i..i + 1);
+        let sum: f64 = weights.iter().map(|weight| weight.to_f64()).sum();
+        let own = columns
+            .iter()
+            .zip(weights)
+            .filter(|(column, _)| **column as usize == i);
+        let own: f64 = own.map(|(_, weight)| weight.to_f64()).sum();
+        let positive = weights.iter().all(|weight| *weight >= T::default());
+        positive.then_some([2.0 * own - sum, sum])
     };
     let hull = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
     let rows = (0..a.len()).into_par_iter().with_min_len(ROWS_A_TASK);

@@ -147,7 +147,7 @@ unsafe fn step_rows<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
     if a.degree() == Some(PAPER_DEGREE) {
         // with a number of edges known beforehand there is no loop over them, and less to check
         for (((row, own), &seed), (columns, weights)) in points.zip(paper_edges(a, rows)) {
-            let [sum] = paper_sums([source], columns, weights);
+            let [sum] = paper_sums([source], [own], columns, weights);
             *row = finish::<T, WIDTH, BACKGROUND>(step, &sum, own, row, seed, lanes, seeds.least);
         }
     } else {
@@ -196,7 +196,7 @@ unsafe fn step_pair<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
     let points = one.iter_mut().zip(two).zip(own.iter().zip(other));
     let points = points.zip(&seeds.background[rows.clone()]);
     for ((((one, two), own), &seed), (columns, weights)) in points.zip(paper_edges(a, rows)) {
-        let sums = paper_sums(sources, columns, weights);
+        let sums = paper_sums(sources, [own.0, own.1], columns, weights);
         *one = finish::<T, WIDTH, BACKGROUND>(step, &sums[0], own.0, one, seed, lanes, seeds.least);
         *two = finish::<T, WIDTH, false>(step, &sums[1], own.1, two, seed, lanes, seeds.least);
     }
@@ -212,16 +212,18 @@ fn paper_edges<'a, T: Real>(
     columns.as_chunks().0.iter().zip(weights.as_chunks().0)
 }
 
-/// Weighted sums, for each of `sources`, of the rows that `columns` name.
+/// Weighted sums, for each of `sources`, of the rows that `columns` name, the first of which are their `own`.
 #[inline(always)]
 fn paper_sums<T: Real, const WIDTH: usize, const GROUPS: usize>(
     sources: [*const [T; WIDTH]; GROUPS],
+    own: [&[T; WIDTH]; GROUPS],
     columns: &[u32; PAPER_DEGREE],
     weights: &[T; PAPER_DEGREE],
 ) -> [[T; WIDTH]; GROUPS] {
-    let mut sums = [[T::default(); WIDTH]; GROUPS];
+    // rows of one length begin with the point itself
+    let mut sums = own.map(|values| values.map(|value| weights[0] * value));
     // in three parts, since the compiler leaves a loop over all edges a loop, which takes a quarter more time
-    for edge in 0..4 {
+    for edge in 1..4 {
         add(&mut sums, sources, columns[edge], weights[edge]);
     }
     for edge in 4..8 {

@@ -59,11 +59,17 @@ impl Best {
 
 /// Offers the values of a pass to the best labels of all points.
 pub(super) fn update<const WIDTH: usize>(best: &mut [Best], pass: &Pass<f32, WIDTH>) {
-    let labels: Vec<_> = pass.labels().collect();
     let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
     points.for_each(|(i, best)| {
-        for (label, group, lane) in &labels {
-            best.offer(*label, group[i][*lane]);
+        for (values, labels) in pass.groups() {
+            // most points have values of few groups
+            if values[i] != [0.0; WIDTH] {
+                for (label, &value) in labels.iter().zip(&values[i]) {
+                    if let Some(label) = *label {
+                        best.offer(label, value);
+                    }
+                }
+            }
         }
     });
 }

@@ -68,7 +68,8 @@ pub(crate) fn remove_outliers_by_index(
     let mut components = filled(Component::NONE, labels.len(), cancel)?;
     for (i, (&root, &index)) in roots.iter().zip(indices).enumerate() {
         look(i)?;
-        components[root as usize].add(root, index, labels[i] > 0 && at_depth(i, labels[i]));
+        let counts = part_size < 1.0 && labels[i] > 0 && at_depth(i, labels[i]);
+        components[root as usize].add(root, index, counts);
     }
     cancel.check()?;
     let largest = largest_of_each(labels, &components);
@@ -148,6 +149,9 @@ impl DisjointSets {
     }
 
     fn join(&mut self, a: u32, b: u32) {
+        if self.parents[a as usize] == self.parents[b as usize] {
+            return;
+        }
         let (a, b) = (self.root(a), self.root(b));
         self.parents[a.max(b) as usize] = a.min(b);
     }

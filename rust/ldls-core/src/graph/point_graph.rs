@@ -258,7 +258,7 @@ impl<T: Real> PointGraph<T> {
         self.len() == 0
     }
 
-    /// Edges of each point, if it is known that all have as many.
+    /// Edges of each point, if it is known that all have as many, of which the first is to itself.
     pub(crate) fn degree(&self) -> Option<usize> {
         match self.layout {
             Layout::Uniform { degree, .. } => Some(degree),
