@@ -85,27 +85,29 @@ def _best_place(
     """Return the free place nearest to the top of `box`, rather farther off than over objects."""
     width, height = size
     step = max(height // 4, 1)
-    x, y = np.arange(0, picture[0] - width, step), np.arange(0, picture[1] - height, step)
-    left, top = (grid.ravel() for grid in np.meshgrid(x, y))
+    # places in rows and columns
+    left, top = np.arange(0, picture[0] - width, step), np.arange(0, picture[1] - height, step)[:, None]
     right, bottom = left + width, top + height
     aside_px = np.abs((left + right - box[0] - box[2]) / 2)
     off_px = np.abs(bottom + height // 4 - box[1])
-    across, down = (cover.shape[1] - 1) / picture[0], (cover.shape[0] - 1) / picture[1]
-    cells = (
-        (edges * share).astype(int) for edges, share in ((left, across), (top, down), (right, across), (bottom, down))
-    )
-    cost = np.hypot(aside_px, off_px) + aversion * height * _covered_share(cover, *cells)
+    cost = np.hypot(aside_px, off_px) + aversion * height * _covered_share(cover, picture, left, top, right, bottom)
     for low_x, low_y, high_x, high_y in taken:
-        cost[(right >= low_x) & (left <= high_x) & (bottom >= low_y) & (top <= high_y)] = np.inf
+        cost[((bottom >= low_y) & (top <= high_y)) & ((right >= low_x) & (left <= high_x))] = np.inf
     if not np.isfinite(cost).any():
         return None
-    best = cost.argmin()
-    return int(left[best]), int(top[best]), int(right[best]), int(bottom[best])
+    row, column = divmod(int(cost.argmin()), len(left))
+    return int(left[column]), int(top[row, 0]), int(right[column]), int(bottom[row, 0])
 
 
-def _covered_share(cover: I64, left: I64, top: I64, right: I64, bottom: I64) -> NDArray[np.float64]:
-    inside = cover[bottom, right] - cover[top, right] - cover[bottom, left] + cover[top, left]
-    return np.asarray(inside / np.maximum((right - left) * (bottom - top), 1))
+def _covered_share(
+    cover: I64, picture: tuple[int, int], left: I64, top: I64, right: I64, bottom: I64
+) -> NDArray[np.float64]:
+    """Share of each place that is covered, by sums of the cover over all that lies above and left of a pixel of it."""
+    across, down = (cover.shape[1] - 1) / picture[0], (cover.shape[0] - 1) / picture[1]
+    left, right = (left * across).astype(int), (right * across).astype(int)
+    top, bottom = (top[:, 0] * down).astype(int), (bottom[:, 0] * down).astype(int)
+    rows = cover[bottom] - cover[top]
+    return np.asarray((rows[:, right] - rows[:, left]) / np.maximum((right - left) * (bottom - top)[:, None], 1))
 
 
 def _middle(box: Box) -> tuple[float, float]:
