@@ -12,7 +12,7 @@ from ldls.cloud import finite_rows
 from ldls.explaining import refused_labels
 from ldls.palette import Colour
 from ldls.segmentation import Segmentation
-from ldls.viewing.drawing import INK, MARK, PAPER, disc, stamp
+from ldls.viewing.drawing import INK, MARK, PAPER, Canvas, disc
 from ldls.viewing.ground import Ground, corners_of, ground_of
 from ldls.viewing.shown import Shown, Stage
 from ldls.viewing.tags import Box, Tag, draw_tags
@@ -57,7 +57,7 @@ def birds_eye_view(
 def birds_eye_of(shown: Shown, ground: Ground, *, boxes: bool) -> Image.Image:
     """The picture of a part of the ground, marked points with a white rim."""
     width, height = ground.size_px
-    fine = Image.new("RGB", (FINE * width, FINE * height), PAPER)
+    fine = Image.new("RGBX", (FINE * width, FINE * height), PAPER)
     step_m = _ring_step_m(ground)
     _draw_rings(ImageDraw.Draw(fine), ground, step_m)
     fine = _with_points(fine, shown, ground)
@@ -69,7 +69,7 @@ def birds_eye_of(shown: Shown, ground: Ground, *, boxes: bool) -> Image.Image:
             around = [tuple(place) for place in (FINE * corners[[0, 1, 2, 3, 0]]).tolist()]
             draw.line(around, colour, 2 * FINE, joint="curve")
             tags.append(Tag(shown.names[each.label - 1], colour, _around(corners)))
-    picture = fine.reduce(FINE)
+    picture = fine.reduce(FINE).convert("RGB")
     written = _write_ranges(picture, ground, step_m)
     draw_tags(picture, tags, _covered(picture, shown, ground), PEN_PX, aversion=AVERSION, taken=written)
     return picture
@@ -112,7 +112,6 @@ def _write_ranges(picture: Image.Image, ground: Ground, step_m: int) -> list[Box
 
 
 def _with_points(fine: Image.Image, shown: Shown, ground: Ground) -> Image.Image:
-    canvas = np.array(fine)
     points = shown.result.points
     rows = finite_rows(points)
     # the lowest first: objects cover the ground that they stand on
@@ -120,16 +119,18 @@ def _with_points(fine: Image.Image, shown: Shown, ground: Ground) -> Image.Image
     at_px = np.floor(FINE * ground.at(points[rows, :2].astype(np.float64))).astype(np.int64)
     labels, marked = shown.labels[rows], shown.marked[rows]
     size = float(np.clip(ground.px_per_m / 14, 0.7, 1.8))
+    rim_px = (1.2 * size + 0.8) * FINE
+    canvas = Canvas(fine, radius_px=rim_px)
     for label, colour in ((-1, OUT_OF_VIEW), (0, BACKGROUND)):
-        stamp(canvas, at_px[labels == label], colour, disc(0.55 * FINE * size))
+        canvas.stamp(at_px[labels == label], colour, disc(0.55 * FINE * size))
     refused = refused_labels(shown.result)[rows]
     outside = (labels == 0) & (refused > 0)
     dim = (shown.colours_of(refused[outside]) * DIM).astype(np.uint8)
-    stamp(canvas, at_px[outside], dim, disc(0.8 * FINE * size))
+    canvas.stamp(at_px[outside], dim, disc(0.8 * FINE * size))
     own = labels > 0
-    stamp(canvas, at_px[own & marked], MARK, disc((1.2 * size + 0.8) * FINE))
-    stamp(canvas, at_px[own], shown.colours_of(labels[own]), disc(1.2 * FINE * size))
-    return Image.fromarray(canvas)
+    canvas.stamp(at_px[own & marked], MARK, disc(rim_px))
+    canvas.stamp(at_px[own], shown.colours_of(labels[own]), disc(1.2 * FINE * size))
+    return canvas.picture()
 
 
 def _covered(picture: Image.Image, shown: Shown, ground: Ground) -> NDArray[np.bool_]:

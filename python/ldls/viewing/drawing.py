@@ -11,8 +11,6 @@ from PIL import Image, ImageDraw, ImageFont
 
 from ldls.palette import Colour
 
-Canvas = NDArray[np.uint8]
-"""(H, W, 3) red, green and blue of a picture that is drawn on."""
 Opacity = NDArray[np.float64]
 """(2 r + 1, 2 r + 1) share of the picture that a mark covers, 0 to 1."""
 PAPER: Colour = (24, 24, 28)
@@ -26,37 +24,62 @@ CAPTION_PX = 30
 
 def disc(radius_px: float, opacity: float = 1.0) -> Opacity:
     """A smooth disc in the middle of an odd square."""
-    reach = ceil(radius_px + 0.5)
+    reach = _reach(radius_px)
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     return np.asarray(opacity * (radius_px + 0.5 - np.hypot(x, y)).clip(0, 1))
 
 
-def stamp(canvas: Canvas, at_px: NDArray[np.int64], colours: NDArray[np.uint8] | Colour, mark: Opacity) -> None:
-    """Set `mark` on the canvas around every one of `at_px` (n, 2), x and y, each in its colour (n, 3) or all in one.
+class Canvas:
+    """A picture that marks are set on."""
 
-    Later ones lie above earlier ones; parts beyond the edge are cut off.
-    """
-    reach = mark.shape[0] // 2
-    height, width = canvas.shape[:2]
-    seen = ((at_px >= -reach) & (at_px < (width + reach, height + reach))).all(axis=1)
-    colours, at_px = np.asarray(colours, np.uint8), at_px[seen]
-    if colours.ndim == 1:
-        # in one colour it is all the same how many lie at a place
-        across = width + 2 * reach
-        places = np.unique((at_px + reach) @ (1, across))
-        at_px = np.stack([places % across, places // across], axis=1) - reach
-    own = colours[seen] if colours.ndim == 2 else np.broadcast_to(colours, (len(at_px), 3))
-    flat = canvas.reshape(-1, 3)
-    # the faintest pixels of the mark first, so that no rim covers the middle of a neighbour
-    for at in np.argsort(mark, axis=None):
-        dy, dx = divmod(int(at), mark.shape[1])
-        opacity = mark[dy, dx]
-        if opacity == 0:
-            continue
-        x, y = at_px[:, 0] + dx - reach, at_px[:, 1] + dy - reach
-        inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
-        places, above = (y * width + x)[inside], own[inside]
-        flat[places] = above if opacity == 1 else np.round((1 - opacity) * flat[places] + opacity * above)
+    def __init__(self, picture: Image.Image, *, radius_px: float) -> None:
+        """A copy of the picture, for marks of up to this radius."""
+        self._size = np.array(picture.size)
+        # marks at places beyond the edge reach into the margin
+        self._margin = 2 * _reach(radius_px)
+        width, height = self._size + 2 * self._margin
+        # a number a pixel, whose last byte is not used
+        self._pixels = np.zeros((height, width), np.uint32)
+        self._inside()[:] = np.asarray(picture.convert("RGBX")).view(np.uint32)[..., 0]
+
+    def picture(self) -> Image.Image:
+        """A copy of the picture as it is now, of mode RGBX."""
+        width, height = self._size.tolist()
+        return Image.frombuffer("RGBX", (width, height), self._inside().tobytes(), "raw", "RGBX", 0, 1)
+
+    def stamp(self, at_px: NDArray[np.int64], colours: NDArray[np.uint8] | Colour, mark: Opacity) -> None:
+        """Set `mark` around every one of `at_px` (n, 2), x and y, each in its colour (n, 3) or all in one.
+
+        Later ones lie above earlier ones; parts beyond the edge are cut off.
+        """
+        reach = mark.shape[0] // 2
+        seen = ((at_px >= -reach) & (at_px < self._size + reach)).all(axis=1)
+        across = self._pixels.shape[1]
+        places = (at_px[seen] + self._margin) @ (1, across)
+        colours = np.asarray(colours, np.uint8)
+        if colours.ndim == 1:
+            # in one colour it is all the same how many lie at a place
+            places, own = np.unique(places), colours[None]
+        else:
+            own = colours[seen]
+        own = np.pad(own, ((0, 0), (0, 1)))
+        flat = self._pixels.reshape(-1)
+        # the faintest pixels of the mark first, so that no rim covers the middle of a neighbour
+        for at in np.argsort(mark, axis=None):
+            dy, dx = divmod(int(at), mark.shape[1])
+            opacity = mark[dy, dx]
+            if opacity == 0:
+                continue
+            here = places + ((dy - reach) * across + dx - reach)
+            above = own
+            if opacity < 1:
+                below = flat[here].view(np.uint8).reshape(-1, 4)
+                above = np.round((1 - opacity) * below + opacity * own).astype(np.uint8)
+            flat[here] = above.view(np.uint32)[:, 0]
+
+    def _inside(self) -> NDArray[np.uint32]:
+        width, height = self._size
+        return self._pixels[self._margin : self._margin + height, self._margin : self._margin + width]
 
 
 def grid(
@@ -91,3 +114,7 @@ def places_in_grid(
 def half(width_px: int) -> int:
     """Width of each of two pictures side by side."""
     return (width_px - GAP_PX) // 2
+
+
+def _reach(radius_px: float) -> int:
+    return ceil(radius_px + 0.5)

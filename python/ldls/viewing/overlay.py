@@ -13,7 +13,7 @@ from ldls.masks import InstanceMasks
 from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView, camera_names
-from ldls.viewing.drawing import MARK, disc, grid, half, places_in_grid, stamp
+from ldls.viewing.drawing import MARK, Canvas, disc, grid, half, places_in_grid
 from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of
 from ldls.viewing.tags import Tag, draw_tags
 
@@ -132,18 +132,18 @@ def _with_masks(
 
 def _with_points(picture: Image.Image, shown: Shown, seen: SeenView, scale: float) -> Image.Image:
     pen_px = _pen_px(picture)
-    canvas = np.array(picture)
+    canvas = Canvas(picture, radius_px=2.0 * pen_px)
     # the farthest first, the nearest above them
     distances = np.linalg.norm(shown.result.points[seen.in_view, :3], axis=1)
     order = np.argsort(-distances, kind="stable")
     at_px = np.floor((seen.pixels[order] + 0.5) * scale).astype(np.int64)
     labels, marked = shown.labels[seen.in_view][order], shown.marked[seen.in_view][order]
     labelled = labels > 0
-    stamp(canvas, at_px[~labelled], BACKGROUND, disc(0.45 * pen_px, 0.5))
-    stamp(canvas, at_px[labelled & ~marked], HALO, disc(1.7 * pen_px, 0.55))
-    stamp(canvas, at_px[labelled & marked], MARK, disc(2.0 * pen_px))
-    stamp(canvas, at_px[labelled], shown.colours_of(labels[labelled]), disc(1.1 * pen_px))
-    return Image.fromarray(canvas)
+    canvas.stamp(at_px[~labelled], BACKGROUND, disc(0.45 * pen_px, 0.5))
+    canvas.stamp(at_px[labelled & ~marked], HALO, disc(1.7 * pen_px, 0.55))
+    canvas.stamp(at_px[labelled & marked], MARK, disc(2.0 * pen_px))
+    canvas.stamp(at_px[labelled], shown.colours_of(labels[labelled]), disc(1.1 * pen_px))
+    return canvas.picture().convert("RGB")
 
 
 def _subdued(image: NDArray[np.uint8], scale: float) -> Image.Image:
