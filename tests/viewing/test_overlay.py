@@ -9,7 +9,7 @@ import ldls
 from ldls.palette import BACKGROUND, instance_colours
 from ldls.viewing import comparison, masks_overlay, overlay
 from ldls.viewing.drawing import MARK
-from ldls.viewing.overlay import overlay_of
+from ldls.viewing.overlay import overlays_of
 from ldls.viewing.shown import Shown, images_of
 from ldls.viewing.tags import place_tags
 
@@ -78,9 +78,8 @@ def test_background_points_leave_the_image_visible(small_scene) -> None:
 def test_marked_points_have_a_white_rim(result) -> None:
     marked = result.labels == 1
     (image,) = images_of(result, None)
-    plain, rimmed = (
-        overlay_of(Shown.of(result, "final", chosen), result.views[0], image, 1800) for chosen in (None, marked)
-    )
+    shown = [Shown.of(result, "final", chosen) for chosen in (None, marked)]
+    plain, rimmed = overlays_of(shown, result.views[0], image, 1800)
     changed = np.any(np.asarray(plain) != np.asarray(rimmed), axis=2)
     white = np.all(np.asarray(rimmed) == MARK, axis=2)
     assert (white & changed).sum() > 100

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
-from ldls.cloud import finite_rows
+from ldls.cloud import Points, finite_rows
 from ldls.explaining import refused_labels
 from ldls.palette import Colour
 from ldls.segmentation import Segmentation
@@ -30,6 +30,8 @@ DIM = 0.6
 PEN_PX = 1.15
 AVERSION = 40.0
 """Heights of a name that it goes aside rather than lie on an object."""
+SMALL = 0.55
+"""Radius of points of no object, in sizes of a point."""
 FINE = 2
 """Scale at which a picture is drawn before it is reduced, so that slanting lines are smooth."""
 
@@ -51,16 +53,26 @@ def birds_eye_view(
     Raises:
         ParameterError: There is no such stage, or the range is not more than 0.
     """
-    return birds_eye_of(Shown.of(result, stage), ground_of(result, range_m), boxes=boxes)
+    ground = ground_of(result, range_m)
+    return birds_eye_of(Shown.of(result, stage), ground, surroundings(result, ground), boxes=boxes)
 
 
-def birds_eye_of(shown: Shown, ground: Ground, *, boxes: bool) -> Image.Image:
-    """The picture of a part of the ground, marked points with a white rim."""
+def surroundings(result: Segmentation, ground: Ground) -> Canvas:
+    """What all pictures of a part of the ground show: rings of equal range, and above them points out of view."""
     width, height = ground.size_px
     fine = Image.new("RGBX", (FINE * width, FINE * height), PAPER)
-    step_m = _ring_step_m(ground)
-    _draw_rings(ImageDraw.Draw(fine), ground, step_m)
-    fine = _with_points(fine, shown, ground)
+    _draw_rings(ImageDraw.Draw(fine), ground, _ring_step_m(ground))
+    canvas = Canvas(fine, radius_px=_rim_px(ground))
+    rows = finite_rows(result.points)
+    at_px = _fine_px(ground, result.points[rows[result.labels[rows] < 0]])
+    canvas.stamp(at_px, OUT_OF_VIEW, disc(SMALL * _point_px(ground)))
+    return canvas
+
+
+def birds_eye_of(shown: Shown, ground: Ground, canvas: Canvas, *, boxes: bool) -> Image.Image:
+    """The picture of a part of the ground, marked points with a white rim, drawn on a canvas with its surroundings."""
+    _set_points(canvas, shown, ground)
+    fine, step_m = canvas.picture(), _ring_step_m(ground)
     draw = ImageDraw.Draw(fine)
     tags = []
     for each in shown.result.objects if boxes else ():
@@ -111,26 +123,37 @@ def _write_ranges(picture: Image.Image, ground: Ground, step_m: int) -> list[Box
     return written
 
 
-def _with_points(fine: Image.Image, shown: Shown, ground: Ground) -> Image.Image:
+def _set_points(canvas: Canvas, shown: Shown, ground: Ground) -> None:
     points = shown.result.points
     rows = finite_rows(points)
+    rows = rows[shown.labels[rows] >= 0]
     # the lowest first: objects cover the ground that they stand on
     rows = rows[np.argsort(points[rows, 2], kind="stable")]
-    at_px = np.floor(FINE * ground.at(points[rows, :2].astype(np.float64))).astype(np.int64)
+    at_px, point_px = _fine_px(ground, points[rows]), _point_px(ground)
     labels, marked = shown.labels[rows], shown.marked[rows]
-    size = float(np.clip(ground.px_per_m / 14, 0.7, 1.8))
-    rim_px = (1.2 * size + 0.8) * FINE
-    canvas = Canvas(fine, radius_px=rim_px)
-    for label, colour in ((-1, OUT_OF_VIEW), (0, BACKGROUND)):
-        canvas.stamp(at_px[labels == label], colour, disc(0.55 * FINE * size))
+    canvas.stamp(at_px[labels == 0], BACKGROUND, disc(SMALL * point_px))
     refused = refused_labels(shown.result)[rows]
     outside = (labels == 0) & (refused > 0)
     dim = (shown.colours_of(refused[outside]) * DIM).astype(np.uint8)
-    canvas.stamp(at_px[outside], dim, disc(0.8 * FINE * size))
+    canvas.stamp(at_px[outside], dim, disc(0.8 * point_px))
     own = labels > 0
-    canvas.stamp(at_px[own & marked], MARK, disc(rim_px))
-    canvas.stamp(at_px[own], shown.colours_of(labels[own]), disc(1.2 * FINE * size))
-    return canvas.picture()
+    canvas.stamp(at_px[own & marked], MARK, disc(_rim_px(ground)))
+    canvas.stamp(at_px[own], shown.colours_of(labels[own]), disc(1.2 * point_px))
+
+
+def _fine_px(ground: Ground, points: Points) -> NDArray[np.int64]:
+    """(n, 2) places of points on the canvas."""
+    return np.floor(FINE * ground.at(points[:, :2].astype(np.float64))).astype(np.int64)
+
+
+def _point_px(ground: Ground) -> float:
+    """Size of a point on the canvas."""
+    return FINE * float(np.clip(ground.px_per_m / 14, 0.7, 1.8))
+
+
+def _rim_px(ground: Ground) -> float:
+    """Radius of the rim of a marked point on the canvas, the largest mark."""
+    return 1.2 * _point_px(ground) + 0.8 * FINE
 
 
 def _covered(picture: Image.Image, shown: Shown, ground: Ground) -> NDArray[np.bool_]:

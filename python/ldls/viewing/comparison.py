@@ -10,10 +10,10 @@ from PIL import Image
 
 from ldls.segmentation import Segmentation
 from ldls.view import camera_names
-from ldls.viewing.birds_eye import birds_eye_of
+from ldls.viewing.birds_eye import birds_eye_of, surroundings
 from ldls.viewing.drawing import grid, half
 from ldls.viewing.ground import ground_of
-from ldls.viewing.overlay import WIDTH_PX, overlay_of
+from ldls.viewing.overlay import WIDTH_PX, overlays_of
 from ldls.viewing.shown import Images, Shown, images_of
 
 WIDE = 2.0
@@ -36,7 +36,8 @@ def comparison(result: Segmentation, images: Images = None) -> Image.Image:
     changed = result.direct_labels != result.labels
     pair = [Shown.of(result, "direct", changed), Shown.of(result, "final", changed)]
     ground = ground_of(result, size_px=(half(WIDTH_PX), half(WIDTH_PX)), fill=True)
-    above = [birds_eye_of(shown, ground, boxes=shown is pair[1]) for shown in pair]
+    around = surroundings(result, ground)
+    above = [birds_eye_of(shown, ground, around.copy(), boxes=shown is pair[1]) for shown in pair]
     return grid(
         [
             _overlays(pair, images_of(result, images)),
@@ -52,9 +53,8 @@ def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]]) -> Ima
     height, width = views[0].view.masks.image_size
     stacked = len(views) == 1 and width > WIDE * height
     each_px = WIDTH_PX if stacked else half(WIDTH_PX)
-    tiles = [
-        overlay_of(shown, seen, image, each_px) for seen, image in zip(views, images, strict=True) for shown in pair
-    ]
+    of_cameras = zip(views, images, strict=True)
+    tiles = [tile for seen, image in of_cameras for tile in overlays_of(pair, seen, image, each_px)]
     cameras = [name for name in camera_names(views)[1:] for _ in pair]
     return grid(tiles, [*captions(pair[0].result), *cameras], columns=1 if stacked else 2)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from math import ceil
 
 import numpy as np
@@ -41,6 +42,10 @@ class Canvas:
         # a number a pixel, whose last byte is not used
         self._pixels = np.zeros((height, width), np.uint32)
         self._inside()[:] = np.asarray(picture.convert("RGBX")).view(np.uint32)[..., 0]
+
+    def copy(self) -> Canvas:
+        """A canvas of its own with the same picture."""
+        return deepcopy(self)
 
     def picture(self) -> Image.Image:
         """A copy of the picture as it is now, of mode RGBX."""

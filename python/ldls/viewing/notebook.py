@@ -10,7 +10,7 @@ from PIL import Image
 
 from ldls.palette import instance_colours
 from ldls.segmentation import Segmentation
-from ldls.viewing.birds_eye import birds_eye_of
+from ldls.viewing.birds_eye import birds_eye_of, surroundings
 from ldls.viewing.ground import ground_of
 from ldls.viewing.object_tables import HEADINGS, cells_of, nearest_first, objects_found
 from ldls.viewing.overlay import overlay
@@ -27,7 +27,7 @@ def html_of(result: Segmentation) -> str:
     numbers = f"{len(result.labels):,} points, {len(result.in_view):,} in view, {objects_found(result.objects)}"
     seen = overlay(result, width_px=WIDTH_PX if len(result.views) == 1 else None)
     ground = ground_of(result, size_px=(WIDTH_PX, HEIGHT_PX), fill=True)
-    above = birds_eye_of(Shown.of(result, "final"), ground, boxes=True)
+    above = birds_eye_of(Shown.of(result, "final"), ground, surroundings(result, ground), boxes=True)
     pictures = _img(seen, "masks and points") + _img(above, "the points from above")
     return f"<div><p>{numbers}</p>{pictures}{_table(result)}</div>"
 

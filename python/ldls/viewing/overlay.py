@@ -48,9 +48,9 @@ def overlay(
         raise ParameterError(f"width_px: got {width_px}, expected 1 or more")
     shown, each = Shown.of(result, stage), images_of(result, images)
     if len(each) == 1:
-        return overlay_of(shown, result.views[0], each[0], width_px or WIDTH_PX)
+        return overlays_of([shown], result.views[0], each[0], width_px or WIDTH_PX)[0]
     pairs = zip(result.views, each, strict=True)
-    tiles = [overlay_of(shown, seen, image, width_px or half(WIDTH_PX)) for seen, image in pairs]
+    tiles = [overlays_of([shown], seen, image, width_px or half(WIDTH_PX))[0] for seen, image in pairs]
     return grid(tiles, camera_names(result.views), columns=2)
 
 
@@ -90,44 +90,57 @@ def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) 
     colours = as_tuples(instance_colours(masks.categories.tolist()))
     names = [f"{mask.name} {mask.score:.2f}" for mask in masks]
     image = image_like(image, masks.image_size)
-    picture, tags, covered = _with_masks(image, masks, colours, names, WIDTH_PX / image.shape[1])
-    draw_tags(picture, tags, covered, _pen_px(picture))
+    scale = WIDTH_PX / image.shape[1]
+    picture, covered = _with_masks(image, masks, colours, scale)
+    draw_tags(picture, _tags(masks, colours, names, scale), covered, _pen_px(picture))
     return picture
 
 
-def overlay_of(shown: Shown, seen: SeenView, image: NDArray[np.uint8], width_px: int) -> Image.Image:
-    """The picture of one camera's image, marked points with a white rim."""
-    labels, with_points = seen.labels.tolist(), set(shown.labels.tolist())
-    colours = [shown.colours[label - 1] for label in labels]
-    names = [shown.names[label - 1] if label in with_points else None for label in labels]
-    scale = width_px / image.shape[1]
-    picture, tags, covered = _with_masks(image, seen.view.masks, colours, names, scale)
-    picture = _with_points(picture, shown, seen, scale)
-    draw_tags(picture, tags, covered, _pen_px(picture))
-    return picture
+def overlays_of(each: Sequence[Shown], seen: SeenView, image: NDArray[np.uint8], width_px: int) -> list[Image.Image]:
+    """The pictures of one camera's image as each of `each` shows it, of one result, marked points with a white rim."""
+    masks, scale = seen.view.masks, width_px / image.shape[1]
+    labels = seen.labels.tolist()
+    colours = [each[0].colours[label - 1] for label in labels]
+    pictures = []
+    masked, covered = _with_masks(image, masks, colours, scale)
+    for shown in each:
+        with_points = set(shown.labels.tolist())
+        names = [shown.names[label - 1] if label in with_points else None for label in labels]
+        picture = _with_points(masked, shown, seen, scale)
+        draw_tags(picture, _tags(masks, colours, names, scale), covered, _pen_px(picture))
+        pictures.append(picture)
+    return pictures
 
 
 def _with_masks(
-    image: NDArray[np.uint8],
-    masks: InstanceMasks,
-    colours: Sequence[Colour],
-    names: Sequence[str | None],
-    scale: float,
-) -> tuple[Image.Image, list[Tag], NDArray[np.bool_]]:
-    """The image with masks, a tag for each mask that has a name, and (H, W) True where masks are."""
+    image: NDArray[np.uint8], masks: InstanceMasks, colours: Sequence[Colour], scale: float
+) -> tuple[Image.Image, NDArray[np.bool_]]:
+    """The image with masks, and (H, W) True where masks are."""
     picture = _subdued(image, scale)
     covered = np.zeros(image.shape[:2], bool)
-    tags = []
-    for mask, colour, name in zip(masks, colours, names, strict=True):
+    for mask, colour in zip(masks, colours, strict=True):
         top, left, height, width = mask.bounding_box
         crop = mask.crop()
-        box = (round(scale * left), round(scale * top), round(scale * (left + width)), round(scale * (top + height)))
         if height:
             _draw_mask(picture, crop, colour, (left, top), scale)
         covered[top : top + height, left : left + width] |= crop
+    return picture, covered
+
+
+def _tags(masks: InstanceMasks, colours: Sequence[Colour], names: Sequence[str | None], scale: float) -> list[Tag]:
+    """A tag for each mask that has a name."""
+    tags = []
+    for mask, colour, name in zip(masks, colours, names, strict=True):
         if name is not None:
+            top, left, height, width = mask.bounding_box
+            box = (
+                round(scale * left),
+                round(scale * top),
+                round(scale * (left + width)),
+                round(scale * (top + height)),
+            )
             tags.append(Tag(name, colour, box))
-    return picture, tags, covered
+    return tags
 
 
 def _with_points(picture: Image.Image, shown: Shown, seen: SeenView, scale: float) -> Image.Image:
