@@ -31,17 +31,16 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
         InputError: There are more or fewer images than cameras, or one has not the size of the masks.
     """
     path = Path(path)
+    birds_eye, compared = (path.with_name(f"{path.stem}-{what}{path.suffix}") for what in ("birds-eye", "comparison"))
+    # the one that takes longest first
     drawn: dict[Path, Callable[[], Image.Image]] = {
+        compared: lambda: comparison(result, images),
+        birds_eye: lambda: birds_eye_view(result),
         path: lambda: overlay(result, images),
-        path.with_name(f"{path.stem}-birds-eye{path.suffix}"): lambda: birds_eye_view(result),
-        path.with_name(f"{path.stem}-comparison{path.suffix}"): lambda: comparison(result, images),
     }
-    # one is packed while the next is drawn
-    with ThreadPoolExecutor(1) as packing:
-        saved = [packing.submit(save_picture, file, draw()) for file, draw in drawn.items()]
-    for each in saved:
-        each.result()
-    return list(drawn)
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(lambda file: save_picture(file, drawn[file]()), drawn))
+    return [path, birds_eye, compared]
 
 
 def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -68,10 +69,14 @@ def write_formats(
     result: Segmentation, folder: Path, frame: str, formats: Sequence[str], images: Sequence[NDArray[np.uint8] | None]
 ) -> list[Path]:
     """Write the files of a frame to `folder`, each whole; `images` are those of the views, for the picture."""
-    paths = [folder / file_name(frame, word) for word in formats]
-    for word, path in zip(formats, paths, strict=True):
+
+    def write(word: str) -> Path:
+        path = folder / file_name(frame, word)
         if word == PICTURE:
             save_picture(path, overlay(result, images))
         else:
             save(result, path)
-    return paths
+        return path
+
+    with ThreadPoolExecutor(2) as threads:
+        return list(threads.map(write, formats))
