@@ -53,7 +53,8 @@ def as_array(name: str, values: object, error: type[InputError] | None = None) -
     """
     import numpy as np
 
-    if isinstance(values, np.ma.MaskedArray):
+    masked = sys.modules.get("numpy.ma")  # not loaded where there are no masked arrays
+    if masked is not None and isinstance(values, masked.MaskedArray):
         raise (error or DtypeError)(f"{name}: got a masked array; pass {name}.filled(...) with a value")
     try:
         array = np.asarray(values)

@@ -64,7 +64,9 @@ class Canvas:
         colours = np.asarray(colours, np.uint8)
         if colours.ndim == 1:
             # in one colour it is all the same how many lie at a place
-            places, own = np.unique(places), colours[None]
+            taken = np.zeros(self._pixels.size, bool)
+            taken[places] = True
+            places, own = np.flatnonzero(taken), colours[None]
         else:
             own = colours[seen]
         own = np.pad(own, ((0, 0), (0, 1)))
