@@ -53,7 +53,7 @@ def demo(
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, "demo", ("npz", "label", "ply"), [rgb])
     written += save_pictures(out / "demo.png", result, rgb)
-    command = write_inputs(out, frame.points, image)
+    command = write_inputs(out, frame.points, image, rgb)
 
     screen = console()
     screen.print(object_table(result.objects))
@@ -93,20 +93,21 @@ def accuracy_table(result: Segmentation, truth: NDArray[np.int32]) -> Table:
     return table
 
 
-def write_inputs(out: Path, points: Points, image: CameraImage) -> str:
-    """Write the frame as files that `ldls segment` reads; the command that does so."""
+def write_inputs(out: Path, points: Points, image: CameraImage, rgb: NDArray[np.uint8]) -> str:
+    """Write the frame with the pixels of its image as files that `ldls segment` reads; the command that does so."""
     import numpy as np
     from PIL import Image
 
     from ldls.io import save
     from ldls.simulation.kitti_layout import calibration_lines, write_lines
+    from ldls.viewing import save_picture
 
     folder = out / "input"
     folder.mkdir(parents=True, exist_ok=True)
     np.asarray(points, np.float32).tofile(folder / "points.bin")
     assert image.masks is not None
     save(image.masks, folder / "masks.npz")
-    Image.fromarray(image.read()).save(folder / "image.png")
+    save_picture(folder / "image.png", Image.fromarray(rgb))
     write_lines(folder / "calib.txt", calibration_lines(image.camera))
     return (
         f"ldls segment --points {folder / 'points.bin'} --calib {folder / 'calib.txt'} "

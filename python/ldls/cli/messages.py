@@ -116,5 +116,5 @@ def timing_table(timings: Mapping[str, float]) -> Table:
 
 def console() -> Console:
     """Return the console for tables: as wide as the terminal, and wide enough where there is none; silent if quiet."""
-    terminal = Console(quiet=is_quiet())
-    return terminal if terminal.is_terminal else Console(width=100, quiet=is_quiet())
+    terminal = Console(quiet=is_quiet(), emoji=False)
+    return terminal if terminal.is_terminal else Console(width=100, quiet=is_quiet(), emoji=False)

@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from ldls.palette import Colour
 
+I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
 AVERSION = 4.0
 """Heights of a tag that it goes aside rather than lie where it had better not be."""
@@ -66,7 +67,8 @@ def place_tags(
     taken: Sequence[Box] = (),
 ) -> list[Box | None]:
     """Place of each tag, inside the picture and apart; None where no room is left."""
-    cover = np.pad(covered.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    cover = np.zeros((covered.shape[0] + 1, covered.shape[1] + 1), np.int32)
+    covered.cumsum(axis=0, dtype=np.int32).cumsum(axis=1, out=cover[1:, 1:])
     places: list[Box | None] = [None] * len(boxes)
     for index in sorted(range(len(boxes)), key=lambda i: -boxes[i][3]):  # the nearest chooses first
         own = [place for place in places if place]
@@ -79,7 +81,7 @@ def _best_place(
     size: tuple[int, int],
     picture: tuple[int, int],
     taken: Sequence[Box],
-    cover: I64,
+    cover: I32,
     aversion: float,
 ) -> Box | None:
     """Return the free place nearest to the top of `box`, rather farther off than over objects."""
@@ -100,7 +102,7 @@ def _best_place(
 
 
 def _covered_share(
-    cover: I64, picture: tuple[int, int], left: I64, top: I64, right: I64, bottom: I64
+    cover: I32, picture: tuple[int, int], left: I64, top: I64, right: I64, bottom: I64
 ) -> NDArray[np.float64]:
     """Share of each place that is covered, by sums of the cover over all that lies above and left of a pixel of it."""
     across, down = (cover.shape[1] - 1) / picture[0], (cover.shape[0] - 1) / picture[1]
