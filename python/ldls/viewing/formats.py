@@ -78,5 +78,8 @@ def write_formats(
             save(result, path)
         return path
 
+    # the picture takes longest
+    in_turn = sorted(formats, key=lambda word: word != PICTURE)
     with ThreadPoolExecutor(2) as threads:
-        return list(threads.map(write, formats))
+        written = dict(zip(in_turn, threads.map(write, in_turn), strict=True))
+    return [written[word] for word in formats]
