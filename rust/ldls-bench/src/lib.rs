@@ -1,0 +1,7 @@
+//! A made-up street, and the stages of the method on it: what `cargo bench` times.
+
+mod stages;
+mod street;
+
+pub use stages::{Prepared, STAGES, Stage};
+pub use street::Street;
