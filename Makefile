@@ -40,6 +40,10 @@ bench: ## Compare with peers, then time every stage.
 	python -m benches
 	cargo bench
 
+.PHONY: instructions
+instructions: ## Count the instructions of each stage under Valgrind and hold them against those recorded.
+	cargo run --release --locked -p ldls-bench
+
 .PHONY: docs
 docs: ## Build the documentation into site/, strictly: a dead link is an error.
 	mkdocs build --strict

@@ -1,4 +1,4 @@
-//! A made-up street, and the stages of the method on it: what `cargo bench` times.
+//! A made-up street, and the stages of the method on it: what `cargo bench` times and `make instructions` counts.
 
 mod stages;
 mod street;
