@@ -44,5 +44,6 @@ def clouds(sweep: NDArray[np.float32], in_view: NDArray[np.float32]) -> dict[str
         "sweep in cm": np.round(sweep, 2),
         "sweep, flat": sweep * np.float32([1, 1, 0]),
         "sweep, every point twice": np.repeat(sweep[: len(sweep) // 2], 2, axis=0),
+        "sweep, every point twenty times": np.repeat(sweep[: len(sweep) // 20], 20, axis=0),
         "lattice of 50 x 50 x 50": np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3),
     }
