@@ -1,4 +1,4 @@
-"""`python -m benches`: how much faster than what else one would use, and how time and memory grow."""
+"""`python -m benches`: how much faster than what else one would use, how times spread, and how time and memory grow."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import statistics
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 import ldls
-from benches.frames import Frame, frame, tiled_frame
+from benches.frames import Frame, frame, suite_frames, tiled_frame
 from benches.measuring import medians
 
 MISSING = "not measured: run pip install '.[bench]'"
@@ -25,18 +26,19 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benches", description=__doc__)
     parser.add_argument("--runs", type=int, default=20, help="rounds of each comparison (default: 20)")
-    parser.add_argument("--threads", type=int, default=None, help="threads of all sides (default: all cores)")
+    every_core = ldls._ldls.default_threads()
+    parser.add_argument("--threads", type=int, default=every_core, help="threads of all sides (default: all cores)")
     parser.add_argument("--most", type=int, default=1_000_000, help="points of the largest cloud (default: 1000000)")
+    parser.add_argument("--frames", type=int, default=20, help="frames of the suite, of 200 (default: 20)")
     parser.add_argument("sections", nargs="*", choices=[[], *SECTIONS], help="what to measure (default: all)")
     options = parser.parse_args()
-    threads = options.threads or ldls._ldls.default_threads()
     # read when the peers are first imported; threads that spin when their work is done would slow the next one's
-    os.environ |= {"OMP_NUM_THREADS": str(threads), "OMP_WAIT_POLICY": "PASSIVE"}
+    os.environ |= {"OMP_NUM_THREADS": str(options.threads), "OMP_WAIT_POLICY": "PASSIVE"}
     console, measured = Console(width=120), frame()
     with quiet_blas():
         for section in options.sections or SECTIONS:
             try:
-                console.print(SECTIONS[section](measured, threads, options.runs, options.most))
+                console.print(SECTIONS[section](measured, options))
             except ImportError as error:
                 console.print(f"{section}: {error.name} is {MISSING}")
 
@@ -50,11 +52,11 @@ def quiet_blas() -> AbstractContextManager[object]:
     return threadpool_limits(1, user_api="blas")  # type: ignore[no-any-return]
 
 
-def against_scipy(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def against_scipy(measured: Frame, options: argparse.Namespace) -> Table:
     """Each stage of the paper's method and `ldls.segment` against the plain SciPy pipeline."""
     from benches import scipy_pipeline
 
-    params, best = ldls.Params.paper(threads=threads), ldls.Params(threads=threads)
+    params, best = ldls.Params.paper(threads=options.threads), ldls.Params(threads=options.threads)
     dense = measured.masks.to_array()
     stages: dict[str, list[dict[str, float]]] = {"scipy": [], "ldls": []}
     labels = {}
@@ -71,12 +73,12 @@ def against_scipy(measured: Frame, threads: int, runs: int, _most: int) -> Table
     def run_best() -> None:
         ldls.segment(measured.points, measured.masks, measured.camera, params=best)
 
-    whole = medians({"scipy": run_scipy, "ldls": run_ldls, "best": run_best}, runs=runs)
+    whole = medians({"scipy": run_scipy, "ldls": run_ldls, "best": run_best}, runs=options.runs)
     differ = int((labels["scipy"] != labels["ldls"]).sum())
     table = _table(
         f"{measured.name}: {len(labels['ldls']):,} points in view, {len(measured.masks)} instances",
         ["stage", "plain scipy float64, ms", "ldls, ms", "ratio"],
-        f"medians of {runs} runs, ldls on {threads} threads; labels that differ: {differ}",
+        f"medians of {options.runs} runs, ldls on {options.threads} threads; labels that differ: {differ}",
     )
     for stage in scipy_pipeline.STAGES:
         peer, own = (statistics.median(run[stage] for run in stages[side][1:]) for side in ("scipy", "ldls"))
@@ -87,19 +89,44 @@ def against_scipy(measured: Frame, threads: int, runs: int, _most: int) -> Table
     return table
 
 
-def against_learners(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def suite(measured: Frame, options: argparse.Namespace) -> Table:
+    """Times of frames of the simulated suite, which are kept in its folder, beside the one frame."""
+    methods = {
+        "the paper's method": ldls.Params.paper(threads=options.threads),
+        "the defaults": ldls.Params(threads=options.threads),
+    }
+
+    def times_ms(frame: Frame) -> list[float]:
+        inputs = (frame.points, frame.masks, frame.camera)
+        sides = {name: partial(ldls.segment, *inputs, params=params) for name, params in methods.items()}
+        return [1e3 * seconds for seconds in medians(sides, runs=min(options.runs, 5)).values()]
+
+    one = times_ms(measured)
+    times = [times_ms(frame) for frame in suite_frames(options.frames)]
+    table = _table(
+        f"ldls.segment: {len(times)} frames of the suite",
+        ["ms a frame", measured.name, "median", "90 %", "99 %", "worst", "99 % / median"],
+        f"a frame's time is the median of {min(options.runs, 5)} runs, {options.threads} threads",
+    )
+    for name, one_ms, suite_ms in zip(methods, one, np.transpose(times), strict=True):
+        median, _, high, _ = found = np.percentile(suite_ms, [50, 90, 99, 100])
+        table.add_row(name, *(f"{ms:.1f}" for ms in (one_ms, *found)), f"{high / median:.2f} x")
+    return table
+
+
+def against_learners(measured: Frame, options: argparse.Namespace) -> Table:
     """`ldls.segment` against project + DBSCAN and against label spreading."""
     from benches import learners
 
-    dense, params = measured.masks.to_array(), ldls.Params(threads=threads)
+    dense, params = measured.masks.to_array(), ldls.Params(threads=options.threads)
     peers: dict[str, tuple[Callable[..., object], int]] = {
-        "project + DBSCAN (scikit-learn)": (learners.project_and_cluster, runs),
-        "LabelSpreading (scikit-learn), 200 iterations": (learners.spread_labels, min(runs, 3)),
+        "project + DBSCAN (scikit-learn)": (learners.project_and_cluster, options.runs),
+        "LabelSpreading (scikit-learn), 200 iterations": (learners.spread_labels, min(options.runs, 3)),
     }
     table = _table(
         f"{measured.name}: the whole frame",
         ["peer", "peer, ms", "ldls, ms", "ratio"],
-        f"{threads} threads on both sides",
+        f"{options.threads} threads on both sides",
     )
     for name, (peer, rounds) in peers.items():
         found = medians(
@@ -113,91 +140,95 @@ def against_learners(measured: Frame, threads: int, runs: int, _most: int) -> Ta
     return table
 
 
-def neighbors(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def neighbors(measured: Frame, options: argparse.Namespace) -> Table:
     """Nearest neighbours against pykdtree, SciPy and small_gicp."""
     from benches import neighbor_peers
 
     table = _table(
         "10 nearest neighbours of every point, tree included, ms",
         ["cloud", "points", "ldls", "pykdtree", "scipy", "small_gicp", "pykdtree / ldls"],
-        f"medians, {threads} threads on all sides",
+        f"medians, {options.threads} threads on all sides",
     )
     sweep = np.ascontiguousarray(measured.points[:, :3])
     for name, cloud in neighbor_peers.clouds(sweep, measured.in_view()).items():
-        rounds = runs if len(cloud) < 500_000 else min(runs, 5)
-        found = medians(neighbor_peers.searches(cloud, threads), runs=rounds)
+        rounds = options.runs if len(cloud) < 500_000 else min(options.runs, 5)
+        found = medians(neighbor_peers.searches(cloud, options.threads), runs=rounds)
         times = [f"{found[peer] * 1e3:.1f}" for peer in ("ldls", "pykdtree", "scipy", "small_gicp")]
         table.add_row(name, f"{len(cloud):,}", *times, f"{found['pykdtree'] / found['ldls']:.2f} x")
     return table
 
 
-def growth(measured: Frame, threads: int, runs: int, most: int) -> Table:
+def growth(measured: Frame, options: argparse.Namespace) -> Table:
     """Time and memory against the number of points, all in view of one camera, 20 instances."""
     from benches import memory
 
-    params = ldls.Params(threads=threads)
+    params = ldls.Params(threads=options.threads)
     table = _table(
-        "time and memory against points", ["points", "s", "over 100,000", "extra bytes a point"], f"{threads} threads"
+        "time and memory against points",
+        ["points", "s", "over 100,000", "extra bytes a point"],
+        f"{options.threads} threads",
     )
     base = 0.0
-    for n in (n for n in (10_000, 100_000, 1_000_000, 10_000_000) if n <= most):
+    for n in (n for n in (10_000, 100_000, 1_000_000, 10_000_000) if n <= options.most):
         tiled = tiled_frame(measured.in_view(), n)
         run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
-        seconds = medians(run, runs=runs if n <= 100_000 else 3)["ldls"]
+        seconds = medians(run, runs=options.runs if n <= 100_000 else 3)["ldls"]
         base = seconds if n == 100_000 else base
         ratio = f"{seconds / base:.1f} x" if base else ""
         table.add_row(f"{n:,}", f"{seconds:.4f}", ratio, f"{memory.extra_bytes(n) / n:.0f}")
     return table
 
 
-def instances(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def instances(measured: Frame, options: argparse.Namespace) -> Table:
     """Time against the number of instances."""
-    params = ldls.Params(threads=threads)
-    table = _table("time against instances, 100,000 points", ["instances", "ms"], f"{threads} threads")
+    params = ldls.Params(threads=options.threads)
+    table = _table("time against instances, 100,000 points", ["instances", "ms"], f"{options.threads} threads")
     for count in (0, 1, 5, 20, 100, 500):
         tiled = tiled_frame(measured.in_view(), 100_000, count)
         run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
-        table.add_row(str(count), f"{medians(run, runs=min(runs, 5))['ldls'] * 1e3:.1f}")
+        table.add_row(str(count), f"{medians(run, runs=min(options.runs, 5))['ldls'] * 1e3:.1f}")
     return table
 
 
-def thread_scaling(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def thread_scaling(measured: Frame, options: argparse.Namespace) -> Table:
     """Time against the number of threads."""
     table = _table(f"time against threads: {measured.name}", ["threads", "ms", "ratio to one"], "")
-    counts = [count for count in (1, 2, 4, 8, 16) if count <= threads]
+    counts = [count for count in (1, 2, 4, 8, 16) if count <= options.threads]
 
     def run(count: int) -> Callable[[], object]:
         params = ldls.Params(threads=count)
         return lambda: ldls.segment(measured.points, measured.masks, measured.camera, params=params)
 
-    found = {count: medians({"ldls": run(count)}, runs=runs)["ldls"] for count in counts}
+    found = {count: medians({"ldls": run(count)}, runs=options.runs)["ldls"] for count in counts}
     for count, seconds in found.items():
         table.add_row(str(count), f"{seconds * 1e3:.2f}", f"{found[1] / seconds:.2f} x")
     return table
 
 
-def batch(measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def batch(measured: Frame, options: argparse.Namespace) -> Table:
     """Frames of a batch one after the other on all threads, against one a thread."""
-    frames = 8 * threads
-    table = _table(f"{frames} frames, {measured.name}", ["frames", "ms a frame", "ratio"], f"{threads} threads")
+    frames = 8 * options.threads
+    table = _table(f"{frames} frames, {measured.name}", ["frames", "ms a frame", "ratio"], f"{options.threads} threads")
 
     def one_after_the_other() -> None:
-        stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=threads))
+        stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=options.threads))
         for _ in range(frames):
             stream.segment(measured.points, measured.masks)
 
     def one_a_thread() -> None:
         stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=1))
-        with ThreadPoolExecutor(threads) as workers:
+        with ThreadPoolExecutor(options.threads) as workers:
             list(workers.map(lambda _: stream.segment(measured.points, measured.masks), range(frames)))
 
-    found = medians({"one after the other": one_after_the_other, "one a thread": one_a_thread}, runs=min(runs, 7))
+    found = medians(
+        {"one after the other": one_after_the_other, "one a thread": one_a_thread}, runs=min(options.runs, 7)
+    )
     for name, seconds in found.items():
         table.add_row(name, f"{seconds / frames * 1e3:.2f}", f"{found['one after the other'] / seconds:.2f} x")
     return table
 
 
-def whole_runs(measured: Frame, threads: int, _runs: int, most: int) -> Table:
+def whole_runs(measured: Frame, options: argparse.Namespace) -> Table:
     """`ldls run` over many frames from the disk, against LabelDiffusion in a loop on one core."""
     import tempfile
     from pathlib import Path
@@ -205,10 +236,10 @@ def whole_runs(measured: Frame, threads: int, _runs: int, most: int) -> Table:
     from benches import runs
     from ldls import batch
 
-    count, one_core = min(2000, most), ldls.Params(threads=1)
+    count, one_core = min(2000, options.most), ldls.Params(threads=1)
     table = _table(
         f"{count:,} frames, {measured.name}",
-        ["round", "loop on one core, frames/s", f"run on {threads}, frames/s", "share of loop x workers"],
+        ["round", "loop on one core, frames/s", f"run on {options.threads}, frames/s", "share of loop x workers"],
         "points, calibration and masks from the disk, labels to the disk",
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -216,14 +247,14 @@ def whole_runs(measured: Frame, threads: int, _runs: int, most: int) -> Table:
         settings = batch.RunSettings(masks=str(stored))
         for number in range(1, 4):
             seconds = medians({"loop": lambda: runs.loop(measured, 50, one_core)}, runs=3)["loop"]
-            summary = batch.run(training, Path(folder) / f"out{number}", settings, workers=threads)
+            summary = batch.run(training, Path(folder) / f"out{number}", settings, workers=options.threads)
             own = 50 / seconds
-            share = summary.frames_per_second / own / threads
+            share = summary.frames_per_second / own / options.threads
             table.add_row(str(number), f"{own:.1f}", f"{summary.frames_per_second:.1f}", f"{share:.0%}")
     return table
 
 
-def masks(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def masks(_measured: Frame, options: argparse.Namespace) -> Table:
     """Masks of 1920 x 1080 pixels from and to COCO's run lengths, against pycocotools."""
     import warnings
 
@@ -250,32 +281,32 @@ def masks(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
     table = _table(
         f"{mask_coding.COUNT} masks of {mask_coding.WIDTH} x {mask_coding.HEIGHT} pixels",
         ["work", "pycocotools, ms", "ldls, ms", "ratio"],
-        f"pycocotools on one thread, ldls on {threads}; pixels that differ: {differ}",
+        f"pycocotools on one thread, ldls on {options.threads}; pixels that differ: {differ}",
     )
     for name, (peer, own) in sides.items():
-        found = medians({"peer": peer, "ldls": own}, runs=min(runs, 7))
+        found = medians({"peer": peer, "ldls": own}, runs=min(options.runs, 7))
         _add_ratio(table, name, found["peer"], found["ldls"])
     return table
 
 
-def cameras(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
+def cameras(_measured: Frame, options: argparse.Namespace) -> Table:
     """A ring of six cameras against each of them alone, by the time a point in view takes."""
     from benches import rings
 
     name, points, views = rings.ring()
-    params = ldls.Params(threads=threads)
+    params = ldls.Params(threads=options.threads)
 
     def run(some: list[ldls.View]) -> Callable[[], ldls.Segmentation]:
         return lambda: ldls.segment(points, some, params=params)
 
     sides = {view.name: run([view]) for view in views} | {"ring": run(views)}
-    found = medians(sides, runs=runs)
+    found = medians(sides, runs=options.runs)
     in_view = {side: len(call().in_view) for side, call in sides.items()}
     alone = sum(found[view.name] for view in views) / sum(in_view[view.name] for view in views)
     table = _table(
         name,
         ["cameras", "points in view", "ms", "us a point", "over the six alone"],
-        f"{threads} threads; the six alone take {alone * 1e6:.2f} us a point and camera",
+        f"{options.threads} threads; the six alone take {alone * 1e6:.2f} us a point and camera",
     )
     for side, seconds in found.items():
         each = seconds / in_view[side]
@@ -283,7 +314,7 @@ def cameras(_measured: Frame, threads: int, runs: int, _most: int) -> Table:
     return table
 
 
-def ground(_measured: Frame, _threads: int, runs: int, _most: int) -> Table:
+def ground(_measured: Frame, options: argparse.Namespace) -> Table:
     """The ground of simulated scenes against Patchwork++: heights, labels and time."""
     from benches import ground_peer, ground_scenes
 
@@ -306,7 +337,7 @@ def ground(_measured: Frame, _threads: int, runs: int, _most: int) -> Table:
                 names[1]: lambda scene=scene: ground_peer.our_ground(scene.points, scene.camera),  # type: ignore[misc]
                 names[3]: lambda scene=scene, seen=in_view: ground_peer.our_ground(seen, scene.camera),  # type: ignore[misc]
             }
-            for name, median in medians(sides, runs=min(runs, 7)).items():
+            for name, median in medians(sides, runs=min(options.runs, 7)).items():
                 seconds[name].append(median)
             said = peer.estimate()
             for name, points, estimate in (
@@ -325,6 +356,7 @@ def ground(_measured: Frame, _threads: int, runs: int, _most: int) -> Table:
 
 SECTIONS = {
     "scipy": against_scipy,
+    "suite": suite,
     "learners": against_learners,
     "neighbors": neighbors,
     "growth": growth,

@@ -17,12 +17,13 @@ from rich.console import Console
 from rich.progress import track
 
 import ldls
-from ldls.datasets import Frame, KittiObjectSource
+from benches.frames import simulated_frames
+from ldls.datasets import Frame
 from ldls.evaluation import ClassSet, Evaluation, Table, evaluate, iou_against
 from ldls.evaluation.methods import BOUND, DIRECT_PROJECTION, ENSEMBLE, FULL, IN_MASKS, PAPER, compare
 from ldls.evaluation.pair import Pair
 from ldls.labeling import Labeling
-from ldls.simulation import FrameOrder, SegmenterErrors, SensorErrors, make_frames, suite_orders
+from ldls.simulation import FrameOrder, SegmenterErrors, SensorErrors, suite_orders
 from ldls.simulation.production import seeded_orders
 from ldls.simulation.scene_object import CLASS_NAMES, CYCLIST
 
@@ -81,7 +82,7 @@ def sets_of(folder: Path, part: str) -> dict[str, list[Frame]]:
     orders = {"suite": suite_orders(part)}
     for lidar, first in FIRST_SEEDS[part].items():
         orders[lidar] = orders_of(range(first, first + FRAMES[part]), lidar=lidar)
-    return {name: frames_of(folder / "frames" / part / name, own) for name, own in orders.items()}
+    return {name: list(simulated_frames(folder / "frames" / part / name, own)) for name, own in orders.items()}
 
 
 def orders_of(
@@ -95,14 +96,6 @@ def orders_of(
     return seeded_orders(
         seeds, lidar=lidar, segmenter=segmenter or SegmenterErrors(), sensors=sensors or SensorErrors()
     )
-
-
-def frames_of(folder: Path, orders: Sequence[FrameOrder]) -> list[Frame]:
-    """The frames of `orders`, from files."""
-    for _ in track(make_frames(folder, orders), description=f"frames in {folder.name}", total=len(orders)):
-        pass
-    source = KittiObjectSource(folder / "training", masks="masks", truth="annotations")
-    return [source[k] for k in range(len(source))]
 
 
 def scores_of(frames: Sequence[Frame], labeller: Labeller, classes: ClassSet) -> Evaluation:
@@ -211,7 +204,9 @@ def curves(folder: Path, _part: str) -> Iterator[tuple[str, Table]]:
     for name, by_value in errors.items():
         stem = name.split(" (")[0].replace(" ", "-")
         scored = {
-            x: by_method(frames_of(folder / "frames" / "curves" / f"{stem}-{x:g}", orders), ClassSet.kitti())
+            x: by_method(
+                list(simulated_frames(folder / "frames" / "curves" / f"{stem}-{x:g}", orders)), ClassSet.kitti()
+            )
             for x, orders in by_value.items()
         }
         yield f"curve-{stem}", curve(folder, stem, name, scored)

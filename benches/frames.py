@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.progress import track
 
 import ldls
-from ldls.simulation import sample_frame
+from ldls import datasets
+from ldls.simulation import FrameOrder, SimulatedFrame, make_frames, sample_frame, suite_folder, suite_orders
 
 TILE_M = 100.0
 """Distance of the copies of a sweep in a tiled cloud: no copy touches another."""
@@ -43,6 +46,21 @@ def frame() -> Frame:
         masks=ldls.read_masks(training / "masks/000571.json"),
         camera=ldls.read_camera(training / "calib/000571.txt"),
     )
+
+
+def simulated_frames(folder: Path, orders: Sequence[FrameOrder]) -> Iterator[datasets.Frame]:
+    """The frames of `orders`, from files in `folder`, which are made first where they are not there yet."""
+    for _ in track(make_frames(folder, orders), description=f"frames in {folder.name}", total=len(orders)):
+        pass
+    source = datasets.KittiObjectSource(folder / "training", masks="masks", truth="annotations")
+    for order in orders:
+        yield source[source.names.index(order.name)]
+
+
+def suite_frames(count: int) -> Iterator[Frame]:
+    """The first `count` frames of the suite, from its folder."""
+    for each in simulated_frames(suite_folder(), suite_orders()[:count]):
+        yield _of_one_image(each.name, each)
 
 
 def tiled_points(points: NDArray[np.float32], n: int) -> NDArray[np.float32]:
@@ -79,8 +97,10 @@ def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Fra
 
 
 def _simulated() -> Frame:
-    sample = sample_frame()
-    (image,) = sample.images
+    return _of_one_image("simulated street (LDLS_TEST_DATA is not set)", sample_frame())
+
+
+def _of_one_image(name: str, frame: datasets.Frame | SimulatedFrame) -> Frame:
+    (image,) = frame.images
     assert image.masks is not None
-    points = np.asarray(sample.points, np.float32)
-    return Frame("simulated street (LDLS_TEST_DATA is not set)", points, image.masks, image.camera)
+    return Frame(name, np.asarray(frame.points, np.float32), image.masks, image.camera)
