@@ -88,27 +88,16 @@ pub fn diffuse(
         // where the series of single precision was given up, that of double precision is no better
         let held = iterations.is_some_and(|products| convergence.sweeps < products);
         let series = held.then(|| Series::of_graph(a, iterations, TOLERANCE_F64));
-        let polynomial = match (series.flatten(), iterations) {
-            (Some(series), _) => Some((series.coefficients[series.degree()], series.steps())),
-            (None, products) => products.map(|products| (1.0, vec![Step::product(); products - 1])),
-        };
-        let reach = polynomial
-            .as_ref()
-            .map(|(_, steps)| Reach::of(a, &contested, steps.len(), cancel));
-        let labels =
-            if let Some((reach, (first, steps))) = reach.transpose()?.flatten().zip(polynomial) {
-                let (a, b) = exact(Some(&reach.points))?;
-                reach.winners((&a, &b), &candidates, (first, &steps), cancel)?
-            } else {
-                let (a, b) = exact(None)?;
-                let mut refined = filled((0, f64::NEG_INFINITY), contested.len(), cancel)?;
-                let choose = |pass: &Pass<f64, WIDTH_F64>| {
-                    winners::refine(&contested, &mut refined, pass);
-                    Ok(())
-                };
-                for_each_pass(&a, &b, &candidates, iterations, cancel, choose)?;
-                collect(refined.iter().map(|&(label, _)| label), cancel)?
-            };
+        let series = series.flatten();
+        let labels = decide(
+            a,
+            &contested,
+            &candidates,
+            series,
+            iterations,
+            exact,
+            cancel,
+        )?;
         for (&point, label) in contested.iter().zip(labels) {
             best[point as usize].labels[0] = label;
         }
@@ -119,6 +108,37 @@ pub fn diffuse(
         confidence: tabulate(best.len(), |i| best[i].confidence(), cancel)?,
         convergence,
     })
+}
+
+/// Which of `candidates`, ascending, wins at each of `points`, in double precision: by the part of the graph that flows to
+/// them, or where that is much, by diffusing the candidates again. `series` stands for the products where there is one.
+fn decide(
+    a: &PointGraph,
+    points: &[u32],
+    candidates: &[u32],
+    series: Option<Series>,
+    iterations: Option<usize>,
+    exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    cancel: &Cancel,
+) -> Result<Vec<u32>> {
+    if let Some(products) = iterations {
+        let (first, steps) = series.map_or_else(
+            || (1.0, vec![Step::product(); products.saturating_sub(1)]),
+            |series| (series.coefficients[series.degree()], series.steps()),
+        );
+        if let Some(reach) = Reach::of(a, points, steps.len(), cancel)? {
+            let (a, b) = exact(Some(&reach.points))?;
+            return reach.winners((&a, &b), candidates, (first, &steps), cancel);
+        }
+    }
+    let (a, b) = exact(None)?;
+    let mut refined = filled((0, f64::NEG_INFINITY), points.len(), cancel)?;
+    let choose = |pass: &Pass<f64, WIDTH_F64>| {
+        winners::refine(points, &mut refined, pass);
+        Ok(())
+    };
+    for_each_pass(&a, &b, candidates, iterations, cancel, choose)?;
+    collect(refined.iter().map(|&(label, _)| label), cancel)
 }
 
 /// The likelihoods that [`diffuse`] compares, in single precision: `a.len()` rows of `n_labels`, row by row.
