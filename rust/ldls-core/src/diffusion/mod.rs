@@ -68,10 +68,13 @@ pub fn diffuse(
     cancel: &Cancel,
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
-    let mut best = filled(Best::default(), a.len(), cancel)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let mut probed = Vec::new();
+    let (mut best, mut probed) = (Vec::new(), Vec::new());
     let choose = |pass: &Pass<f32, WIDTH_F32>| {
+        if best.is_empty() {
+            // not before, since a pass takes the most memory while it runs
+            best = filled(Best::default(), a.len(), cancel)?;
+        }
         winners::update(&mut best, pass);
         if let Some(errors) = pass.errors(cancel)? {
             probed = errors;
@@ -192,6 +195,7 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
             pass = Pass::run(a, &schedule, &seeds, None, iterations, cancel)?;
         }
         cancel.check()?;
+        pass.finish();
         done(&pass)?;
         convergence.merge(pass.convergence);
     }

@@ -142,6 +142,11 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
         Ok(())
     }
 
+    /// Gives up the values before the last step, once no further one is to come.
+    pub(super) fn finish(&mut self) {
+        self.previous = Vec::new();
+    }
+
     /// Label, values of its group at all points and lane within the group of each label.
     pub(super) fn labels(&self) -> impl Iterator<Item = (u32, &[[T; WIDTH]], usize)> {
         let lanes = self.seeds.labels();

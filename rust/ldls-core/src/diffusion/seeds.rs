@@ -10,7 +10,7 @@ use std::ops::Range;
 /// Most groups of a pass: one bit each says which of them are in use.
 pub(super) const MOST_GROUPS: usize = 8;
 /// The same for clouds so large that every group counts: it takes 64 bytes a point.
-const MOST_GROUPS_OF_MANY: usize = 3;
+const MOST_GROUPS_OF_MANY: usize = 2;
 const MANY_POINTS: usize = 1 << 20;
 /// Lane of the background in the pass that has it.
 pub(super) const BACKGROUND_LANE: usize = 0;
