@@ -84,6 +84,7 @@ pub fn diffuse(
     let mut convergence = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
     let errors = Errors { a, probed };
     let error = |point: u32| errors.at(point as usize);
+    // the largest error of all points leaves few to be looked at more closely
     let mut contested = winners::contested(&best, convergence.error)?;
     contested.retain(|&point| best[point as usize].may_win(1, error(point)));
     if !contested.is_empty() {
@@ -195,7 +196,7 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
             pass = Pass::run(a, &schedule, &seeds, None, iterations, cancel)?;
         }
         cancel.check()?;
-        pass.finish();
+        pass.drop_previous();
         done(&pass)?;
         convergence.merge(pass.convergence);
     }

@@ -143,7 +143,7 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
     }
 
     /// Gives up the values before the last step, once no further one is to come.
-    pub(super) fn finish(&mut self) {
+    pub(super) fn drop_previous(&mut self) {
         self.previous = Vec::new();
     }
 

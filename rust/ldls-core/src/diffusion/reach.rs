@@ -11,7 +11,7 @@ use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 
 /// Share of the work of diffusing the whole graph from which on that is done instead.
-const MUCH: f64 = 0.5;
+const MOST_WORK: f64 = 0.5;
 /// Share of the largest value within which values are equal: what rounding leaves of equal ones.
 const EQUAL: f64 = 1e-13;
 /// Rows handled by one task of the thread pool.
@@ -38,7 +38,7 @@ impl Reach {
         steps: usize,
         cancel: &Cancel,
     ) -> Result<Option<Self>> {
-        let much = MUCH * steps.max(1) as f64 * a.len() as f64;
+        let most = MOST_WORK * steps.max(1) as f64 * a.len() as f64;
         let mut met = filled(false, a.len(), cancel)?;
         let (mut points, mut ends) = (Vec::new(), Vec::new());
         for &point in from {
@@ -51,7 +51,7 @@ impl Reach {
             cancel.check()?;
             let last = points.len();
             work += last;
-            if work as f64 > much {
+            if work as f64 > most {
                 return Ok(None);
             }
             for at in first..last {
