@@ -9,8 +9,7 @@ use std::ops::Range;
 
 /// Most groups of a pass: one bit each says which of them are in use.
 pub(super) const MOST_GROUPS: usize = 8;
-/// The same for clouds so large that every group counts: it takes 64 bytes a point.
-const MOST_GROUPS_OF_MANY: usize = 2;
+/// Points from which on a pass has a single group: each takes 64 bytes a point.
 const MANY_POINTS: usize = 1 << 20;
 /// Lane of the background in the pass that has it.
 pub(super) const BACKGROUND_LANE: usize = 0;
@@ -48,7 +47,7 @@ pub(super) fn plan<T: Real>(
     let most_groups = if b.rows() < MANY_POINTS {
         MOST_GROUPS
     } else {
-        MOST_GROUPS_OF_MANY
+        1
     };
     let passes = lanes.chunks(width * most_groups);
     passes.map(<[_]>::to_vec).collect()
