@@ -295,8 +295,12 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
     #[inline(always)]
     fn reach_of(&self, key: Key) -> f32 {
         let squared = squared_of(key);
-        if self.tree.rounding == 0.0 || squared == f32::INFINITY {
-            return squared.min(f32::MAX) * (1.0 + ROUNDING);
+        if squared == f32::INFINITY {
+            // short of the places without a candidate: a list that is not filled yet has room
+            return f32::MAX;
+        }
+        if self.tree.rounding == 0.0 {
+            return squared * (1.0 + ROUNDING);
         }
         // either of two points may be off in each of three coordinates
         let distance = squared.sqrt() + 8.0 * self.tree.rounding;
