@@ -263,6 +263,7 @@ CALLS = {
             "thresholds": (0.5,),
             "max_range_m": None,
             "minimum_points": 0,
+            "track": True,
         },
     ),
     "object_scores": (
@@ -278,6 +279,12 @@ CALLS = {
         evaluation.SemanticScores(("person", "car")).add,
         {"prediction": W.labeling, "truth": W.labeling},
     ),
+    "TrackingScores": (evaluation.TrackingScores, {"names": ("car",), "minimum_points": 0}),
+    "TrackingScores.add": (
+        evaluation.TrackingScores(("person", "car")).add,
+        {"prediction": W.labeling, "truth": W.labeling},
+    ),
+    "tracking_table": (evaluation.tracking_table, {"scores": {"a": evaluation.TrackingScores(("car",))}}),
     "semantic_table": (evaluation.semantic_table, {"evaluations": {"a": evaluation.evaluate([], classes=CLASSES)}}),
     "frame_table": (evaluation.frame_table, {"evaluation": evaluation.evaluate([], classes=CLASSES)}),
 }

@@ -364,3 +364,77 @@ def test_names_of_ones_own_can_be_background(frames):
     outcome = evaluate(frames, "--background", "gnome", "--out", frames / "t")
     assert outcome.exit_code == 0, outcome.output
     assert scores(frames / "t")["Car precision"] == 100.0
+
+
+@pytest.fixture
+def drive(tmp_path):
+    """Four sweeps with two cars and a person; `switching` gives one car another number at half time."""
+    for folder in ("truth", "steady", "switching", "anew"):
+        (tmp_path / folder).mkdir()
+    classes = np.array([10, 10, 10, 10, 252, 252, 30, 40], "<u4")
+    for sweep in range(4):
+        numbers = {
+            "truth": [1, 1, 1, 1, 2, 2, 3, 0],
+            "steady": [700, 700, 700, 700, 60_000, 60_000, 2, 0],
+            "switching": [1 + sweep // 2 * 4] * 4 + [2, 2, 3, 0],
+            "anew": [10 * sweep + number for number in (1, 1, 1, 1, 2, 2, 3, 0)],
+        }
+        for folder, each in numbers.items():
+            (classes | np.array(each, "<u4") << 16).tofile(tmp_path / folder / f"{sweep:06}.label")
+    return tmp_path
+
+
+def tracking(folder):
+    rows = json.loads((folder / "tracking.json").read_text())["rows"]
+    return {(row["method"], row["class"]): row for row in rows}
+
+
+def test_a_drive_is_scored_over_its_sweeps(drive):
+    others = (f"--beside={name}={drive / name}" for name in ("switching", "anew"))
+    words = [str(drive / "steady"), str(drive / "truth"), *others, "--out", str(drive / "t")]
+    outcome = run(app, ["evaluate", *words, "--track"])
+    assert outcome.exit_code == 0, outcome.output
+    assert "Objects over the drive" in outcome.output
+    assert "panoptic, tracking and frames as .md, .csv and .json" in outcome.output
+    rows = tracking(drive / "t")
+    assert (rows["steady", "all"]["LSTQ"], rows["steady", "all"]["MOTSA"]) == (100.0, 100.0)
+    found = rows["switching", "all"]
+    assert (found["objects"], found["object frames"], found["id switches"]) == (3, 12, 1)
+    assert found["S_assoc"] == pytest.approx(100 * (0.5 + 1 + 1) / 3)
+    assert rows["switching", "Car"]["S_assoc"] == pytest.approx(75.0)
+    assert found["a hundred frames"] == pytest.approx(100 / 12)
+    assert rows["anew", "all"]["S_assoc"] == pytest.approx(25.0)
+    assert rows["anew", "all"]["id switches"] == 9
+    assert "tracking" not in run(app, ["evaluate", *words]).output
+
+
+def test_numbers_of_every_format_that_has_them_are_followed(drive):
+    # truth as arrays, and a prediction as of nuScenes: its numbers count from 1 in each class
+    (drive / "arrays").mkdir()
+    (drive / "nuscenes").mkdir()
+    for sweep in range(4):
+        values = np.fromfile(drive / f"truth/{sweep:06}.label", "<u4")
+        classes = np.array([1, 1, 1, 1, 1, 1, 2, 0])
+        write_labeling(drive / f"arrays/{sweep:06}.npz", Labeling(classes, values >> 16, np.zeros(8, bool), NAMES))
+        panoptic = np.array([17001] * 4 + [17002] * 2 + [2001, 0], np.uint16)
+        np.savez(drive / f"nuscenes/{sweep:06}_panoptic.npz", data=panoptic)
+    words = [str(drive / "nuscenes"), str(drive / "arrays"), f"--beside=steady={drive / 'steady'}"]
+    outcome = run(app, ["evaluate", *words, "--track", "--out", str(drive / "t")])
+    assert outcome.exit_code == 0, outcome.output
+    rows = tracking(drive / "t")
+    for method in ("nuscenes", "steady"):
+        assert (rows[method, "all"]["LSTQ"], rows[method, "all"]["objects"]) == (100.0, 3)
+
+
+def test_what_masks_allow_is_no_drive(results):
+    outcome = evaluate(results, "--track", "--out", results / "t")
+    assert outcome.exit_code == 0, outcome.output
+    assert {method for method, _ in tracking(results / "t")} == {"mine"}
+
+
+def test_boxes_are_no_truth_of_a_drive(seen):
+    (seen / "boxes").mkdir()
+    (seen / "boxes/7.txt").write_text("Car 0 0 0 0 0 9 9 1.5 1.6 4 0 1 20 0\n")
+    outcome = run(app, ["evaluate", str(seen / "theirs"), f"kitti-boxes:{seen / 'boxes'}", "--track"])
+    assert outcome.exit_code == 1
+    assert "--track: TRUTH is kitti-boxes, which numbers the objects of each frame anew" in outcome.stderr

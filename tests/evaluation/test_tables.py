@@ -11,12 +11,14 @@ from ldls.evaluation import (
     ClassSet,
     Pair,
     Table,
+    TrackingScores,
     ablation_table,
     evaluate,
     frame_table,
     instance_table,
     panoptic_table,
     semantic_table,
+    tracking_table,
 )
 from ldls.evaluation.tables import coverage_table, reliability_table
 
@@ -101,6 +103,25 @@ def test_ablation_tells_the_gain(methods):
     table = ablation_table(methods)
     assert table.columns == ("variant", "Car IoU", "Pedestrian IoU", "mean IoU", "gain", "mean PQ")
     assert [row[-2:] for row in table.rows] == [(0.0, 0.0), (50.0, 100.0)]
+
+
+def test_tracking_has_a_row_a_class_and_one_of_all():
+    truth = labeling([1, 1, 2, 0], [1, 1, 1, 0])
+    scores = TrackingScores(truth.names[1:])
+    for car, person in ((1, 2), (3, 2)):
+        scores.add(labeling([1, 1, 2, 0], [car, car, person, 0]), truth)
+    table = tracking_table({"m": scores})
+    assert table.columns == (
+        *("method", "class", "LSTQ", "S_cls", "S_assoc", "objects", "object frames", "id switches"),
+        *("a hundred frames", "MOTSA"),
+    )
+    assert table.rows == (
+        ("m", "Car", None, 100.0, 50.0, 1, 2, 1, 50.0, 50.0),
+        ("m", "Pedestrian", None, 100.0, 100.0, 1, 2, 0, 0.0, 100.0),
+        ("m", "all", pytest.approx(100 * 0.75**0.5), 100.0, 75.0, 2, 4, 1, 25.0, 75.0),
+    )
+    one = TrackingScores(("Car",))
+    assert tracking_table({"m": one}).rows == (("m", "Car", None, None, None, 0, 0, 0, None, None),)
 
 
 def test_recall_is_told_of_well_seen_instances_too():

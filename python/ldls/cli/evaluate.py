@@ -18,6 +18,7 @@ from ldls.errors import ParameterError
 if TYPE_CHECKING:
     from ldls.evaluation import Evaluation
 
+BOXES = "kitti-boxes"
 FOLDER = {"exists": True, "file_okay": False, "readable": True, "metavar": "FOLDER"}
 
 
@@ -75,6 +76,14 @@ def evaluate(
     min_points: Annotated[
         int, typer.Option(metavar="N", min=0, help="True instances of fewer points do not count.")
     ] = 0,
+    track: Annotated[
+        bool,
+        typer.Option(
+            "--track",
+            help="The frames are the sweeps of one drive in the order of their names, and an instance's number means "
+            "the same object throughout: score that too.",
+        ),
+    ] = False,
     points: Annotated[
         Path | None,
         typer.Option(help="Folder of the sweeps, for --calib, --max-range and kitti-boxes.", **FOLDER),
@@ -94,15 +103,17 @@ def evaluate(
     """Score the labels of a method, and of others beside it, against true labels.
 
     Prints precision, recall and IoU over points, instances found at IoU 0.50 and 0.70, and panoptic quality; of .npz
-    results of ldls also how far their confidence can be relied on, and what their masks allow at best. Files belong
-    together by name: 000123.npz and 000123.txt. Points that a method's .npz, the truth or --calib has out of view count
-    for no method.
+    results of ldls also how far their confidence can be relied on, and what their masks allow at best; with --track
+    LSTQ, association scores, id switches and MOTSA. Files belong together by name: 000123.npz and 000123.txt. Points
+    that a method's .npz, the truth or --calib has out of view count for no method.
 
     Examples:
     ldls evaluate results label_2 --points velodyne --calib calib --out tables
 
     ldls evaluate theirs labels --beside mine=results --beside boxes=kitti-boxes:detections --points velodyne
     --calib calib
+
+    ldls evaluate predictions labels --track
     """
     from ldls.cli.label_pairs import Counting, FrameFolders, have_masks, parse_place, read_bounds, read_pairs
     from ldls.evaluation import ClassSet, evaluate as score_pairs
@@ -124,12 +135,18 @@ def evaluate(
         )
         if lacking:
             console().print(f"{method}: left out for want of their pair: {_frames(len(lacking))}", highlight=False)
+    if track and any(frame.truth.format == BOXES for own in files.values() for frame in own):
+        raise ParameterError(
+            f"--track: TRUTH is {BOXES}, which numbers the objects of each frame anew; expected a format whose numbers "
+            "mean the same object in every sweep, such as label"
+        )
     folders = FrameFolders(points=points, calib=calib, images=image)
     of_methods = {method: {each.name: each.prediction for each in own} for method, own in files.items()}
     counting = Counting(of_methods, folders)
     score = partial(score_pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
     by_method = {
-        method: score(progress(read_pairs(own, counting), len(own), "scoring")) for method, own in files.items()
+        method: score(progress(read_pairs(own, counting), len(own), "scoring"), track=track)
+        for method, own in files.items()
     }
     # labels alone have no masks
     whole = next((own for own in files.values() if have_masks(own)), None)
@@ -164,6 +181,9 @@ def _show(by_method: dict[str, Evaluation], left_out_by: set[str], out: Path | N
     }
     if any(scores.reliability for scores in by_method.values()):
         shown |= {"reliability": tables.reliability_table(by_method), "coverage": tables.coverage_table(by_method)}
+    tracked = {method: scores.tracking for method, scores in by_method.items() if scores.tracking}
+    if tracked:
+        shown["tracking"] = tables.tracking_table(tracked)
     figures: list[Path] = []
     if out:
         for stem, table in shown.items():

@@ -18,7 +18,16 @@ from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticQuality, PanopticScores
 from ldls.evaluation.reliability import Reliability
 from ldls.evaluation.semantic import SemanticScores
-from ldls.evaluation.tables import Table, ablation_table, frame_table, instance_table, panoptic_table, semantic_table
+from ldls.evaluation.tables import (
+    Table,
+    ablation_table,
+    frame_table,
+    instance_table,
+    panoptic_table,
+    semantic_table,
+    tracking_table,
+)
+from ldls.evaluation.tracking import TrackingQuality, TrackingScores
 from ldls.labeling import Labeling
 
 __all__ = [
@@ -36,6 +45,8 @@ __all__ = [
     "Reliability",
     "SemanticScores",
     "Table",
+    "TrackingQuality",
+    "TrackingScores",
     "ablation_table",
     "annotate",
     "bound_labels",
@@ -48,4 +59,5 @@ __all__ = [
     "panoptic_table",
     "scores_against_range",
     "semantic_table",
+    "tracking_table",
 ]

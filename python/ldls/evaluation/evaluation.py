@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ldls.checks import checked, shown
 from ldls.errors import InputError, ParameterError
@@ -14,6 +16,7 @@ from ldls.evaluation.pair import Pair
 from ldls.evaluation.panoptic import PanopticScores
 from ldls.evaluation.reliability import Reliability
 from ldls.evaluation.semantic import SemanticScores
+from ldls.evaluation.tracking import TrackingScores
 from ldls.labeling import Labeling
 
 WELL_SEEN_POINTS = 20
@@ -49,6 +52,7 @@ class Evaluation:
         panoptic: Panoptic quality.
         frames: One record a frame.
         reliability: Confidence against truth; None where a frame has no confidence.
+        tracking: Objects over the drive; None where the frames are not said to be one.
     """
 
     names: tuple[str, ...]
@@ -58,6 +62,7 @@ class Evaluation:
     panoptic: PanopticScores
     frames: tuple[FrameCounts, ...]
     reliability: Reliability | None
+    tracking: TrackingScores | None = None
 
 
 @checked
@@ -68,6 +73,7 @@ def evaluate(
     thresholds: Sequence[float] = PAPER_THRESHOLDS,
     max_range_m: float | None = None,
     minimum_points: int = 0,
+    track: bool = False,
 ) -> Evaluation:
     """Semantic, instance and panoptic scores over all frames, which are taken one at a time.
 
@@ -77,6 +83,9 @@ def evaluate(
         thresholds: IoU from which on a matched instance is found.
         max_range_m: Points farther from the lidar than this do not count; needs `Pair.ranges_m`.
         minimum_points: Smaller true instances, and smaller unmatched segments in panoptic quality, do not count.
+        track: Score objects over the drive as well. The frames are the sweeps of one drive in their order, and an
+            instance's number means the same object in all of them; of true ones together with the scored class. Of
+            several drives evaluate each, and merge their `tracking`.
 
     Raises:
         ShapeError: Prediction and truth of a frame differ in length.
@@ -91,23 +100,31 @@ def evaluate(
         classes.names, thresholds=thresholds, minimum_points=max(minimum_points, WELL_SEEN_POINTS)
     )
     panoptic = PanopticScores(classes.names, minimum_points=minimum_points)
+    tracking = TrackingScores(classes.names, minimum_points=minimum_points) if track else None
     reliability: Reliability | None = Reliability()
     frames = []
     for item in pairs:
-        pair = _as_pair(item).mapped(classes, max_range_m=max_range_m)
+        own = _as_pair(item)
+        pair = own.mapped(classes, max_range_m=max_range_m)
         of_frame = SemanticScores(classes.names)
         of_frame.add(pair.prediction, pair.truth)
         semantic.merge(of_frame)
         for scores in (instance, well_seen, panoptic):
             scores.add(pair.prediction, pair.truth)
+        if tracking is not None:
+            tracking.add(_numbered(pair.prediction, own.prediction), _numbered(pair.truth, own.truth))
         if pair.confidence is None:
             reliability = None
         elif reliability is not None:
             reliability.add(pair.prediction, pair.truth, pair.confidence)
         frames.append(_frame_counts(pair, of_frame))
-    return Evaluation(
-        classes.names, semantic, instance, well_seen, panoptic, tuple(frames), reliability if frames else None
-    )
+    reliability = reliability if frames else None
+    return Evaluation(classes.names, semantic, instance, well_seen, panoptic, tuple(frames), reliability, tracking)
+
+
+def _numbered(mapped: Labeling, own: Labeling) -> Labeling:
+    """`mapped` with the numbers of `own`: classes that become one may have got others, in each frame anew."""
+    return replace(mapped, instances=np.where(mapped.classes > 0, own.instances, 0))
 
 
 def _as_pair(item: Pair | tuple[str, Labeling, Labeling]) -> Pair:

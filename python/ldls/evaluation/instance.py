@@ -29,13 +29,15 @@ class Overlaps:
         prediction_ids: (P,) numbers of the predicted segments, ascending.
         truth_points: (T,) int64: points of each true segment.
         prediction_points: (P,) int64: points of each predicted segment.
+        common: (T, P) int64: points in both.
         iou: (T, P) float64: points in both over points in either.
     """
 
-    truth_ids: NDArray[np.int32]
-    prediction_ids: NDArray[np.int32]
+    truth_ids: NDArray[np.signedinteger]
+    prediction_ids: NDArray[np.signedinteger]
     truth_points: NDArray[np.int64]
     prediction_points: NDArray[np.int64]
+    common: NDArray[np.int64]
     iou: NDArray[np.float64]
 
 
@@ -95,7 +97,7 @@ class InstanceScores:
         return self._counts[key]
 
 
-def overlaps(prediction: NDArray[np.int32], truth: NDArray[np.int32]) -> Overlaps:
+def overlaps(prediction: NDArray[np.signedinteger], truth: NDArray[np.signedinteger]) -> Overlaps:
     """Overlaps of the segments of `prediction` and `truth`, each (n,), where -1 is no segment."""
     truth_ids, truth_rows = np.unique(truth, return_inverse=True)
     prediction_ids, prediction_rows = np.unique(prediction, return_inverse=True)
@@ -106,9 +108,9 @@ def overlaps(prediction: NDArray[np.int32], truth: NDArray[np.int32]) -> Overlap
     true, predicted = truth_ids >= 0, prediction_ids >= 0
     truth_points = both.sum(axis=1)[true]
     prediction_points = both.sum(axis=0)[predicted]
-    both = both[true][:, predicted]
-    iou = both / (truth_points[:, None] + prediction_points[None, :] - both)
-    return Overlaps(truth_ids[true], prediction_ids[predicted], truth_points, prediction_points, iou)
+    common = both[true][:, predicted]
+    iou = common / (truth_points[:, None] + prediction_points[None, :] - common)
+    return Overlaps(truth_ids[true], prediction_ids[predicted], truth_points, prediction_points, common, iou)
 
 
 def instance_overlaps(prediction: Labeling, truth: Labeling, name: str) -> Overlaps:

@@ -16,6 +16,7 @@ from ldls.checks import checked
 from ldls.errors import ParameterError
 from ldls.evaluation.evaluation import WELL_SEEN_POINTS, Evaluation
 from ldls.evaluation.reliability import BINS
+from ldls.evaluation.tracking import TrackingQuality, TrackingScores
 from ldls.io.files import whole_file
 
 if TYPE_CHECKING:
@@ -144,6 +145,23 @@ def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
 
 
 @checked
+def tracking_table(scores: Mapping[str, TrackingScores]) -> Table:
+    """Association scores by method: of each class and, where there are several, of all together."""
+    rows: list[tuple[Cell, ...]] = []
+    for method, each in scores.items():
+        names = each.names if len(each.names) > 1 else ()
+        rows += [(method, name, None, percent(each.semantic[name].iou), *_association(each[name])) for name in names]
+        whole = "all" if names else each.names[0]
+        rows.append((method, whole, percent(each.lstq), percent(each.s_cls), *_association(each.total)))
+    columns = (
+        *("method", "class", "LSTQ", "S_cls", "S_assoc", "objects", "object frames"),
+        *("id switches", "a hundred frames", "MOTSA"),
+    )
+    note = f"{PERCENT} S_cls of a class is its IoU. Object frames: true objects in each sweep, matched or not."
+    return Table("Objects over the drive", columns, tuple(rows), note)
+
+
+@checked
 def ablation_table(evaluations: Mapping[str, Evaluation]) -> Table:
     """IoU of each class by variant, the gain in mean IoU over the first (Table III), and mean panoptic quality."""
     names = _classes(evaluations)
@@ -215,6 +233,11 @@ def coverage_table(evaluations: Mapping[str, Evaluation]) -> Table:
     columns = ("method", "confidence from", "coverage", "precision")
     note = "In percent. Coverage: share of the points labelled as objects that are kept."
     return Table("Points of objects by confidence", columns, tuple(rows), note)
+
+
+def _association(quality: TrackingQuality) -> tuple[Cell, ...]:
+    counts = quality.tubes, quality.object_frames, quality.id_switches, quality.switches_per_100
+    return percent(quality.s_assoc), *counts, percent(quality.motsa)
 
 
 def _class_scores(evaluation: Evaluation) -> Iterator[tuple[str, int, *tuple[float | None, ...]]]:

@@ -123,7 +123,7 @@ def test_nuscenes(tmp_path):
     np.savez(tmp_path / "a_panoptic.npz", data=np.array([17001, 2999, 0, 24000], np.uint16))
     found = read_panoptic(tmp_path / "a_panoptic.npz")
     assert class_names(found) == expected
-    assert found.instances.tolist() == [1, 999, 0, 0]
+    assert found.instances.tolist() == [17001, 2999, 0, 0]
 
 
 def test_nuscenes_faults(tmp_path):

@@ -61,7 +61,7 @@ def read_lidarseg(path: str | PathLike[str]) -> Labeling:
 
 
 def read_panoptic(path: str | PathLike[str]) -> Labeling:
-    """Labels of a `_panoptic.npz` file, one a point.
+    """Labels of a `_panoptic.npz` file, one a point; instances by their whole numbers, which differ between classes.
 
     Raises:
         CorruptFileError: It is not a whole `.npz` file with one array `data` of such labels.
@@ -72,7 +72,8 @@ def read_panoptic(path: str | PathLike[str]) -> Labeling:
         if labels is None or labels.ndim != 1 or labels.dtype.kind not in "iu":
             raise CorruptFileError(f"found arrays {arrays.listed()}, expected 'data' with a uint16 a point")
         try:
-            return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=labels % INSTANCES_A_CLASS)
+            instances = np.where(labels % INSTANCES_A_CLASS > 0, labels, 0)
+            return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=instances)
         except InputError as error:
             raise CorruptFileError(str(error)) from None
 
