@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         MaskError as MaskError,
         NonFiniteError as NonFiniteError,
         ParameterError as ParameterError,
+        PoseError as PoseError,
         ShapeError as ShapeError,
         SourceError as SourceError,
         TruncatedFileError as TruncatedFileError,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
         read_image as read_image,
         read_masks as read_masks,
         read_points as read_points,
+        read_poses as read_poses,
         read_result as read_result,
         save as save,
         save_objects as save_objects,
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
         Segmentation as Segmentation,
         SegmentedObject as SegmentedObject,
     )
+    from ldls.sequences import Trajectory as Trajectory
     from ldls.view import SeenView as SeenView, View as View
 
 _NAMES = {
@@ -67,6 +70,7 @@ _NAMES = {
         "MaskError",
         "NonFiniteError",
         "ParameterError",
+        "PoseError",
         "ShapeError",
         "SourceError",
         "TruncatedFileError",
@@ -75,11 +79,21 @@ _NAMES = {
         "UnsupportedFormatError",
     ),
     "ldls.explaining": ("Explanation", "explain"),
-    "ldls.io": ("read_camera", "read_image", "read_masks", "read_points", "read_result", "save", "save_objects"),
+    "ldls.io": (
+        "read_camera",
+        "read_image",
+        "read_masks",
+        "read_points",
+        "read_poses",
+        "read_result",
+        "save",
+        "save_objects",
+    ),
     "ldls.label_diffusion": ("LabelDiffusion", "segment"),
     "ldls.masks": ("InstanceMasks",),
     "ldls.params": ("Params",),
     "ldls.segmentation": ("Instance", "OrientedBox", "Report", "Segmentation", "SegmentedObject"),
+    "ldls.sequences": ("Trajectory",),
     "ldls.view": ("SeenView", "View"),
 }
 """The public names, by the module that they come from."""

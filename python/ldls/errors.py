@@ -60,6 +60,12 @@ class ParameterError(InputError):
     code = "parameter"
 
 
+class PoseError(InputError):
+    """Poses of a drive that cannot be its way, or have none for a moment."""
+
+    code = "pose"
+
+
 class SourceError(InputError):
     """A source of frames that is not whole, or of an unknown kind."""
 

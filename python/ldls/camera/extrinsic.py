@@ -69,10 +69,14 @@ def _rotation(name: str, value: NDArray[np.float64]) -> NDArray[np.float64]:
     if name == "rotation":
         return as_matrix(name, value, ((3, 3),))
     if name == "roll_pitch_yaw_deg":
-        roll, pitch, yaw = np.radians(as_matrix(name, value, ((3,),)))
-        return _about(2, yaw) @ _about(1, pitch) @ _about(0, roll)
+        return turn_of(*np.radians(as_matrix(name, value, ((3,),))))
     quaternion = as_matrix(name, value, ((4,),))
     return from_quaternion(name, quaternion if name == "quaternion_wxyz" else np.roll(quaternion, 1))
+
+
+def turn_of(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """(3, 3) rotation by so many radians about the fixed axes x, then y, then z."""
+    return _about(2, yaw) @ _about(1, pitch) @ _about(0, roll)
 
 
 def _about(axis: int, angle: float) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.checks import numbers
-from ldls.errors import CalibrationError
+from ldls.errors import CalibrationError, LdlsError
 
 Matrix = NDArray[np.float64]
 
@@ -35,23 +35,23 @@ def as_matrix(name: str, values: ArrayLike, shapes: tuple[tuple[int, ...], ...])
     return numbers(name, values, np.float64, *shapes, error=CalibrationError).copy()
 
 
-def rigid(place: str, matrix: Matrix) -> Matrix:
+def rigid(place: str, matrix: Matrix, error: type[LdlsError] = CalibrationError) -> Matrix:
     """`matrix` (4, 4), which turns and shifts and does nothing else.
 
     Raises:
-        CalibrationError: It does something else; the message has the deviation.
+        CalibrationError: It does something else; the message has the deviation. Or another `error`.
     """
     rotation = matrix[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are no rotation's
         deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if not deviation <= ROTATION_LIMIT:
-        raise CalibrationError(
+        raise error(
             f"{place}: R^T R deviates by {deviation:.3g} from the identity, expected a rotation to {ROTATION_LIMIT}"
         )
     if not np.linalg.det(rotation) > 0:
-        raise CalibrationError(f"{place}: the determinant is -1, a mirror; expected a rotation")
+        raise error(f"{place}: the determinant is -1, a mirror; expected a rotation")
     if matrix[3].tolist() != [0, 0, 0, 1]:
-        raise CalibrationError(f"{place}: the last row is {matrix[3].tolist()}, expected [0, 0, 0, 1]; transposed?")
+        raise error(f"{place}: the last row is {matrix[3].tolist()}, expected [0, 0, 0, 1]; transposed?")
     return matrix
 
 
@@ -86,3 +86,22 @@ def from_quaternion(place: str, wxyz: Matrix) -> Matrix:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def to_quaternion(rotation: Matrix) -> Matrix:
+    """(4,) unit quaternion w x y z, w >= 0, of the rotation (3, 3): that of the nearest one, where digits are missing.
+
+    It is the eigenvector of the largest eigenvalue of a symmetric matrix (Bar-Itzhack 2000), so half turns are no
+    special case.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    quadratic = np.array(
+        [
+            [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, xx - yy - zz, xy + yx, xz + zx],
+            [xz - zx, xy + yx, yy - xx - zz, yz + zy],
+            [yx - xy, xz + zx, yz + zy, zz - xx - yy],
+        ]
+    )
+    wxyz: Matrix = np.linalg.eigh(quadratic).eigenvectors[:, -1]
+    return -wxyz if wxyz[0] < 0 else wxyz

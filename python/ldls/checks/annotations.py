@@ -21,6 +21,7 @@ MAKERS = {
     "InstanceMasks": "make them with InstanceMasks.from_array, or ldls.read_masks of a file",
     "Labeling": "make one with Labeling.from_codes, or ldls.io.labels.read_labeling of a file",
     "Params": "make them with Params(...), as in Params(sigma=0.5)",
+    "Trajectory": "make one with Trajectory(stamps, poses), or ldls.read_poses of a file",
     "Segmentation": "ldls.segment and ldls.read_result return them",
 }
 """Where instances of a class come from, for messages."""

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
-from ldls.datasets.kitti_common import camera_numbers, read_stamps
+from ldls.datasets.kitti_common import camera_numbers
 from ldls.io import read_camera
 from ldls.io.images import read_image_size
+from ldls.io.kitti_stamps import read_stamps
 
 
 class KittiOdometrySource(FileSource):

@@ -10,13 +10,12 @@ from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
 from ldls.datasets.file_source import FileSource, check_folders, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
-from ldls.datasets.kitti_common import camera_numbers, read_stamps
+from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import SourceError
 from ldls.io import read_camera
+from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
 
 LIDAR = "velodyne_points"
 
@@ -97,14 +96,4 @@ def _drive(path: Path, wanted: str | None) -> Path:
 
 
 def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:
-    return read_stamps(folder / "timestamps.txt", names, _seconds, example="2011-09-26 13:02:25.951199337")
-
-
-def _seconds(line: str) -> float | None:
-    """Seconds since 1970; None for a blank line, which KITTI has for what was not taken."""
-    if not line.strip():
-        return None
-    stamp = np.datetime64(line.strip(), "ns")
-    if np.isnat(stamp):
-        raise ValueError("not a time")
-    return int(stamp.astype(np.int64)) / 1e9
+    return read_stamps(folder / "timestamps.txt", names, clock_seconds, example=CLOCK_EXAMPLE)

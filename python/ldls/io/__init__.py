@@ -5,6 +5,16 @@ from ldls.io.images import read_image
 from ldls.io.masks.formats import read_masks
 from ldls.io.objects import save_objects
 from ldls.io.points import read_points
+from ldls.io.poses.read import read_poses
 from ldls.io.results import read_result, save
 
-__all__ = ["read_camera", "read_image", "read_masks", "read_points", "read_result", "save", "save_objects"]
+__all__ = [
+    "read_camera",
+    "read_image",
+    "read_masks",
+    "read_points",
+    "read_poses",
+    "read_result",
+    "save",
+    "save_objects",
+]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ldls.camera.rigid import to_quaternion
 from ldls.io.ros.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -196,7 +197,7 @@ def _static_transforms(types: Any) -> Any:  # noqa: ANN401
 
 def _transform(types: Any, header: Header, child: str, T_parent_child: NDArray[np.float64]) -> Any:  # noqa: ANN401
     x, y, z = T_parent_child[:3, 3].tolist()
-    qx, qy, qz, qw = _quaternion(T_parent_child[:3, :3])
+    qw, qx, qy, qz = to_quaternion(T_parent_child[:3, :3]).tolist()
     transform = make(
         types,
         "geometry_msgs/msg/Transform",
@@ -205,10 +206,3 @@ def _transform(types: Any, header: Header, child: str, T_parent_child: NDArray[n
     )
     stamped = "geometry_msgs/msg/TransformStamped"
     return make(types, stamped, header=make_header(types, header), child_frame_id=child, transform=transform)
-
-
-def _quaternion(rotation: NDArray[np.float64]) -> tuple[float, float, float, float]:
-    """Quaternion x y z w of a rotation by less than half a turn."""
-    w = np.sqrt(1 + np.trace(rotation)) / 2
-    x, y, z = rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
-    return float(x / (4 * w)), float(y / (4 * w)), float(z / (4 * w)), float(w)

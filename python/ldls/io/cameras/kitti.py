@@ -20,7 +20,7 @@ SIZES = {"P0": 12, "P1": 12, "P2": 12, "P3": 12, "R0_rect": 9, "Tr_velo_to_cam":
 """Numbers in each line that a camera needs."""
 SPELLINGS = {"R_rect": "R0_rect", "R_rect_00": "R0_rect", "Tr_velo_cam": "Tr_velo_to_cam"}
 """Keys of KITTI tracking, and those of KITTI object that they stand for."""
-LIDAR_SIZES = {"R": 9, "T": 3}
+TRANSFORM_SIZES = {"R": 9, "T": 3}
 
 Matrices = dict[str, NDArray[np.float64]]
 
@@ -71,19 +71,29 @@ def read_raw(folder: str | PathLike[str], *, camera: int = 2) -> Camera:
     _check_number(camera)
     folder = Path(folder)
     lidar_path, camera_path = folder / "calib_velo_to_cam.txt", folder / "calib_cam_to_cam.txt"
-    lidar = _read_matrices(lidar_path, LIDAR_SIZES, {})
     p_rect, s_rect = f"P_rect_{camera:02}", f"S_rect_{camera:02}"
     cameras = _read_matrices(camera_path, {p_rect: 12, "R_rect_00": 9, s_rect: 2}, {})
-    rotation, translation = (_get_matrix(lidar_path, lidar, key, RAW_ARCHIVE) for key in LIDAR_SIZES)
-    to_camera = np.column_stack([rotation.reshape(3, 3), translation])
+    to_camera = read_raw_transform(lidar_path)
     projection, rectification = (_get_matrix(camera_path, cameras, key, RAW_ARCHIVE) for key in (p_rect, "R_rect_00"))
     size = _image_size(camera_path, cameras.get(s_rect))
     with within(folder):
         return Camera(
             projection=projection.reshape(3, 4),
-            T_camera_lidar=_homogeneous(rectification.reshape(3, 3)) @ _homogeneous(to_camera),
+            T_camera_lidar=_homogeneous(rectification.reshape(3, 3)) @ to_camera,
             image_size=size,
         )
+
+
+def read_raw_transform(path: Path) -> NDArray[np.float64]:
+    """(4, 4) of a file of a day of KITTI raw with the lines R and T, as calib_velo_to_cam.txt.
+
+    Raises:
+        CalibrationError: A key is missing or doubled, or a line does not hold the numbers it should.
+        FileNotFoundError: The file is missing.
+    """
+    matrices = _read_matrices(path, TRANSFORM_SIZES, {})
+    rotation, translation = (_get_matrix(path, matrices, key, RAW_ARCHIVE) for key in TRANSFORM_SIZES)
+    return _homogeneous(np.column_stack([rotation.reshape(3, 3), translation]))
 
 
 def _check_number(camera: int) -> None:
