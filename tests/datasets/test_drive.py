@@ -1,5 +1,7 @@
 """A simulated drive: through its source and the method, it scores as its frames do singly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,11 @@ from ldls.datasets.inspection import check_stamps, inspect
 from ldls.evaluation import ClassSet, evaluate
 from ldls.labeling import Labeling
 from ldls.simulation import Drive, SensorErrors, drive_folder, drive_frame, write_drive
+from ldls.simulation.drives import drive_poses
 
 DRIVE = Drive(n_frames=3, seed=0, lidar="hdl-32e")
+TURNS = Drive(n_frames=12, seed=2, lidar="vlp-16", camera="robot", turn_deg_s=20.0)
+"""5.5 m and 22 degrees to the left."""
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +37,8 @@ def test_the_source_gives_back_what_was_simulated(drive_path):
     assert frame.images[0].camera.projection == pytest.approx(simulated.images[0].camera.projection)
     assert frame.images[0].camera.T_camera_lidar == pytest.approx(simulated.images[0].camera.T_camera_lidar, abs=1e-9)
     assert frame.stamp - frame.images[0].stamp == pytest.approx(DRIVE.sensors.delay_s, abs=1e-6)
+    np.testing.assert_allclose(frame.pose, simulated.pose, atol=1e-6)
+    assert frame.pose[0, 3] == pytest.approx(0.2 * DRIVE.speed_m_s)
     assert not check_stamps(source.names, source.stamps) and not inspect(source, 2).findings
 
 
@@ -59,8 +66,71 @@ def test_objects_move_while_the_rig_does_and_none_is_run_over():
     assert np.linalg.norm(last.points[:, :2], axis=1).min() > 0.5
 
 
+def test_a_drive_that_turns_follows_an_arc():
+    poses = drive_poses(TURNS)
+    yaw = np.radians(20 * 0.1 * np.arange(12))
+    radius = TURNS.speed_m_s / np.radians(20)
+    np.testing.assert_allclose(poses[:, 0, 3], radius * np.sin(yaw), atol=1e-9)
+    np.testing.assert_allclose(poses[:, 1, 3], radius * (1 - np.cos(yaw)), atol=1e-9)
+    np.testing.assert_allclose(np.arctan2(poses[:, 1, 0], poses[:, 0, 0]), yaw, atol=1e-9)
+    assert 0 < np.ptp(poses[:, 2, 3]) < 0.3, "the rig keeps to the ground"
+
+
+def test_poses_of_a_drive_that_turns_are_read_as_they_are(tmp_path):
+    """To a tenth of a millimetre, through latitude and longitude."""
+    made = write_drive(tmp_path, TURNS)
+    next(made)  # one frame, for the poses are written first
+    folder = drive_folder(tmp_path, TURNS)
+    trajectory = ldls.read_poses(folder / "oxts")
+    np.testing.assert_allclose(trajectory.poses, drive_poses(TURNS), atol=1e-4)
+    (source,) = (open_source(folder),)
+    assert source[0].stamp == trajectory.stamps[0]
+
+
+@pytest.mark.parametrize("turn_deg_s", [-20.0, 0.0, 20.0])
+def test_what_stands_still_stays_where_it_is_in_the_world(turn_deg_s):
+    drive = replace(TURNS, turn_deg_s=turn_deg_s)
+    first, last = drive_frame(drive, 0), drive_frame(drive, 11)
+    np.testing.assert_array_equal(first.pose, np.eye(4))
+    n_seen = 0
+    for number, (was, thing) in enumerate(zip(first.objects, last.objects, strict=True), start=1):
+        assert thing.yaw - was.yaw == pytest.approx(-np.radians(1.1 * turn_deg_s))
+        if was.velocity_m_s != (0, 0):
+            continue
+        assert (last.pose @ [*thing.centre_m, 1])[:3] == pytest.approx(was.centre_m, abs=1e-9)
+        points = last.points[last.truth.instances == number, :3] @ last.pose[:3, :3].T + last.pose[:3, 3]
+        c, s = np.cos(was.yaw), np.sin(was.yaw)
+        within = np.abs((points - was.centre_m) @ [[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        n_seen += len(points)
+        # the range's noise is 15 mm
+        assert np.all(within < np.array([was.length_m, was.width_m, was.height_m]) / 2 + 0.1)
+    assert n_seen > 200
+
+
+def test_what_moves_goes_its_own_way_in_the_world_while_the_rig_turns():
+    first, last = drive_frame(TURNS, 0), drive_frame(TURNS, 11)
+    moving = [pair for pair in zip(first.objects, last.objects, strict=True) if np.hypot(*pair[0].velocity_m_s) > 1]
+    assert moving
+    for was, thing in moving:
+        way = (last.pose @ [*thing.centre_m, 1])[:2] - was.centre_m[:2]
+        assert way == pytest.approx(np.multiply(1.1, was.velocity_m_s), abs=1e-9)
+
+
+def test_a_rig_that_leaves_the_road_drives_through_nothing():
+    drive = Drive(n_frames=60, seed=2, lidar="vlp-16", camera="robot", turn_deg_s=12.0)
+    for number in (25, 40, 59):
+        # the ground is farther away
+        assert np.linalg.norm(drive_frame(drive, number).points[:, :3], axis=1).min() > 1.2
+
+
 @pytest.mark.parametrize(
-    "options", [pytest.param({"n_frames": 0}, id="no frames"), pytest.param({"camera": "ring"}, id="a ring")]
+    "options",
+    [
+        pytest.param({"n_frames": 0}, id="no frames"),
+        pytest.param({"camera": "ring"}, id="a ring"),
+        pytest.param({"turn_deg_s": 91.0}, id="too fast a turn"),
+        pytest.param({"turn_deg_s": float("nan")}, id="no turn"),
+    ],
 )
 def test_drives_that_cannot_be_are_refused(options):
     with pytest.raises(ldls.ParameterError):

@@ -8,14 +8,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.errors import InputError, LeftOutWarning, SourceError, some
+from ldls.errors import InputError, LeftOutWarning, SourceError, some, within
 from ldls.io import read_image, read_points
 from ldls.io.labels import read_labeling
 from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
+from ldls.sequences import Trajectory
 
 POINT_SUFFIXES = (".bin", ".npy")
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -61,6 +65,7 @@ class FileSource:
             counts = ", ".join(f"{part} {len(files)}" for part, files in parts.items())
             raise SourceError(f"{path}: no frame has a file in each of these, found {counts}; names must agree")
         self.stamps: tuple[float | None, ...] = (None,) * len(self.names)
+        self._trajectory: Trajectory | None = None
         self.left_out = {name: f"no {' and no '.join(lacks[name])}" for name in sorted(lacks) if lacks[name]}
         self._points = next(iter(parts.values()))
         warn_left_out(path, [why for name, why in self.left_out.items() if name in self._points], len(self._points))
@@ -81,7 +86,21 @@ class FileSource:
         points = read_points(self._points[name], columns=self._columns)
         images = tuple(self._image(camera, index) for camera in self.camera_names)
         truth = self._read_truth(name, points, images[0].camera) if self._truth else None
-        return Frame(name=name, points=points, stamp=self.stamps[index], images=images, truth=truth)
+        return Frame(
+            name=name, points=points, stamp=self.stamps[index], pose=self._pose(index), images=images, truth=truth
+        )
+
+    def _pose(self, index: int) -> NDArray[np.float64] | None:
+        """T_world_lidar of a frame, where its stamp and the way of the lidar are known.
+
+        Raises:
+            PoseError: The way has a gap there.
+        """
+        stamp = self.stamps[index]
+        if self._trajectory is None or stamp is None:
+            return None
+        with within(f"{self.path}, pose of frame {self.names[index]}"):
+            return self._trajectory.at(stamp)
 
     def _image(self, camera: str, index: int) -> CameraImage:
         """The image of a camera in a frame."""

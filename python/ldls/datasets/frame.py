@@ -45,6 +45,8 @@ class Frame:
         name: Name of the frame, unique in its source, fit for a file name.
         points: (N, >= 3) x y z first, in metres in the lidar frame.
         stamp: Time of the sweep in seconds; None where the source does not say.
+        pose: (4, 4) T_world_lidar at its stamp, in metres; the world is the same for all frames of a drive. None where
+            the source does not say.
         images: One for each camera.
         truth: True labels of the points, where the source has them.
     """
@@ -52,6 +54,7 @@ class Frame:
     name: str
     points: Points
     stamp: float | None = None
+    pose: NDArray[np.float64] | None = None
     images: tuple[CameraImage, ...] = ()
     truth: Labeling | None = None
 

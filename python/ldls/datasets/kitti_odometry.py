@@ -1,6 +1,7 @@
 """KITTI odometry and SemanticKITTI: sequences of sweeps and images with one calibration each.
 
-sequences/NN/{velodyne/NNNNNN.bin,image_2/NNNNNN.png,calib.txt}; times.txt and labels/NNNNNN.label where there are any.
+sequences/NN/{velodyne/NNNNNN.bin,image_2/NNNNNN.png,calib.txt}; times.txt, poses.txt (or poses/NN.txt beside sequences)
+and labels/NNNNNN.label where there are any.
 """
 
 from __future__ import annotations
@@ -11,12 +12,19 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
+from ldls.camera import Camera
 from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
-from ldls.io import read_camera
+from ldls.io import read_camera, read_poses
+from ldls.io.files import read_lines
 from ldls.io.images import read_image_size
 from ldls.io.kitti_stamps import read_stamps
+from ldls.sequences import Trajectory
+
+TIMES = "times.txt"
 
 
 class KittiOdometrySource(FileSource):
@@ -52,6 +60,8 @@ class KittiOdometrySource(FileSource):
         Raises:
             SourceError: A folder is missing, no frame is whole, or there are fewer times than frames.
             CalibrationError: The calibration is broken.
+            FileFormatError: The file of poses is broken.
+            PoseError: The poses jump, or there is not one for each time.
             FileNotFoundError: The calibration is missing.
             ParameterError: There is no such camera.
         """
@@ -62,7 +72,8 @@ class KittiOdometrySource(FileSource):
         super().__init__(path, {"velodyne": points, **images}, cameras, truth=truth)
         calib = path / "calib.txt"
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}
-        self.stamps = read_stamps(path / "times.txt", self.names, _seconds, example="0.103736")
+        self.stamps = _read_stamps(path, self.names)
+        self._trajectory = _trajectory(path, next(iter(self._cameras.values())))
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
@@ -93,6 +104,23 @@ def _sequence(path: Path, wanted: str | int | None) -> Path:
     if name is None and (_is_sequence(path) or not sequences):
         return path
     return parent / choose(parent, "sequence", sequences, name)
+
+
+def _read_stamps(path: Path, names: Sequence[str]) -> tuple[float | None, ...]:
+    return read_stamps(path / TIMES, names, _seconds, example="0.103736")
+
+
+def _trajectory(path: Path, camera: Camera) -> Trajectory | None:
+    """The way of the lidar, where the sequence has times and poses; every camera's transform is that to camera 0."""
+    files = [path / "poses.txt"]
+    if path.absolute().parent.name == "sequences":
+        files.append(path.absolute().parents[1] / "poses" / f"{path.name}.txt")
+    there = [file for file in files if file.exists()]
+    if not there or not (path / TIMES).exists():
+        return None
+    lines = [str(number) for number in range(len(read_lines(path / TIMES)))]
+    stamps = np.array(_read_stamps(path, lines), np.float64)
+    return read_poses(there[0], format="kitti", stamps=stamps, T_camera_lidar=camera.T_camera_lidar)
 
 
 def _seconds(line: str) -> float:

@@ -1,7 +1,8 @@
 """A drive of KITTI's raw data, synchronised and rectified.
 
 DATE/calib_cam_to_cam.txt, DATE/calib_velo_to_cam.txt and DATE/DATE_drive_NNNN_sync/{velodyne_points,image_02}/ with
-data/NNNNNNNNNN.{bin,png} and timestamps.txt. For truth, annotations/NNNNNNNNNN.txt in the drive: a class a point.
+data/NNNNNNNNNN.{bin,png} and timestamps.txt. For poses, oxts/ beside them and DATE/calib_imu_to_velo.txt. For truth,
+annotations/NNNNNNNNNN.txt in the drive: a class a point.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from ldls.datasets.file_source import FileSource, check_folders, choose, find_im
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import SourceError
-from ldls.io import read_camera
+from ldls.io import read_camera, read_poses
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
+from ldls.io.poses.kitti_raw import CALIBRATION
+from ldls.sequences import Trajectory
 
-LIDAR = "velodyne_points"
+LIDAR, OXTS = "velodyne_points", "oxts"
 
 
 class KittiRawSource(FileSource):
@@ -56,6 +59,8 @@ class KittiRawSource(FileSource):
         Raises:
             SourceError: A folder is missing, no frame is whole, or there are fewer stamps than frames.
             CalibrationError: The calibration of the day is broken.
+            FileFormatError: A file of poses is broken.
+            PoseError: The poses jump.
             FileNotFoundError: The calibration of the day is missing.
             ParameterError: There is no such camera.
         """
@@ -67,6 +72,7 @@ class KittiRawSource(FileSource):
         images = {name: find_images(path / name / "data") for name in cameras}
         super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
         self.stamps = _stamps(path / LIDAR, self.names)
+        self._trajectory = _trajectory(path)
         self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}
 
     @classmethod
@@ -93,6 +99,12 @@ def _drive(path: Path, wanted: str | None) -> Path:
     if wanted is None and ((path / LIDAR).is_dir() or not drives):
         return path.absolute()  # the calibration lies in its parent
     return path / choose(path, "drive", drives, wanted)
+
+
+def _trajectory(path: Path) -> Trajectory | None:
+    """The way of the lidar, where the drive has its measurements and the day their calibration."""
+    there = (path / OXTS / "data").is_dir() and (path.parent / CALIBRATION).exists()
+    return read_poses(path / OXTS, format="kitti-raw") if there else None
 
 
 def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:

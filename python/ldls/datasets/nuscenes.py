@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
@@ -122,17 +123,21 @@ class NuScenesSource:
             name=self.names[index],
             points=points,
             stamp=self.stamps[index],
+            pose=self._pose(sweep),
             images=tuple(self._image(channel, frame[channel], sweep) for channel in self.camera_names),
             truth=self._read_truth(sweep.token, points),
         )
 
+    def _pose(self, taken: Reading) -> NDArray[np.float64]:
+        """(4, 4) from coordinates of a sensor to those of the map, at the moment of its reading."""
+        pose: NDArray[np.float64] = self._poses[taken.pose] @ self._sensors[taken.sensor].T_ego_sensor
+        return pose
+
     def _image(self, channel: str, taken: Reading, sweep: Reading) -> CameraImage:
-        sensor, lidar = self._sensors[taken.sensor], self._sensors[sweep.sensor]
-        T_global_lidar = self._poses[sweep.pose] @ lidar.T_ego_sensor
-        T_global_camera = self._poses[taken.pose] @ sensor.T_ego_sensor
+        sensor = self._sensors[taken.sensor]
         camera = Camera(
             projection=sensor.intrinsic,
-            T_camera_lidar=np.linalg.inv(T_global_camera) @ T_global_lidar,
+            T_camera_lidar=np.linalg.inv(self._pose(taken)) @ self._pose(sweep),
             image_size=taken.size,
             distortion=sensor.distortion,
         )

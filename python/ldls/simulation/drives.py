@@ -1,6 +1,7 @@
 """Drives through one scene, in which objects move, ten frames a second: a car's, and a robot's.
 
-Objects move straight on and do not mind one another. The rig stays upright, and all stands still during a sweep.
+Objects move straight on and do not mind one another. The rig stays upright, and all stands still during a sweep. The
+world of a drive's poses is the lidar's own frame at the first sweep.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.camera.extrinsic import turn_of
+from ldls.camera.rigid import from_parts
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.ground import Ground
@@ -25,8 +28,9 @@ PERIOD_S = 0.1
 SPEED_M_S = 5.0
 LONGEST_M = 40.0
 """Longest way of a drive, for scenes end; longer drives go slower."""
+FASTEST_TURN_DEG_S = 90.0
 CLEAR_M = 1.5
-"""No object comes nearer to the lidar than this."""
+"""Nothing comes nearer to the lidar than this."""
 ROBOT = Rig(VLP_16, 0.75, (MountedCamera(ROBOT_LENS, (0.10, 0.0, -0.12)),))
 """A VLP-16 over a camera with a lens."""
 ROBOT_SEGMENTER = SegmenterErrors(wrong_class=0)
@@ -39,7 +43,7 @@ ROBOT_IMAGE_DELAY_S = 0.012
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """A car's drive: objects that would come too near to the rig are taken away before.
+    """A car's drive: what would come too near to the rig is taken away before.
 
     The rig keeps its height above the ground, and stands still between an image and its sweep.
 
@@ -48,12 +52,13 @@ class Drive:
         seed: Seed of the scene and all noise.
         kind: `street` or `campus`.
         lidar: Name of a lidar.
+        turn_deg_s: Degrees a second by which the rig turns to the left all the way, -90 to 90.
         camera: Name of a camera; a ring has more than KITTI's raw layout takes.
         segmenter: Errors of the masks.
         sensors: Errors of calibration and clocks, the same in all frames.
 
     Raises:
-        ParameterError: There is no frame, or the camera is a ring.
+        ParameterError: There is no frame, the rig turns too fast, or the camera is a ring.
     """
 
     n_frames: int = 20
@@ -63,10 +68,14 @@ class Drive:
     camera: str = "kitti"
     segmenter: SegmenterErrors = field(default_factory=SegmenterErrors)
     sensors: SensorErrors = field(default_factory=SensorErrors)
+    turn_deg_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.n_frames < 1:
             raise ParameterError(f"n_frames: got {self.n_frames}, expected 1 or more")
+        if not abs(self.turn_deg_s) <= FASTEST_TURN_DEG_S:
+            limit = f"{FASTEST_TURN_DEG_S:g} degrees a second"
+            raise ParameterError(f"turn_deg_s: got {self.turn_deg_s}, expected -{limit} to {limit}")
         if len(self.rig().cameras) > 1:
             raise ParameterError(f"camera: got {self.camera!r}, expected kitti or robot, for a drive has one camera")
 
@@ -90,9 +99,11 @@ def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
     if not 0 <= number < drive.n_frames:
         raise ParameterError(f"number: got {number}, expected 0 to {drive.n_frames - 1}")
     plan = make_plan(drive.seed, kind=drive.kind)
-    plan.remove(_in_the_way(drive, plan))
+    poses = _poses(drive, plan.ground)
+    plan.remove(_in_the_way(poses, plan))
+    plan.clear(poses[:, :2, 3], CLEAR_M)
     seconds, seed = number * PERIOD_S, 1000 * drive.seed + number
-    scene = _on_the_ground(build(plan), plan.ground, seconds, drive.speed_m_s * seconds)
+    scene = _from_the_rig(build(plan), plan.ground, seconds, poses[number])
     return take_frame(
         scene,
         scene.after(drive.sensors.delay_s),
@@ -102,8 +113,18 @@ def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
         sweep_noise=(seed, 0),
         mask_seed=seed,
         drift=drive.sensors.drift(drive.seed),
+        pose=poses[number],
         segmenter=drive.segmenter,
     )
+
+
+def drive_poses(drive: Drive) -> NDArray[np.float64]:
+    """(n_frames, 4, 4) true T_world_lidar at each sweep of a drive.
+
+    Raises:
+        ParameterError: There is no such kind of scene.
+    """
+    return _poses(drive, make_plan(drive.seed, kind=drive.kind).ground)
 
 
 def robot_drive(
@@ -138,6 +159,7 @@ def robot_drive(
             sweep_noise=(seed, 0, number),
             mask_seed=seed + 7919 * number,
             drift=np.eye(4),
+            pose=from_parts(np.eye(3), np.array([ROBOT_SPEED_M_S * swept, 0, 0])),
             segmenter=ROBOT_SEGMENTER if segmenter is None else segmenter,
         )
 
@@ -148,11 +170,24 @@ def _from_the_robot(scene: Scene, seconds: float) -> Scene:
     return scene.after(seconds).moved(-np.tile(way, (len(scene.objects) + 1, 1)))
 
 
-def _on_the_ground(scene: Scene, ground: Ground, seconds: float, way_m: float) -> Scene:
-    """The scene `seconds` later, seen from `way_m` farther along x; objects keep to the ground."""
+def _poses(drive: Drive, ground: Ground) -> NDArray[np.float64]:
+    """(n, 4, 4) from the ground below the rig at each frame to that below the first; the lidar is as high above all.
+
+    The way is an arc: its chord leads where the rig heads at half of the time.
+    """
+    seconds = PERIOD_S * np.arange(drive.n_frames, dtype=np.float64)
+    yaw = np.radians(drive.turn_deg_s) * seconds
+    chord_m = drive.speed_m_s * seconds * np.sinc(yaw / (2 * np.pi))
+    x_m, y_m = chord_m * np.cos(yaw / 2), chord_m * np.sin(yaw / 2)
+    places = np.stack([x_m, y_m, ground.height_m(x_m, y_m)], axis=1)
+    return np.array([from_parts(turn_of(0, 0, turn), place) for turn, place in zip(yaw, places, strict=True)])
+
+
+def _from_the_rig(scene: Scene, ground: Ground, seconds: float, pose: NDArray[np.float64]) -> Scene:
+    """The scene `seconds` later, seen from the pose of the rig; objects keep to the ground."""
     by_m = np.zeros((len(scene.objects) + 1, 3))
     by_m[1:] = [_moved_m(thing, ground, seconds) for thing in scene.objects]
-    return scene.moved(by_m - [way_m, 0.0, ground.height_m(way_m, 0.0)])
+    return scene.moved(by_m - pose[:3, 3]).turned(-float(np.arctan2(pose[1, 0], pose[0, 0])))
 
 
 def _moved_m(thing: SceneObject, ground: Ground, seconds: float) -> tuple[float, float, float]:
@@ -161,17 +196,17 @@ def _moved_m(thing: SceneObject, ground: Ground, seconds: float) -> tuple[float,
     return dx, dy, float(ground.height_m(x + dx, y + dy) - ground.height_m(x, y))
 
 
-def _in_the_way(drive: Drive, plan: Plan) -> set[int]:
+def _in_the_way(poses: NDArray[np.float64], plan: Plan) -> set[int]:
     """Numbers of the objects that come within `CLEAR_M` of the lidar's axis at any time of the drive."""
-    seconds = PERIOD_S * np.arange(drive.n_frames, dtype=np.float64)
     numbered = enumerate(plan.objects, start=1)
-    return {number for number, thing in numbered if _nearest_m(thing, seconds, drive.speed_m_s) < CLEAR_M}
+    return {number for number, thing in numbered if _nearest_m(thing, poses[:, :2, 3]) < CLEAR_M}
 
 
-def _nearest_m(thing: SceneObject, seconds: NDArray[np.float64], speed_m_s: float) -> float:
-    """Least distance between the lidar's axis and the box of an object."""
+def _nearest_m(thing: SceneObject, way_m: NDArray[np.float64]) -> float:
+    """Least distance between the lidar's axis, at the places (n, 2) of the frames, and the box of an object."""
+    seconds = PERIOD_S * np.arange(len(way_m), dtype=np.float64)
     (x, y, _), (vx, vy) = thing.centre_m, thing.velocity_m_s
-    towards = np.stack([x + (vx - speed_m_s) * seconds, y + vy * seconds])
+    towards = np.stack([x + vx * seconds, y + vy * seconds]) - way_m.T
     c, s = np.cos(thing.yaw), np.sin(thing.yaw)
     along, across = np.abs(np.array([[c, s], [-s, c]]) @ towards)
     beyond = np.maximum([along - thing.length_m / 2, across - thing.width_m / 2], 0)

@@ -13,6 +13,8 @@ from ldls.simulation.shapes.shape import Shape, join
 
 CLEAR_M = 3.2
 """Nothing stands nearer to the sensor than this."""
+HEADROOM_M = 2.0
+"""What of a scenery is higher above its foot is in nobody's way."""
 
 
 class Plan:
@@ -79,12 +81,25 @@ class Plan:
         self.placed = [(new[m], look, shape) for m, look, shape in self.placed if m in new]
         self.objects = [self.objects[m - 1] for m in kept]
 
+    def clear(self, way_m: NDArray[np.float64], room_m: float) -> None:
+        """Take scenery away that stands within `room_m` metres of a place of the way (n, 2); not the ground."""
+        ground, *others = self.placed
+        self.placed = [ground, *(each for each in others if each[0] or _distance_m(each[2], way_m) >= room_m)]
+
     def _stand(self, shape: Shape, x_m: float, y_m: float, yaw: float) -> Shape:
         return shape.turned(yaw).moved((x_m, y_m, float(self.ground.height_m(x_m, y_m))))
 
     def _free(self, discs: NDArray[np.float64]) -> bool:
         apart = np.linalg.norm(discs[:, None, :2] - self._discs[None, :, :2], axis=-1)
         return bool((apart > discs[:, None, 2] + self._discs[None, :, 2]).all())
+
+
+def _distance_m(shape: Shape, way_m: NDArray[np.float64]) -> float:
+    """Least distance between the places (n, 2) and the rectangle around what of the shape is lower than a vehicle."""
+    height_m = shape.vertices_m[:, 2]
+    low = shape.vertices_m[height_m < height_m.min() + HEADROOM_M, :2]
+    beyond = np.maximum(np.maximum(low.min(axis=0) - way_m, way_m - low.max(axis=0)), 0)
+    return float(np.hypot(*beyond.T).min())
 
 
 def _footprint(shape: Shape, x_m: float, y_m: float, yaw: float) -> NDArray[np.float64]:

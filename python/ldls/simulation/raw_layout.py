@@ -1,6 +1,9 @@
 """Drives as files in the layout of KITTI's raw data.
 
 OUT/DATE/calib_cam_to_cam.txt, calib_velo_to_cam.txt           calibration as given; P_rect_00, 01 and 03 repeat 02
+OUT/DATE/calib_imu_to_velo.txt                                 the IMU is in the place of the lidar
+OUT/DATE/DATE_drive_NNNN_sync/oxts/timestamps.txt              times of the poses: those of the sweeps
+OUT/DATE/DATE_drive_NNNN_sync/oxts/data/*.txt                  true poses, as latitude, longitude, altitude and angles
 OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/timestamps.txt   times of the sweeps
 OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/data/*.bin       points
 OUT/DATE/DATE_drive_NNNN_sync/image_02/timestamps.txt          times of the images
@@ -19,14 +22,18 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ldls.simulation.drives import PERIOD_S, Drive, drive_frame
+from ldls.io.poses.kitti_raw import EARTH_RADIUS_M
+from ldls.simulation.drives import PERIOD_S, Drive, drive_frame, drive_poses
 from ldls.simulation.kitti_layout import row_of, write_lines, write_masks, write_picture, write_points, write_truth
 from ldls.simulation.production import FrameSummary, make_frames
 from ldls.simulation.simulated_frame import SimulatedFrame
 
 FIRST_DAY = np.datetime64("2026-01-01")
 FIRST_MOMENT = np.timedelta64(12, "h")
+LATITUDE, LONGITUDE = 49.0, 8.4
+"""Degrees at which every drive begins."""
 MADE = "calib_time: 01-Jan-2026 12:00:00"
 
 
@@ -47,7 +54,10 @@ def write_drive(folder: str | PathLike[str], drive: Drive, *, processes: int = 1
     """
     path = drive_folder(folder, drive)
     _write_calibration(path.parent, drive)
-    for sensor, later_s in (("velodyne_points", drive.sensors.delay_s), ("image_02", 0.0)):
+    for number, pose in enumerate(drive_poses(drive)):
+        write_lines(path / "oxts/data" / f"{number:010d}.txt", [_measured(drive, pose)])
+    delay_s = drive.sensors.delay_s
+    for sensor, later_s in (("velodyne_points", delay_s), ("oxts", delay_s), ("image_02", 0.0)):
         write_lines(path / sensor / "timestamps.txt", [_stamp(drive, k, later_s) for k in range(drive.n_frames)])
     orders = [DriveFrameOrder(drive, number) for number in range(drive.n_frames)]
     yield from make_frames(folder, orders, processes=processes)
@@ -85,6 +95,18 @@ class DriveFrameOrder:
         return frame
 
 
+def _measured(drive: Drive, pose: NDArray[np.float64]) -> str:
+    """The 30 numbers of KITTI's GPS and IMU at a pose, x east: where it is, how it turns and moves, and zeros."""
+    east_m, north_m, up_m = pose[:3, 3]
+    yaw, turn = np.arctan2(pose[1, 0], pose[0, 0]), np.radians(drive.turn_deg_s)
+    scaled_m, latitude = EARTH_RADIUS_M * np.cos(np.radians(LATITUDE)), np.radians(LATITUDE)
+    stretched = np.log(np.tan(np.pi / 4 + latitude / 2)) + north_m / scaled_m
+    place = (90 * (4 / np.pi * np.arctan(np.exp(stretched)) - 1), LONGITUDE + np.degrees(east_m / scaled_m), up_m)
+    speeds = (drive.speed_m_s * np.sin(yaw), drive.speed_m_s * np.cos(yaw), drive.speed_m_s, 0, 0)
+    numbers = (*place, 0, 0, yaw, *speeds, *[0] * 6, 0, 0, turn, 0, 0, turn, *[0] * 7)
+    return " ".join(f"{number:.15g}" for number in numbers)
+
+
 def _stamp(drive: Drive, number: int, later_s: float) -> str:
     """A moment as KITTI writes it, to the nanosecond."""
     since = np.timedelta64(round((number * PERIOD_S + later_s) * 1e9), "ns")
@@ -105,3 +127,4 @@ def _write_calibration(day: Path, drive: Drive) -> None:
     write_lines(day / "calib_cam_to_cam.txt", cameras)
     lidar = [MADE, f"R: {row_of(transform[:3, :3])}", f"T: {row_of(transform[:3, 3])}"]
     write_lines(day / "calib_velo_to_cam.txt", lidar)
+    write_lines(day / "calib_imu_to_velo.txt", [MADE, f"R: {row_of(np.eye(3))}", f"T: {row_of(np.zeros(3))}"])

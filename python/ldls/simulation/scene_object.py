@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,6 +54,13 @@ class SceneObject:
         """The object elsewhere."""
         (x, y, z), (dx, dy, dz) = self.centre_m, by_m
         return replace(self, centre_m=(x + dx, y + dy, z + dz))
+
+    def turned(self, yaw: float) -> SceneObject:
+        """The object turned about the origin's z axis, to the left, by radians; its motion too."""
+        c, s = math.cos(yaw), math.sin(yaw)
+        (x, y, z), (vx, vy) = self.centre_m, self.velocity_m_s
+        place, velocity = (c * x - s * y, s * x + c * y, z), (c * vx - s * vy, s * vx + c * vy)
+        return replace(self, centre_m=place, yaw=self.yaw + yaw, velocity_m_s=velocity)
 
     def corners_m(self) -> NDArray[np.float64]:
         """(8, 3) corners of the box, in metres."""

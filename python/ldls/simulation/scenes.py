@@ -48,6 +48,10 @@ class Scene:
         objects = tuple(o.moved((x, y, z)) for o, (x, y, z) in zip(self.objects, by_m[1:].tolist(), strict=True))
         return replace(self, shape=shape, objects=objects)
 
+    def turned(self, yaw: float) -> Scene:
+        """The scene turned about z, to the left, by radians."""
+        return replace(self, shape=self.shape.turned(yaw), objects=tuple(each.turned(yaw) for each in self.objects))
+
 
 def make_scene(seed: int = 0, *, kind: str = "street") -> Scene:
     """A scene of a kind, `street` or `campus`; each seed is another one.

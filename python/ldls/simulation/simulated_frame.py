@@ -49,6 +49,7 @@ class SimulatedFrame(Frame):
 
     Attributes:
         stamp: Time of the sweep, in seconds since the scene began.
+        pose: (4, 4) true T_world_lidar at the time of the sweep; None where there is no drive.
         images: One for each camera, the one that looks ahead first.
         truth: True labels of the points: KITTI's classes or COCO's, and the objects as instances.
         rings: (N,) int32 beam of each point, 0 the highest.
@@ -107,6 +108,7 @@ def take_frame(
     sweep_noise: tuple[int, ...],
     mask_seed: int,
     drift: NDArray[np.float64],
+    pose: NDArray[np.float64] | None = None,
     segmenter: SegmenterErrors | None = None,
 ) -> SimulatedFrame:
     """The frame that a rig at the scene's origin takes.
@@ -120,6 +122,7 @@ def take_frame(
         sweep_noise: Seed of the noise of the sweep.
         mask_seed: Seed of the errors of the masks.
         drift: (4, 4) error of the calibration, after the true transform.
+        pose: (4, 4) T_world_lidar at the time of the sweep, in a drive.
         segmenter: Errors of the masks; `SegmenterErrors()` by default.
 
     Raises:
@@ -147,6 +150,7 @@ def take_frame(
         name=name,
         points=sweep.points,
         stamp=stamps[1],
+        pose=pose,
         images=tuple(images),
         truth=Labeling.from_instance_labels(sweep.instances, [CLASS_NAMES[o.category] for o in scanned.objects]),
         rings=sweep.rings,
