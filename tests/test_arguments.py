@@ -225,6 +225,8 @@ CALLS = {
         },
     ),
     "stages.confidence": (stages.confidence, {"z": W.z, "labels": W.z.argmax(axis=1), "masks": W.masks}),
+    "Trajectory": (ldls.Trajectory, {"stamps": [0, 0.1], "poses": np.stack([np.eye(4)] * 2)}),
+    "Trajectory.at": (ldls.Trajectory([0, 0.1], np.stack([np.eye(4)] * 2)).at, {"stamp": 0.05}),
     "Labeling": (
         ldls.labeling.Labeling,
         {"classes": [0, 1], "instances": [0, 1], "ignored": [False, True], "names": NAMES},
@@ -450,6 +452,7 @@ READERS = {
     "read_points": (ldls.read_points, {"path": "none.bin", "columns": 4, "recover": False}),
     "read_camera": (ldls.read_camera, {"path": "none.txt", "format": None, "camera": None, "image_size": None}),
     "read_masks": (ldls.read_masks, {"path": "none.json", "image_id": None, "image_size": None, "names": None}),
+    "read_poses": (ldls.read_poses, {"path": "none.txt", "format": None, "stamps": None, "T_camera_lidar": None}),
     "read_image": (ldls.read_image, {"path": "none.png"}),
     "read_result": (ldls.read_result, {"path": "none.npz"}),
     "save": (ldls.save, {"thing": W.result, "path": "none/none.npz"}),

@@ -102,7 +102,7 @@ class Parser:
         if len(names) == 1:
             contents = [content]
         for name, own in zip(names, contents, strict=False):
-            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(own)
         return folder / names[0] if len(names) == 1 else folder
 
@@ -459,6 +459,11 @@ OBJECTS = (
 )
 
 
+TUM_POSES = "# stamp tx ty tz qx qy qz qw\n1.5 0 0 0 0 0 0 1\n1.6 1.25 -0.5 0.1 0 0 0.6 0.8\n"
+KITTI_POSES = "1 0 0 0.5 0 1 0 -1 0 0 1 0\n8.0e-01 0 6.0e-01 1.5 0 1 0 -1 -6.0e-01 0 8.0e-01 0\n"
+OXTS = "49.015 8.4342 116.43 0.035 0.009 -2.6" + 19 * " 0.1" + " 4 11 6 6 6\n"
+
+
 def coco(folder):
     """A data set with run lengths as text, one with lists of them and polygons, and results."""
     ldls.save(MASKS[0], folder / "a.json")
@@ -758,6 +763,20 @@ PARSERS: dict[str, Parser] = {
     "camera Kalibr": Parser(("a.yaml",), texts(KALIBR), read_camera(), text=True),
     "camera CameraInfo": Parser(
         ("a.yaml",), texts(CAMERA_INFO_YAML), read_camera(T_camera_lidar=T_CAMERA_LIDAR), text=True
+    ),
+    "poses KITTI": Parser(
+        ("a.txt",),
+        texts(KITTI_POSES),
+        lambda path: ldls.read_poses(path, stamps=[0, 1], T_camera_lidar=T_CAMERA_LIDAR),
+        text=True,
+    ),
+    "poses TUM": Parser(("a.txt",), texts(TUM_POSES), ldls.read_poses, text=True),
+    "poses KITTI raw": Parser(
+        ("drive/oxts/data/0000000000.txt", "drive/oxts/timestamps.txt", "calib_imu_to_velo.txt"),
+        texts(BETWEEN_FILES.decode().join((OXTS, "2011-09-26 13:02:25.951199337\n", RAW_LIDAR))),
+        lambda folder: ldls.read_poses(folder / "drive/oxts"),
+        text=True,
+        allowed=(OSError,),
     ),
     "masks .json": Parser(("a.json",), coco, ldls.read_masks, text=True, gentle=0.5),
     "masks of all images .json": Parser(("a.json",), data_sets, read_data_set, text=True, gentle=0.5),

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 SIZE = (60, 80)
 K = np.array([[50.0, 0, 40], [0, 50.0, 30], [0, 0, 1]])
@@ -65,6 +66,24 @@ def kitti_raw(folder, n_frames=3):
         lines = [f"2011-09-26 13:02:{25 + k}.{nanoseconds:09d}\n" for k in range(n_frames)]
         write_text(drive / sensor / "timestamps.txt", "".join(lines))
     return drive
+
+
+def oxts(drive, way, T_lidar_imu, clock):
+    """Poses of the lidar as those of an IMU near Karlsruhe, by a sphere of the earth; returns their folder."""
+    for number, pose in enumerate(way @ T_lidar_imu):
+        roll, pitch, yaw = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
+        # over some metres a sphere is as good as a projection
+        east, north, up = pose[:3, 3]
+        latitude = 49 + np.degrees(north / 6378137)
+        longitude = 8.4 + np.degrees(east / 6378137 / np.cos(np.radians(49)))
+        numbers = [latitude, longitude, 100 + up, roll, pitch, yaw, *[0] * 19, 4, 11, 4, 4, 0]
+        line = " ".join(f"{x:.14g}" for x in numbers)
+        write_text(drive / f"oxts/data/{number:010d}.txt", f"{line}\n")
+    write_text(drive / "oxts/timestamps.txt", "".join(clock))
+    rotation, translation = row(T_lidar_imu[:3, :3]), row(T_lidar_imu[:3, 3])
+    calibration = f"calib_time: 25-May-2012 16:47:16\nR: {rotation}\nT: {translation}\n"
+    write_text(drive.parent / "calib_imu_to_velo.txt", calibration)
+    return drive / "oxts"
 
 
 def kitti_odometry(folder, n_frames=3):

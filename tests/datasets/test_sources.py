@@ -6,6 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import ldls
 from datasets import layouts
@@ -102,6 +103,94 @@ def test_a_raw_drive_leaves_out_frames_that_lack_a_file(tmp_path):
     (drive / "image_02/data/0000000003.png").unlink()
     with pytest.warns(LeftOutWarning, match="1 of 3 sweeps are left out: 1 no image_02"):
         assert len(open_source(drive)) == 2
+
+
+def way(n, step_m=0.5):
+    """A lidar that goes ahead and turns to the left."""
+    poses = np.tile(np.eye(4), (n, 1, 1))
+    poses[:, 0, 3] = step_m * np.arange(n)
+    poses[:, :3, :3] = Rotation.from_euler("z", 3 * np.arange(n)[:, None], degrees=True).as_matrix()
+    return poses
+
+
+IMU_M = np.array([-0.8, 0.3, -0.8])
+"""Where the IMU is, from the lidar."""
+
+
+def with_oxts(drive, n=3, later_s=0.2):
+    """Measurements a second apart, as sweeps are, but so much later."""
+    clock = [f"2011-09-26 13:02:{25.951199337 + later_s + k:.9f}\n" for k in range(n)]
+    T_lidar_imu = np.eye(4)
+    T_lidar_imu[:3, 3] = IMU_M
+    return layouts.oxts(drive, way(n), T_lidar_imu, clock)
+
+
+def test_poses_of_a_raw_drive_are_those_at_the_stamps_of_its_sweeps(tmp_path):
+    drive = layouts.kitti_raw(tmp_path)
+    assert open_source(drive)[0].pose is None
+    with_oxts(drive)
+    frame = pickle.loads(pickle.dumps(open_source(drive)))[1]
+    assert frame.pose[:3, 3] == pytest.approx([0.4, 0, 0] - IMU_M, abs=1e-4)
+    assert np.degrees(np.arctan2(frame.pose[1, 0], frame.pose[0, 0])) == pytest.approx(2.4, abs=1e-4)
+    # before the first one its motion goes on
+    assert open_source(drive)[0].pose[0, 3] == pytest.approx(-0.1 - IMU_M[0], abs=1e-4)
+    (drive.parent / "calib_imu_to_velo.txt").unlink()
+    assert open_source(drive)[1].pose is None
+
+
+def test_a_sweep_beyond_the_poses_of_its_drive_is_an_error_with_its_name(tmp_path):
+    drive = layouts.kitti_raw(tmp_path)
+    with_oxts(drive, n=2)
+    source = open_source(drive)
+    assert source[1].pose is not None
+    with pytest.raises(
+        ldls.PoseError, match="drive_0001_sync, pose of frame 0000000002: stamp: no pose at 1317042147.95"
+    ):
+        source[2]
+
+
+@pytest.mark.parametrize("file", ["08/poses.txt", "../poses/08.txt"])
+def test_poses_of_odometry_are_those_of_the_lidar(tmp_path, file):
+    sequence = layouts.kitti_odometry(tmp_path)
+    assert open_source(sequence)[0].pose is None
+    of_camera = layouts.T @ way(3) @ np.linalg.inv(layouts.T)
+    layouts.write_text(sequence.parent / file, "".join(layouts.row(pose[:3]) + "\n" for pose in of_camera))
+    (sequence / "velodyne/000001.bin").unlink()
+    first, last = open_source(sequence)
+    np.testing.assert_allclose([first.pose, last.pose], way(3)[[0, 2]], atol=1e-8)
+    (sequence / "times.txt").unlink()
+    assert open_source(sequence)[0].pose is None
+
+
+def test_poses_of_nuscenes_are_those_of_the_lidar_on_the_car(tmp_path):
+    first, second = open_source(layouts.nuscenes(tmp_path))
+    expected = np.eye(4)
+    expected[:3, 3] = [5, 0, 1.8]
+    np.testing.assert_allclose(second.pose, expected, atol=1e-9)
+    assert first.pose[0, 3] == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "error", "message"),
+    [
+        pytest.param("kitti-raw", lambda d: (with_oxts(d) / "data/0000000001.txt").write_text("49 8 0\n"),
+                     ldls.TruncatedFileError, "oxts/data/0000000001.txt: line 1", id="a broken measurement"),
+        pytest.param("kitti-raw", lambda d: (with_oxts(d) / "timestamps.txt").unlink(), FileNotFoundError,
+                     "timestamps.txt", id="measurements without stamps"),
+        pytest.param("kitti-odometry", lambda d: layouts.write_text(d / "poses.txt", "1 0 0 0\n" * 3),
+                     ldls.CorruptFileError, "poses.txt: line 1: expected at least 12", id="half a pose"),
+        pytest.param("kitti-odometry", lambda d: layouts.write_text(d / "poses.txt", layouts.row(np.eye(4)[:3]) + "\n"),
+                     ldls.PoseError, "poses.txt: stamps: there are 3 for 1 poses", id="fewer poses than times"),
+        pytest.param("kitti-odometry", lambda d: layouts.write_text(d / "poses.txt", "".join(
+                         layouts.row(pose[:3]) + "\n" for pose in way(3, step_m=11))),
+                     ldls.PoseError, "poses.txt: poses: from 0.000000 to 0.100000 s the lidar moves 11 m", id="a jump"),
+    ],
+)  # fmt: skip
+def test_broken_poses_of_a_drive_are_named(tmp_path, kind, change, error, message):
+    path = WRITERS[kind](tmp_path)
+    change(path)
+    with pytest.raises(error, match=message):
+        open_source(path)
 
 
 def test_truth_of_odometry_is_that_of_its_labels(tmp_path):

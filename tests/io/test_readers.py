@@ -38,6 +38,8 @@ READERS = {
     "kitti.txt": lambda path: ldls.read_camera(path, format="kitti"),
     "opencv.yaml": lambda path: ldls.read_camera(path, format="opencv", T_camera_lidar=np.eye(4)),
     "camera": lambda path: ldls.read_camera(path, format="camera-info", T_camera_lidar=np.eye(4)),
+    "tum.txt": lambda path: ldls.read_poses(path, format="tum"),
+    "poses.txt": lambda path: ldls.read_poses(path, format="kitti", stamps=[0], T_camera_lidar=np.eye(4)),
     "image.png": ldls.read_image,
     "image size.jpg": read_image_size,
     "result.npz": ldls.read_result,

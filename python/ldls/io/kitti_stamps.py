@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ldls.io.files import read_lines
 
 CLOCK_EXAMPLE = "2011-09-26 13:02:25.951199337"
 """A line of KITTI's raw data."""
+CLOCK = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d:\d\d(\.\d{1,9})?", re.ASCII)
 
 
 def read_stamps(
@@ -52,7 +54,8 @@ def clock_seconds(line: str) -> float | None:
     """Seconds since 1970; None for a blank line, which KITTI has for what was not taken."""
     if not line.strip():
         return None
-    stamp = np.datetime64(line.strip(), "ns")
-    if np.isnat(stamp):
+    # NumPy takes zones and other spellings too, some of them with a warning
+    if not CLOCK.fullmatch(line.strip()):
         raise ValueError("not a time")
+    stamp = np.datetime64(line.strip(), "ns")
     return int(stamp.astype(np.int64)) / 1e9

@@ -142,26 +142,9 @@ def test_options_are_those_of_the_format(tmp_path):
 T_LIDAR_IMU = transform(Rotation.from_euler("zyx", [1, -0.5, 0.2], degrees=True), [-0.8, 0.3, -0.8])
 
 
-def oxts(folder, way=WAY):
-    """A day with the drive whose lidar goes that way over the ground near Karlsruhe, by a sphere of the earth."""
-    of_imu = way @ T_LIDAR_IMU
-    lines = []
-    for pose in of_imu:
-        roll, pitch, yaw = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
-        # over some metres a sphere is as good as a projection
-        east, north, up = pose[:3, 3]
-        latitude = 49 + np.degrees(north / 6378137)
-        longitude = 8.4 + np.degrees(east / 6378137 / np.cos(np.radians(49)))
-        numbers = [latitude, longitude, 100 + up, roll, pitch, yaw, *[0] * 19, 4, 11, 4, 4, 0]
-        lines.append(" ".join(f"{x:.14g}" for x in numbers) + "\n")
-    for number, line in enumerate(lines):
-        layouts.write_text(folder / f"day/drive/oxts/data/{number:010d}.txt", line)
-    clock = "".join(f"2011-09-26 13:02:10.{k}00000000\n" for k in range(len(lines)))
-    layouts.write_text(folder / "day/drive/oxts/timestamps.txt", clock)
-    rotation, translation = layouts.row(T_LIDAR_IMU[:3, :3]), layouts.row(T_LIDAR_IMU[:3, 3])
-    rows = f"calib_time: 25-May-2012 16:47:16\nR: {rotation}\nT: {translation}\n"
-    layouts.write_text(folder / "day/calib_imu_to_velo.txt", rows)
-    return folder / "day/drive/oxts"
+def oxts(folder):
+    drive = folder / "day/drive"
+    return layouts.oxts(drive, WAY, T_LIDAR_IMU, [f"2011-09-26 13:02:10.{k}00000000\n" for k in range(len(WAY))])
 
 
 def test_oxts_lead_over_the_imu_to_the_lidar(tmp_path):
