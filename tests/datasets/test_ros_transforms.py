@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ldls.datasets.ros_transforms import TransformTree
-from ldls.errors import CalibrationError
+from ldls.errors import CalibrationError, PoseError
 
 QUARTER = (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5))
 """A quarter turn to the left about z."""
@@ -51,6 +51,22 @@ def test_moving_frames_are_read_only_where_they_are_needed():
     assert not read
     heights = [tree.lookup("lidar", "camera", ns)[0, 3] for ns in (0, 1_600_000_000, 3_500_000_000, 9_000_000_000)]
     assert heights == [1, 2, 4, 4] and read == [True]
+
+
+def test_poses_lie_between_the_times_there_are():
+    moving = [edge("odom", "base", (4 * second, 0, 0), QUARTER, seconds=second) for second in (3, 1, 2, 2)]
+    # transforms that stand still may be said twice
+    static = [edge("base", "lidar", (1, 0, 0), seconds=second) for second in (0, 1)]
+    tree = TransformTree([*static, edge("earth", "odom", (0, 0, 7))], lambda: moving)
+    pose = tree.pose("odom", "/lidar", 1_250_000_000)
+    np.testing.assert_allclose(pose @ [0, 0, 0, 1], [5, 1, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(tree.pose("earth", "lidar", 2_000_000_000)[:3, 3], [8, 1, 7], atol=1e-9)
+    with pytest.raises(PoseError, match="no pose at 3.600000 s, poses are from 1.000000 to 3.000000 s"):
+        tree.pose("odom", "lidar", 3_600_000_000)
+    with pytest.raises(
+        PoseError, match="lidar's frame 'lidar' and the world 'map'; found earth <- odom <- base <- lidar"
+    ):
+        tree.pose("map", "lidar", 0)
 
 
 def test_frames_that_nothing_connects_are_listed():

@@ -12,7 +12,7 @@ pytest.importorskip("embreex")
 
 import ldls
 from ldls.datasets import RosBag
-from ldls.errors import CalibrationError, ParameterError
+from ldls.errors import CalibrationError, ParameterError, PoseError
 from ldls.io.labelled_bag import LabelledBag
 from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import SegmenterErrors, robot_drive, write_robot_drive
@@ -113,6 +113,20 @@ def test_the_bag_holds_what_was_simulated(drive_folder, simulated):
         np.testing.assert_array_equal(masks.to_array(), made.images[0].masks.to_array())
         truth = read_annotations(drive_folder / f"annotations/{frame.name}.txt")
         np.testing.assert_array_equal(truth.instances, made.truth.instances)
+
+
+def test_a_bag_whose_world_is_named_has_the_poses_that_were_simulated(drive_folder, simulated):
+    bag = next(drive_folder.glob("drive*"))
+    assert RosBag(bag)[1].pose is None
+    made = np.array([frame.pose for frame in simulated])
+    assert np.ptp(made[:, 0, 3]) == pytest.approx(0.36)
+    # odom is on the ground
+    made[:, 2, 3] = ROBOT.height_m
+    np.testing.assert_allclose([frame.pose for frame in RosBag(bag, world="odom")], made, atol=1e-6)
+    with pytest.raises(
+        PoseError, match="velodyne_points at .*: transforms: nothing connects .* the world 'map'; found od"
+    ):
+        RosBag(bag, world="map")[0]
 
 
 def test_the_first_frame_of_a_drive_has_the_true_classes():

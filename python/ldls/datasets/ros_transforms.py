@@ -1,17 +1,19 @@
-"""Transforms from lidar to camera: those given by hand, and those of a robot's frames from /tf_static and /tf."""
+"""Transforms from lidar to camera and world: those given by hand, and those of /tf_static and /tf."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import from_parts, from_quaternion
-from ldls.errors import CalibrationError, ParameterError
+from ldls.camera.rigid import from_parts, from_quaternion, inverse
+from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
-from ldls.io.ros.messages import Message, nanoseconds
+from ldls.io.ros.messages import NANOSECONDS, Message, nanoseconds
+from ldls.sequences import Trajectory
 
 Matrix = NDArray[np.float64]
 
@@ -22,17 +24,36 @@ class _Edge:
 
     Attributes:
         parent: The parent.
+        name: The frames, for messages.
         stamps_ns: The time at which each holds.
         transforms: (4, 4) each, from the frame's to the parent's coordinates.
     """
 
     parent: str
+    name: str
     stamps_ns: list[int] = field(default_factory=list)
     transforms: list[Matrix] = field(default_factory=list)
 
     def at(self, stamp_ns: int) -> Matrix:
         """The transform of the nearest time."""
         return self.transforms[int(np.abs(np.array(self.stamps_ns, np.int64) - stamp_ns).argmin())]
+
+    def between(self, stamp_ns: int) -> Matrix:
+        """The transform between the times before and after; one that never changes holds always.
+
+        Raises:
+            PoseError: There is none of that time, or they jump.
+        """
+        with within(self.name):
+            return self.transforms[0] if self._motion is None else self._motion.at(stamp_ns / NANOSECONDS)
+
+    @cached_property
+    def _motion(self) -> Trajectory | None:
+        transforms = np.array(self.transforms)
+        if (transforms == transforms[0]).all():
+            return None
+        stamps_ns, first = np.unique(np.array(self.stamps_ns, np.int64), return_index=True)
+        return Trajectory(stamps_ns / NANOSECONDS, transforms[first])
 
 
 class TransformTree:
@@ -53,7 +74,7 @@ class TransformTree:
                 child, parent = _plain(one.child_frame_id), _plain(one.header.frame_id)
                 edge = self._edges.get(child)
                 if edge is None or edge.parent != parent:
-                    edge = self._edges[child] = _Edge(parent)
+                    edge = self._edges[child] = _Edge(parent, f"transforms from {parent} to {child}")
                 edge.stamps_ns.append(nanoseconds(one.header.stamp))
                 edge.transforms.append(_matrix(one.transform, f"{parent} to {child}"))
 
@@ -64,16 +85,35 @@ class TransformTree:
             CalibrationError: Nothing connects the frames; the message lists those there are.
         """
         target, source = _plain(target), _plain(source)
-        if not self._connected(target, source) and self._moving is not None:
-            moving, self._moving = self._moving, None
-            self._add(moving())
-        if not self._connected(target, source):
+        if not self._can_connect(target, source):
             raise CalibrationError(
                 f"transforms: nothing connects the lidar's frame {source!r} and the camera's {target!r}; found "
                 f"{self._chains() or 'none'}; pass T_camera_lidar"
             )
-        up_source, up_target = self._to_root(source, stamp_ns), self._to_root(target, stamp_ns)
+        up_source, up_target = (self._to_root(frame, lambda edge: edge.at(stamp_ns)) for frame in (source, target))
         return np.linalg.inv(up_target) @ up_source
+
+    def pose(self, world: str, source: str, stamp_ns: int) -> Matrix:
+        """(4, 4) from coordinates in the frame `source` to coordinates in `world`, between the times there are.
+
+        Raises:
+            PoseError: Nothing connects the frames, or a transform on the way has a gap then, or jumps at any time.
+        """
+        world, source = _plain(world), _plain(source)
+        if not self._can_connect(world, source):
+            raise PoseError(
+                f"transforms: nothing connects the lidar's frame {source!r} and the world {world!r}; found "
+                f"{self._chains() or 'none'}; choose another world"
+            )
+        up_source, up_world = (self._to_root(frame, lambda edge: edge.between(stamp_ns)) for frame in (source, world))
+        return inverse(up_world) @ up_source
+
+    def _can_connect(self, one: str, other: str) -> bool:
+        """True for connected frames; moving transforms are read where static ones do not connect them."""
+        if not self._connected(one, other) and self._moving is not None:
+            moving, self._moving = self._moving, None
+            self._add(moving())
+        return self._connected(one, other)
 
     def _ancestors(self, frame: str) -> list[str]:
         chain = [frame]
@@ -84,10 +124,10 @@ class TransformTree:
     def _connected(self, one: str, other: str) -> bool:
         return one == other or self._ancestors(one)[-1] == self._ancestors(other)[-1]
 
-    def _to_root(self, frame: str, stamp_ns: int) -> Matrix:
+    def _to_root(self, frame: str, at: Callable[[_Edge], Matrix]) -> Matrix:
         transform = np.eye(4)
         for name in self._ancestors(frame)[:-1]:
-            transform = self._edges[name].at(stamp_ns) @ transform
+            transform = at(self._edges[name]) @ transform
         return transform
 
     def _chains(self) -> str:

@@ -56,6 +56,7 @@ class RosBag:
         max_offset_s: The tolerance.
         unpaired: Number of sweeps with no image within the tolerance.
         recover: True if the whole messages of a truncated bag are read.
+        world: Frame in which frames have their pose; None if they have none.
     """
 
     kind = "rosbag"
@@ -71,6 +72,7 @@ class RosBag:
         max_offset_s: float = 0.05,
         T_camera_lidar: Extrinsic | Mapping[str, Extrinsic] | None = None,
         fields: Mapping[str, str] | None = None,
+        world: str | None = None,
         recover: bool = False,
     ) -> None:
         """Open a bag and pair its stamps.
@@ -85,6 +87,8 @@ class RosBag:
             T_camera_lidar: (4, 4) from lidar to camera coordinates, or a file of it, as `ldls.read_camera` takes them,
                 instead of the bag's transforms; a mapping from image topic to either for several cameras.
             fields: The clouds' own names of x, y, z and intensity, where they differ.
+            world: Frame of /tf in which frames have their pose, as "odom" or "map"; without it they have none, and /tf
+                is not read for them.
             recover: If true, a truncated bag yields its whole messages and a warning instead of an error.
 
         Raises:
@@ -101,7 +105,7 @@ class RosBag:
         if unknown:
             raise ParameterError(f"fields: got {', '.join(unknown)}, expected {', '.join(READ_FIELDS)}")
         self.path, self.max_offset_s = Path(path), max_offset_s
-        self.recover = recover
+        self.recover, self.world = recover, world
         self._fields = dict(fields or {})
         self._bag = open_bag(self.path, recover=recover)
         self.topics = choose_topics(self._bag, points_topic, image_topics, info_topics)
@@ -201,14 +205,19 @@ class RosBag:
             IndexError: There is no such frame.
             FileFormatError: The cloud cannot be read.
             CalibrationError: A camera is not calibrated, or nothing connects its frame and the cloud's.
+            PoseError: Nothing connects the world and the cloud's frame, or transforms have a gap then, or jump.
         """
         if not -len(self) <= index < len(self):
             raise IndexError(f"frame {index}: there are {len(self)}")
         sweep, cloud = self._sweeps[index], self.cloud(index)
         with within(self._place(sweep)):
-            points = cloud.points(self._fields)
+            points, pose = cloud.points(self._fields), self._pose(sweep.header)
         images = tuple(self._image(image, sweep.header) for image in self._images[index] if image)
-        return Frame(name=self.names[index], points=points, stamp=sweep.header.stamp_ns / NANOSECONDS, images=images)
+        stamp = sweep.header.stamp_ns / NANOSECONDS
+        return Frame(name=self.names[index], points=points, stamp=stamp, pose=pose, images=images)
+
+    def _pose(self, sweep: Header) -> NDArray[np.float64] | None:
+        return None if self.world is None else self._tree.pose(self.world, sweep.frame_id, sweep.stamp_ns)
 
     def _image(self, image: StampedMessage, sweep: Header) -> CameraImage:
         info = nearest(self._infos[image.topic], image.header.stamp_ns)
