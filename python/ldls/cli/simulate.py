@@ -105,7 +105,8 @@ def simulate(
     A ring's other cameras go to image_ring_1 to image_ring_5, with calib_ring_K and masks_ring_K.
 
     With --layout kitti-raw the frames are a drive, ten a second, through the scene of the seed: folder
-    DATE/DATE_drive_NNNN_sync with velodyne_points, image_02, masks_02 and annotations; the calibration is in DATE.
+    DATE/DATE_drive_NNNN_sync with velodyne_points, image_02, masks_02, annotations and oxts (poses); the calibration
+    is in DATE.
 
     A seed is a frame, or a drive: the same one gives the same files. Frames that are there already are kept.
     Needs the extra `sim` of ldls.

@@ -52,10 +52,10 @@ class Drive:
         seed: Seed of the scene and all noise.
         kind: `street` or `campus`.
         lidar: Name of a lidar.
-        turn_deg_s: Degrees a second by which the rig turns to the left all the way, -90 to 90.
         camera: Name of a camera; a ring has more than KITTI's raw layout takes.
         segmenter: Errors of the masks.
         sensors: Errors of calibration and clocks, the same in all frames.
+        turn_deg_s: Degrees a second by which the rig turns to the left all the way, -90 to 90.
 
     Raises:
         ParameterError: There is no frame, the rig turns too fast, or the camera is a ring.
