@@ -120,6 +120,8 @@ def mirrored():
         pytest.param([0, 1], [moved(0), moved(5).T], PoseError, "transposed?", id="transposed"),
         pytest.param([0, 0.1, 0.2], [moved(0), moved(9.9), moved(20)], PoseError,
                      "from 0.100000 to 0.200000 s the lidar moves 10.1 m in 0.1 s, expected at most 100", id="jump"),
+        pytest.param([0, 1], [moved(0), np.eye(4) + 101 * np.eye(4)[[2]].T @ np.eye(4)[[3]]], PoseError,
+                     "the lidar moves 101 m", id="jump upwards"),
         pytest.param([0, 1], [moved(-1e308), moved(1e308)], PoseError, "the lidar moves inf m", id="jump over all"),
     ],
 )  # fmt: skip
