@@ -36,6 +36,7 @@ impl Street {
             categories: &[0; INSTANCES],
             scores: &[1.0; INSTANCES],
             camera: &self.camera,
+            rows: View::ALL_ROWS,
         }
     }
 }

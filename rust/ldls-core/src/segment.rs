@@ -96,6 +96,7 @@ pub fn segment(
     clear_ground(&mut kept, heights, params.ground_clearance);
     let confidence = judge(&mut kept, &diffused, &scene.scores(), params, cancel)?;
 
+    let (sightings, objects) = images.into_parts();
     // back to the rows of the cloud
     let rows = arrange(order, &in_view.indices, cancel)?;
     Ok(Segmentation {
@@ -104,8 +105,8 @@ pub fn segment(
         confidence: scatter(cloud.len(), &rows, 0.0, confidence, cancel)?,
         report: Report::new(in_view.counts, nearest, diffused.convergence),
         in_view: in_view.indices,
-        sightings: images.sightings,
-        objects: images.objects,
+        sightings,
+        objects,
         timings: t,
     })
 }
@@ -209,6 +210,7 @@ mod tests {
             categories: &[1, 1],
             scores: &[1.0, 1.0],
             camera: &camera,
+            rows: View::ALL_ROWS,
         };
         let alone = segment(&[turned]);
         let beside = looking_back();

@@ -71,7 +71,7 @@ pub struct SegmentationArrays {
 
 /// Segments points by the masks of the images that one camera or several took.
 #[pyfunction]
-#[pyo3(signature = (points, masks, categories, scores, cameras, same_object, params, keep_origin))]
+#[pyo3(signature = (points, masks, categories, scores, cameras, rows, same_object, params, keep_origin))]
 #[expect(
     clippy::too_many_arguments,
     reason = "the face in Python has few; here each is one extraction"
@@ -83,19 +83,23 @@ pub fn segment(
     categories: Vec<Vec<i32>>,
     scores: Vec<Vec<f32>>,
     cameras: Vec<PyRef<'_, Camera>>,
+    rows: Option<Vec<[usize; 2]>>,
     same_object: f64,
     params: ParamsAttributes,
     keep_origin: bool,
 ) -> PyResult<SegmentationArrays> {
     let cloud = points.cloud(py)?;
     let (threads, params) = (params.threads, params.params());
+    let rows = rows.unwrap_or_else(|| vec![View::ALL_ROWS; masks.len()]);
     let views = masks.iter().zip(&categories).zip(&scores).zip(&cameras);
     let views: Vec<View> = views
-        .map(|(((masks, categories), scores), camera)| View {
+        .zip(rows)
+        .map(|((((masks, categories), scores), camera), rows)| View {
             masks: &masks.0,
             categories,
             scores,
             camera: &camera.0,
+            rows,
         })
         .collect();
     let segmentation = run(py, threads, |cancel| {

@@ -34,6 +34,19 @@ pub struct Sighting {
     pub uv: Vec<[f64; 2]>,
 }
 
+impl Sighting {
+    /// The part of the points at some positions in the list of those in view.
+    pub(crate) fn within(mut self, positions: Range<usize>) -> Self {
+        let place = |position: usize| self.seen.partition_point(|&at| (at as usize) < position);
+        let kept = place(positions.start)..place(positions.end);
+        self.uv.truncate(kept.end);
+        self.uv.drain(..kept.start);
+        self.seen.truncate(kept.end);
+        self.seen.drain(..kept.start);
+        self
+    }
+}
+
 /// Numbers of points that are not in view, by reason, and the extent of the usable ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Counts {
@@ -132,6 +145,12 @@ fn project_rows(
 }
 
 impl InView {
+    /// Position that a row of the cloud has, or would have, in the list of the points in view.
+    pub(crate) fn place(&self, row: usize) -> usize {
+        self.indices
+            .partition_point(|&index| (index as usize) < row)
+    }
+
     /// No point of `images` images, with room for `points`.
     fn empty(images: usize, points: usize) -> Result<Self> {
         Ok(Self {

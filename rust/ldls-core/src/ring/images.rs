@@ -1,6 +1,7 @@
 //! The pixel edges of all images, added up by object.
 
-use super::same_objects::{Objects, same_objects};
+use super::moments::Moments;
+use super::same_objects::{Objects, instances_of, same_objects};
 use super::view::View;
 use crate::depth::DepthGroups;
 use crate::ground::{ground_heights, is_ground};
@@ -18,7 +19,10 @@ const POINTS_A_TASK: usize = 4096;
 /// The images of one moment, the points in view that each of them sees and the objects that they show.
 pub(crate) struct Images<'a> {
     views: &'a [View<'a>],
-    pub(crate) sightings: Vec<Sighting>,
+    /// The points that take their pixels from each image.
+    sightings: Vec<Sighting>,
+    /// Those that it sees of its own moment, where that is not the same.
+    seen: Option<Vec<Sighting>>,
     /// Position of each point in view in the sighting of each image.
     slots: Vec<Vec<u32>>,
     /// Label of each instance of each image, at the number of the instance; entry 0 is the background.
@@ -43,32 +47,54 @@ impl<'a> Images<'a> {
         let size = |view: &View| [view.masks.height(), view.masks.width()];
         let images: Vec<_> = views.iter().map(|view| (view.camera, size(view))).collect();
         let mut in_view = project(cloud, &images, keep_origin, cancel)?;
-        let sightings = std::mem::take(&mut in_view.sightings);
+        let mut sightings = std::mem::take(&mut in_view.sightings);
         let points = in_view.indices.len();
-        let slots = sightings.iter().map(|own| slots(own, points, cancel));
-        let slots = slots.collect::<Result<Vec<_>>>()?;
+        let mut slots = slots_of(&sightings, points, cancel)?;
         let shared = |one: usize, other: usize| {
-            let slots = slots[one].iter().zip(&slots[other]);
-            let both = slots.filter(|(one, other)| **one != UNSEEN && **other != UNSEEN);
-            both.map(|(&at, &also_at)| {
-                [
-                    sightings[one].uv[at as usize],
-                    sightings[other].uv[also_at as usize],
-                ]
-            })
-            .collect()
+            let places = slots[one].iter().zip(&slots[other]);
+            let places = places.map(|(&at, &also_at)| [at, also_at]);
+            places.filter(|places| !places.contains(&UNSEEN))
         };
-        let objects = same_objects(views, shared, same_object);
+        let instances = instances_of(views, &sightings);
+        let objects = same_objects(views, &instances, shared, same_object);
+        let labels = labels_of(views, &objects);
+        let mut seen = None;
+        if views.iter().any(|view| view.rows != View::ALL_ROWS) {
+            let own = views
+                .iter()
+                .map(|view| view.rows.map(|row| in_view.place(row)));
+            let own: Vec<_> = own.collect();
+            let moments = Moments {
+                views,
+                sightings: &sightings,
+                slots: &slots,
+                unseen: UNSEEN,
+                instances: &instances,
+                labels: &labels,
+                objects: &objects,
+            };
+            let taken = moments.sightings(&own)?;
+            slots = slots_of(&taken, points, cancel)?;
+            let within = |(all, [start, end]): (Sighting, [usize; 2])| all.within(start..end);
+            seen = Some(sightings.into_iter().zip(own).map(within).collect());
+            sightings = taken;
+        }
         let images = Self {
             views,
-            labels: labels_of(views, &objects),
+            labels,
             slots,
             sightings,
+            seen,
             objects,
             heights: filled(f64::NAN, points, cancel)?,
             depths: Vec::new(),
         };
         Ok((in_view, images))
+    }
+
+    /// The points that each image sees of its own moment, and the objects.
+    pub(crate) fn into_parts(self) -> (Vec<Sighting>, Objects) {
+        (self.seen.unwrap_or(self.sightings), self.objects)
     }
 
     /// Finds the ground below `points` in view, by the first camera, and the object of each mask by depth, where the
@@ -156,7 +182,7 @@ impl<'a> Images<'a> {
                 .pixel_labels(&uv, window, weight, admitted, cancel)
         });
         let mut parts = parts.collect::<Result<Vec<_>>>()?;
-        if parts.len() == 1 {
+        if parts.len() == 1 && parts[0].rows() == order.len() {
             // the image sees every point, and its instances are the labels: nothing to add up
             return Ok(parts.remove(0));
         }
@@ -206,13 +232,16 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Position of each of `n` points in view in a sighting.
-fn slots(sighting: &Sighting, n: usize, cancel: &Cancel) -> Result<Vec<u32>> {
-    let mut slots = filled(UNSEEN, n, cancel)?;
-    for (slot, &point) in sighting.seen.iter().enumerate() {
-        slots[point as usize] = slot as u32;
-    }
-    Ok(slots)
+/// Position of each of `n` points in view in each of `sightings`.
+fn slots_of(sightings: &[Sighting], n: usize, cancel: &Cancel) -> Result<Vec<Vec<u32>>> {
+    let of_sighting = |sighting: &Sighting| {
+        let mut slots = filled(UNSEEN, n, cancel)?;
+        for (slot, &point) in sighting.seen.iter().enumerate() {
+            slots[point as usize] = slot as u32;
+        }
+        Ok(slots)
+    };
+    sightings.iter().map(of_sighting).collect()
 }
 
 /// Label of each instance of each view: the number of its object.

@@ -4,6 +4,7 @@
 //! two images show has an instance in each; the two are one label if the points that both cameras see agree.
 
 mod images;
+mod moments;
 mod same_objects;
 mod view;
 

@@ -2,17 +2,28 @@
 
 use super::view::View;
 use crate::masks::InstanceMasks;
-use crate::projection::nearest_pixel;
+use crate::projection::{Sighting, nearest_pixel};
 use std::collections::BTreeMap;
 
 /// The instances that object l = 1, 2, ... consists of, at position l - 1: image and instance, the latter from 1.
 pub type Objects = Vec<Vec<(usize, u32)>>;
 
-/// The instances of all views, those that show one object together. `shared` yields the pixels, in each of two images,
-/// of the points that both see.
-pub(crate) fn same_objects(
+/// The instances on whose masks each point falls that each image sees; none of an image that is alone.
+pub(super) fn instances_of(views: &[View], sightings: &[Sighting]) -> Vec<Vec<Vec<u32>>> {
+    if views.len() == 1 {
+        return vec![Vec::new()];
+    }
+    let images = views.iter().zip(sightings);
+    let of_image = |(view, sighting): (&View, &Sighting)| instances_at(view.masks, &sighting.uv);
+    images.map(of_image).collect()
+}
+
+/// The instances of all views, those that show one object together. `instances` are those at the points that each image
+/// sees, and `shared` yields where, among these, the points are that two images see.
+pub(super) fn same_objects<Shared: IntoIterator<Item = [u32; 2]>>(
     views: &[View],
-    shared: impl Fn(usize, usize) -> Vec<[[f64; 2]; 2]>,
+    instances: &[Vec<Vec<u32>>],
+    shared: impl Fn(usize, usize) -> Shared,
     same_object: f64,
 ) -> Objects {
     let mut groups: Objects = Vec::new();
@@ -22,7 +33,7 @@ pub(crate) fn same_objects(
         groups.extend((1..=view.masks.len() as u32).map(|m| vec![(image, m)]));
         group_of.push((first..groups.len()).collect());
     }
-    for pair in best_first(agreements(views, shared), same_object) {
+    for pair in best_first(agreements(views, instances, shared), same_object) {
         let mut pair = pair.map(|(image, m)| group_of[image][m as usize - 1]);
         pair.sort_unstable();
         let [kept, joined] = pair;
@@ -65,27 +76,36 @@ fn best_first(agreements: BTreeMap<Pair, Agreement>, same_object: f64) -> Vec<Pa
 }
 
 /// Agreement of each two instances of one category in two images on which a point falls that both images see.
-fn agreements(
+fn agreements<Shared: IntoIterator<Item = [u32; 2]>>(
     views: &[View],
-    shared: impl Fn(usize, usize) -> Vec<[[f64; 2]; 2]>,
+    instances: &[Vec<Vec<u32>>],
+    shared: impl Fn(usize, usize) -> Shared,
 ) -> BTreeMap<Pair, Agreement> {
     let mut agreements = BTreeMap::new();
     for one in 0..views.len() {
         for other in one + 1..views.len() {
-            let pixels = shared(one, other);
-            let [here, there] = [(one, 0), (other, 1)].map(|(image, side)| {
-                instances_at(views[image].masks, pixels.iter().map(|uv| uv[side]))
-            });
-            let totals = [&here, &there].map(|lists| count(lists.iter().flatten().copied()));
-            let pairs = here.iter().zip(&there).flat_map(|(here, there)| {
-                here.iter()
-                    .flat_map(|&m| there.iter().map(move |&other| (m, other)))
-            });
-            for ((m, k), both) in count(pairs) {
-                let category = |image: usize, m: u32| views[image].categories[m as usize - 1];
-                if category(one, m) == category(other, k) {
-                    let either = totals[0][&m] + totals[1][&k] - both;
-                    agreements.insert([(one, m), (other, k)], Agreement { both, either });
+            let [here, there] = [one, other].map(|image| views[image].masks.len() + 1);
+            let (mut either, mut both) = ([vec![0; here], vec![0; there]], vec![0; here * there]);
+            for [at, also_at] in shared(one, other) {
+                let [here, others] =
+                    [(one, at), (other, also_at)].map(|(image, at)| &instances[image][at as usize]);
+                for (counts, instances) in either.iter_mut().zip([here, others]) {
+                    for &m in instances {
+                        counts[m as usize] += 1;
+                    }
+                }
+                for &m in here {
+                    for &k in others {
+                        both[m as usize * there + k as usize] += 1;
+                    }
+                }
+            }
+            for (at, both) in both.into_iter().enumerate().filter(|(_, both)| *both > 0) {
+                let (m, k) = (at / there, at % there);
+                if views[one].categories[m - 1] == views[other].categories[k - 1] {
+                    let either = either[0][m] + either[1][k] - both;
+                    let pair = [(one, m as u32), (other, k as u32)];
+                    agreements.insert(pair, Agreement { both, either });
                 }
             }
         }
@@ -93,19 +113,10 @@ fn agreements(
     agreements
 }
 
-fn count<T: Ord>(values: impl Iterator<Item = T>) -> BTreeMap<T, usize> {
-    let mut counts = BTreeMap::new();
-    for value in values {
-        *counts.entry(value).or_default() += 1;
-    }
-    counts
-}
-
 /// The instances on whose masks each of `uv` falls.
-fn instances_at(masks: &InstanceMasks, uv: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<u32>> {
-    let pixels: Vec<[usize; 2]> = uv
-        .filter_map(|uv| nearest_pixel(uv, masks.height(), masks.width()))
-        .collect();
+fn instances_at(masks: &InstanceMasks, uv: &[[f64; 2]]) -> Vec<Vec<u32>> {
+    let pixel = |uv: &[f64; 2]| nearest_pixel(*uv, masks.height(), masks.width());
+    let pixels: Vec<[usize; 2]> = uv.iter().filter_map(pixel).collect();
     let mut instances_of = vec![Vec::new(); pixels.len()];
     for (m, mask) in (1..).zip(masks.masks()) {
         let [top, left, height, width] = mask.bounding_box();
@@ -146,6 +157,7 @@ mod tests {
             masks,
             categories,
             camera,
+            rows: View::ALL_ROWS,
         };
         let ring = segment(&[
             view(&first, &left, &[3, 3]),
@@ -174,10 +186,16 @@ mod tests {
             masks,
             categories: &[1],
             camera: &camera,
+            rows: View::ALL_ROWS,
         };
         let views = [view(&first), view(&second)];
-        let pixels: Vec<[[f64; 2]; 2]> = (8..16).map(|u| [[f64::from(u), 7.0]; 2]).collect();
-        let objects = |same_object| same_objects(&views, |_, _| pixels.clone(), same_object).len();
+        let sighting = Sighting {
+            seen: (0..8).collect(),
+            uv: (8..16).map(|u| [f64::from(u), 7.0]).collect(),
+        };
+        let instances = instances_of(&views, &[sighting.clone(), sighting]);
+        let shared = |_, _| (0..8).map(|at| [at, at]);
+        let objects = |same_object| same_objects(&views, &instances, shared, same_object).len();
         assert_eq!((objects(0.5), objects(0.5_f64.next_up())), (1, 2));
     }
 
@@ -194,6 +212,7 @@ mod tests {
             let categories = [1; 6];
             let views: Vec<View> = parts.iter().zip(&cameras).map(|(masks, camera)| View {
                 masks, camera, categories: &categories[..masks.len()], scores: &[1.0; 9][..masks.len()],
+                rows: View::ALL_ROWS,
             }).collect();
             let found = segment(&views);
             let mut members: Vec<(usize, u32)> = found.objects.concat();

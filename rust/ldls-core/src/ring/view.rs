@@ -15,9 +15,15 @@ pub struct View<'a> {
     pub scores: &'a [f32],
     /// The camera.
     pub camera: &'a Camera,
+    /// First of the rows of the cloud that were swept when the image was taken, and the one after the last: its pixels
+    /// label these alone.
+    pub rows: [usize; 2],
 }
 
 impl View<'_> {
+    /// Rows of a cloud that is swept all at one moment.
+    pub const ALL_ROWS: [usize; 2] = [0, usize::MAX];
+
     /// Refuses a view that has not one category and one score a mask.
     pub(crate) fn check(&self) -> Result<()> {
         let (categories, scores) = (self.categories.len(), self.scores.len());

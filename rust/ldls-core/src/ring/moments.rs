@@ -1,0 +1,184 @@
+//! Images of several moments: which of them a point takes its pixels from.
+//!
+//! A point takes those of the images of its own moment, for what moves is elsewhere in the others. Where these miss an
+//! object, of which at least two others have a mask, points on its place take those of the nearest of these: a segmenter
+//! that overlooks an object says nothing of it, though its pixels look like background.
+
+use super::same_objects::Objects;
+use super::view::View;
+use crate::Result;
+use crate::memory::push;
+use crate::projection::Sighting;
+use std::cmp::Reverse;
+
+/// Masks from which on an object is believed to be where an image has none: a single one may be a segmenter's mistake.
+const MASKS_OF_AN_OBJECT: usize = 2;
+
+/// What is known of the points in view before each has its images.
+pub(super) struct Moments<'a> {
+    pub(super) views: &'a [View<'a>],
+    /// All points that each image would see, if all were swept at its moment.
+    pub(super) sightings: &'a [Sighting],
+    /// Position of each point in view in each of them, or `unseen`.
+    pub(super) slots: &'a [Vec<u32>],
+    pub(super) unseen: u32,
+    /// Instances of the image at each point of each sighting.
+    pub(super) instances: &'a [Vec<Vec<u32>>],
+    /// Label of each instance of each image.
+    pub(super) labels: &'a [Vec<u32>],
+    pub(super) objects: &'a Objects,
+}
+
+impl Moments<'_> {
+    /// The points that take their pixels from each image; `own` are the positions of those of its own moment.
+    pub(super) fn sightings(&self, own: &[[usize; 2]]) -> Result<Vec<Sighting>> {
+        let mut taken: Vec<Vec<(u32, u32)>> = vec![Vec::new(); self.views.len()];
+        for (image, &[start, end]) in own.iter().enumerate() {
+            let lenders = self.lenders(image);
+            for (slot, &point) in (0..).zip(&self.sightings[image].seen) {
+                if !(start..end).contains(&(point as usize)) {
+                    continue;
+                }
+                // a mask of its own moment knows better
+                let free = !lenders.is_empty() && self.instances[image][slot as usize].is_empty();
+                let lends = |(lender, objects): &(usize, Vec<bool>)| {
+                    let slot = self.slots[*lender][point as usize];
+                    let shows = |&m: &u32| objects[self.labels[*lender][m as usize] as usize];
+                    let there = slot != self.unseen
+                        && self.instances[*lender][slot as usize].iter().any(shows);
+                    there.then_some((*lender, slot))
+                };
+                let (image, slot) = lenders
+                    .iter()
+                    .filter(|_| free)
+                    .find_map(lends)
+                    .unwrap_or((image, slot));
+                push(&mut taken[image], (point, slot))?;
+            }
+        }
+        let sighting = |(all, mut taken): (&Sighting, Vec<(u32, u32)>)| {
+            taken.sort_unstable();
+            Sighting {
+                seen: taken.iter().map(|&(point, _)| point).collect(),
+                uv: taken
+                    .iter()
+                    .map(|&(_, slot)| all.uv[slot as usize])
+                    .collect(),
+            }
+        };
+        Ok(self.sightings.iter().zip(taken).map(sighting).collect())
+    }
+
+    /// The images of other moments, the nearest first, and by label the objects that each shows and that those of the
+    /// moment of `image` miss.
+    fn lenders(&self, image: usize) -> Vec<(usize, Vec<bool>)> {
+        let rows = self.views[image].rows;
+        let mut missed = vec![false; self.objects.len() + 1];
+        for (label, masks) in (1..).zip(self.objects) {
+            let shown = masks
+                .iter()
+                .any(|&(other, _)| self.views[other].rows == rows);
+            missed[label] = !shown && masks.len() >= MASKS_OF_AN_OBJECT;
+        }
+        if !missed.contains(&true) {
+            return Vec::new();
+        }
+        let others = (0..self.views.len()).filter(|&other| self.views[other].rows != rows);
+        let mut lenders: Vec<_> = others.map(|other| (other, missed.clone())).collect();
+        // of equally near ones the earlier
+        lenders.sort_by_key(|&(other, _)| (other.abs_diff(image), Reverse(other < image)));
+        lenders
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::{camera, masks, wall};
+    use crate::{Cancel, Cloud, InstanceMasks, Params, Segmentation};
+
+    /// The wall, swept once a moment, before a camera that finds `moments` of masks.
+    fn segment(moments: &[InstanceMasks]) -> Segmentation {
+        let (values, camera) = (wall().repeat(moments.len()), camera(20.0));
+        let cloud = Cloud::F64 {
+            values: &values,
+            columns: 3,
+        };
+        let n = cloud.len() / moments.len();
+        let views = moments.iter().enumerate().map(|(moment, masks)| View {
+            masks,
+            categories: &[1; 4][..masks.len()],
+            scores: &[1.0; 4][..masks.len()],
+            camera: &camera,
+            rows: [moment * n, (moment + 1) * n],
+        });
+        let views: Vec<View> = views.collect();
+        let params = Params {
+            iterations: Some(2),
+            ..Params::paper()
+        };
+        crate::segment(cloud, &views, 0.5, &params, false, Cancel::never()).unwrap()
+    }
+
+    /// Numbers of the points of each moment with each label.
+    fn counts(found: &Segmentation, moments: usize) -> Vec<Vec<usize>> {
+        let of_moment = |labels: &[i32]| {
+            let count = |label: i32| labels.iter().filter(|&&own| own == label).count();
+            (1..=found.objects.len() as i32).map(count).collect()
+        };
+        let moments = found.labels.chunks(found.labels.len() / moments);
+        moments.map(of_moment).collect()
+    }
+
+    const OBJECT: [usize; 4] = [5, 8, 12, 10];
+    const ELSEWHERE: [usize; 4] = [5, 28, 12, 8];
+
+    #[test]
+    fn an_image_that_misses_an_object_takes_it_from_those_that_show_it() {
+        let found = segment(&[masks(&[OBJECT]), masks(&[]), masks(&[OBJECT])]);
+        assert_eq!(found.objects, [[(0, 1), (2, 1)]]);
+        let counts = counts(&found, 3);
+        assert!(counts[0][0] > 10, "{counts:?}");
+        assert_eq!(counts[0], counts[1]);
+    }
+
+    #[test]
+    fn a_mask_that_a_single_image_has_counts_for_its_own_points_alone() {
+        let found = segment(&[
+            masks(&[OBJECT]),
+            masks(&[]),
+            masks(&[]),
+            masks(&[]),
+            masks(&[]),
+        ]);
+        let alone = counts(&segment(&[masks(&[OBJECT])]), 1);
+        assert!(alone[0][0] > 10, "{alone:?} {:?}", counts(&found, 5));
+        assert_eq!(counts(&found, 5)[1..].concat(), [0; 4]);
+    }
+
+    #[test]
+    fn a_mask_of_its_own_moment_knows_better() {
+        // what stands there at the second moment overlaps too little to be the same object
+        let other = [5, 13, 12, 14];
+        let found = segment(&[masks(&[OBJECT]), masks(&[other]), masks(&[OBJECT])]);
+        assert_eq!(found.objects.len(), 2);
+        let alone = segment(&[masks(&[]), masks(&[other]), masks(&[])]);
+        let (found, alone) = (counts(&found, 3), counts(&alone, 3));
+        assert!(found[1][1] >= alone[1][0] / 2, "{found:?} {alone:?}");
+    }
+
+    #[test]
+    fn images_see_the_points_of_their_own_moment() {
+        let found = segment(&[masks(&[OBJECT, ELSEWHERE]), masks(&[ELSEWHERE])]);
+        let n = found.labels.len() / 2;
+        for (moment, sighting) in found.sightings.iter().enumerate() {
+            let rows = sighting
+                .seen
+                .iter()
+                .map(|&at| found.in_view[at as usize] as usize);
+            let (own, rows) = (moment * n..(moment + 1) * n, rows.collect::<Vec<_>>());
+            assert!(!rows.is_empty() && rows.iter().all(|row| own.contains(row)));
+        }
+        assert_eq!(found.objects.len(), 2);
+    }
+}
