@@ -56,15 +56,18 @@ def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1, heights=No
     return expected
 
 
-def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, heights=None, centers=None):
+def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, heights=None, centers=None, rows=None):
     """`views` holds masks (M, H, W), categories (M,) and a camera matrix for each camera. Labels, and the instances
-    (camera, mask), both from 0, of each label from 1. `heights`, and `centers` of the cameras, are as in `segment`."""
+    (camera, mask), both from 0, of each label from 1. `heights`, and `centers` of the cameras, are as in `segment`.
+    `rows` has the first row and the one after the last that was swept at the moment of each view."""
     seen = [project(points, matrix, masks.shape[1:], min_depth_m) for masks, _, matrix in views]
     in_view = np.unique(np.concatenate([rows for rows, _ in seen]))
     xyz = points[in_view, :3].astype(np.float64)
     heights = np.full(len(xyz), np.nan) if heights is None else heights
     ground = (heights > -0.3) & (heights < 0.15)
     groups = same_objects(views, seen, same_object)
+    if rows is not None:
+        seen = pixels_taken(views, seen, groups, rows)
     labels, mass = np.zeros((len(in_view), len(groups) + 1)), np.zeros(len(in_view))
     at_depth = np.zeros(labels.shape, bool)
     for camera, ((masks, _, _), (rows, pixels)) in enumerate(zip(views, seen, strict=True)):
@@ -90,6 +93,32 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
     whole = np.full(len(points), -1)
     whole[in_view] = expected.remove_outliers(diffused, params)
     return whole, groups
+
+
+def pixels_taken(views, seen, groups, rows):
+    """Rows and pixels of the points that take their pixels from each view: those of its moment, but for points where it
+    has no mask and the nearest view of another moment shows an object that two masks have and its moment misses."""
+
+    def masks_at(view, row):
+        (at,) = np.flatnonzero(seen[view][0] == row)
+        column, line = np.floor(seen[view][1][at] + 0.5).astype(int)
+        return [m for m in range(len(views[view][0])) if views[view][0][m, line, column]]
+
+    def lends(other, view, row):
+        if row not in seen[other][0]:
+            return False
+        shown = [next(g for g in groups if (other, m) in g) for m in masks_at(other, row)]
+        return any(len(g) >= 2 and all(rows[member] != rows[view] for member, _ in g) for g in shown)
+
+    taken = [[] for _ in views]
+    for view in range(len(views)):
+        others = [other for other in range(len(views)) if rows[other] != rows[view]]
+        others.sort(key=lambda other: (abs(other - view), other > view))
+        for row in seen[view][0][(seen[view][0] >= rows[view][0]) & (seen[view][0] < rows[view][1])]:
+            lenders = [] if masks_at(view, row) else [other for other in others if lends(other, view, row)]
+            taken[lenders[0] if lenders else view].append(row)
+    parts = [np.isin(own_rows, own) for (own_rows, _), own in zip(seen, taken, strict=True)]
+    return [(own_rows[part], pixels[part]) for (own_rows, pixels), part in zip(seen, parts, strict=True)]
 
 
 def same_objects(views, seen, same_object):

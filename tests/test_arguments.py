@@ -225,6 +225,27 @@ CALLS = {
         },
     ),
     "stages.confidence": (stages.confidence, {"z": W.z, "labels": W.z.argmax(axis=1), "masks": W.masks}),
+    "Sweep": (
+        ldls.Sweep,
+        {"points": W.points, "views": [ldls.View(W.masks, W.camera)], "pose": np.eye(4), "stamp": 0.1},
+    ),
+    "segment_sweeps": (
+        ldls.segment_sweeps,
+        {
+            "sweeps": [ldls.Sweep(W.points, [ldls.View(W.masks, W.camera)], np.eye(4), 0.1)] * 2,
+            "params": ldls.Params(threads=1),
+            "nonfinite": "drop",
+            "keep_origin": False,
+            "same_object": 0.5,
+        },
+    ),
+    "Tracker.track": (
+        lambda **arguments: ldls.Tracker().track(**arguments),
+        {
+            "sweeps": [ldls.Sweep(W.points, [ldls.View(W.masks, W.camera)], np.eye(4), 0.1)],
+            "results": ldls.segment_sweeps([ldls.Sweep(W.points, [ldls.View(W.masks, W.camera)], np.eye(4), 0.1)]),
+        },
+    ),
     "Trajectory": (ldls.Trajectory, {"stamps": [0, 0.1], "poses": np.stack([np.eye(4)] * 2)}),
     "Trajectory.at": (ldls.Trajectory([0, 0.1], np.stack([np.eye(4)] * 2)).at, {"stamp": 0.05}),
     "Labeling": (

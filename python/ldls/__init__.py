@@ -52,7 +52,12 @@ if TYPE_CHECKING:
         Segmentation as Segmentation,
         SegmentedObject as SegmentedObject,
     )
-    from ldls.sequences import Trajectory as Trajectory
+    from ldls.sequences import (
+        Sweep as Sweep,
+        Tracker as Tracker,
+        Trajectory as Trajectory,
+        segment_sweeps as segment_sweeps,
+    )
     from ldls.view import SeenView as SeenView, View as View
 
 _NAMES = {
@@ -93,7 +98,7 @@ _NAMES = {
     "ldls.masks": ("InstanceMasks",),
     "ldls.params": ("Params",),
     "ldls.segmentation": ("Instance", "OrientedBox", "Report", "Segmentation", "SegmentedObject"),
-    "ldls.sequences": ("Trajectory",),
+    "ldls.sequences": ("Sweep", "Tracker", "Trajectory", "segment_sweeps"),
     "ldls.view": ("SeenView", "View"),
 }
 """The public names, by the module that they come from."""

@@ -122,6 +122,7 @@ def segment(
     categories: list[list[int]],
     scores: list[list[float]],
     cameras: list[Camera],
+    rows: list[tuple[int, int]] | None,
     same_object: float,
     params: Params,
     keep_origin: bool,

@@ -158,34 +158,67 @@ def _segment(
 ) -> Segmentation:
     cloud = as_points(points)
     if nonfinite == "raise":
-        _check_finite(cloud)
+        check_finite(cloud)
+    arrays = diffuse_labels(cloud, views, None, params, keep_origin=keep_origin, same_object=same_object)
+    result = result_of(arrays, views, cloud, params)
+    _warn(result, arrays.report)
+    return result
+
+
+def diffuse_labels(
+    cloud: Points,
+    views: Sequence[View],
+    rows: list[tuple[int, int]] | None,
+    params: Params,
+    *,
+    keep_origin: bool,
+    same_object: float,
+) -> _ldls.SegmentationArrays:
+    """Call the core; `rows` has the first row and the one after the last that each view labels, None where all."""
     if not 0 < same_object <= 1:
         raise ParameterError(f"same_object: got {same_object!r}, expected more than 0 and at most 1")
-    arrays = _ldls.segment(
+    return _ldls.segment(
         cloud,
         [view.masks.core for view in views],
         [view.masks.categories.tolist() for view in views],
         [view.masks.scores.tolist() for view in views],
         [view.camera.core for view in views],
+        rows,
         same_object,
         params,
         keep_origin,
     )
-    instances = tuple(_instance(label, parts, views) for label, parts in enumerate(arrays.objects, start=1))
-    result = Segmentation(
-        labels=arrays.labels,
-        diffused_labels=arrays.diffused_labels,
-        confidence=arrays.confidence,
-        in_view=arrays.in_view,
+
+
+def result_of(
+    arrays: _ldls.SegmentationArrays,
+    views: Sequence[View],
+    points: Points,
+    params: Params,
+    *,
+    rows: tuple[int, int] | None = None,
+    own: range | None = None,
+) -> Segmentation:
+    """Return what the core says of `points`, which are some `rows` of its cloud, and of the `own` views among all."""
+    start, end = rows or (0, len(points))
+    own = range(len(views)) if own is None else own
+    numbered = enumerate(arrays.objects, start=1)
+    instances = tuple(_instance(label, parts, views, own) for label, parts in numbered)
+    sightings = [(in_view - start, pixels) for in_view, pixels in (arrays.sightings[number] for number in own)]
+    first, last = np.searchsorted(arrays.in_view, (start, end))
+    seen = _seen([views[number] for number in own], sightings, instances)
+    return Segmentation(
+        labels=arrays.labels[start:end],
+        diffused_labels=arrays.diffused_labels[start:end],
+        confidence=arrays.confidence[start:end],
+        in_view=arrays.in_view[first:last] - start,
         instances=instances,
-        views=_seen(views, arrays.sightings, instances),
-        report=_report(arrays, views, instances),
+        views=seen,
+        report=_report(arrays, len(points), int(last - first), seen, instances),
         timings=arrays.timings,
-        points=cloud,
+        points=points,
         params=params,
     )
-    _warn(result, arrays.report)
-    return result
 
 
 def nothing_in_view(result: Segmentation) -> str | None:
@@ -214,23 +247,22 @@ def _expected_on_masks(views: Sequence[SeenView]) -> float:
     return sum(len(seen.in_view) * area / (seen.view.masks.height * seen.view.masks.width) for seen, area in areas)
 
 
-def _instance(label: int, parts: Sequence[tuple[int, int]], views: tuple[View, ...]) -> Instance:
+def _instance(label: int, parts: Sequence[tuple[int, int]], views: Sequence[View], own: range) -> Instance:
     """Return the instance that the core's parts, numbers of a view and of a mask from 1, are one object of."""
-    sources = tuple((number, mask - 1) for number, mask in parts)
-    number, first = sources[0]
+    number, first = parts[0]
     masks = views[number].masks
-    category = int(masks.categories[first])
+    category = int(masks.categories[first - 1])
     return Instance(
         label=label,
         category=category,
         name=masks.names[category],
-        score=max(float(views[number].masks.scores[mask]) for number, mask in sources),
-        sources=sources,
+        score=max(float(views[number].masks.scores[mask - 1]) for number, mask in parts),
+        sources=tuple((number - own.start, mask - 1) for number, mask in parts if number in own),
     )
 
 
 def _seen(
-    views: tuple[View, ...],
+    views: Sequence[View],
     sightings: Sequence[tuple[NDArray[np.int64], NDArray[np.float64]]],
     instances: tuple[Instance, ...],
 ) -> tuple[SeenView, ...]:
@@ -244,7 +276,12 @@ def _seen(
     )
 
 
-def _check_finite(cloud: Points) -> None:
+def check_finite(cloud: Points) -> None:
+    """Refuse points that are not finite.
+
+    Raises:
+        NonFiniteError: There are some.
+    """
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(cloud[:, :3]).all(axis=1))
     if not finite.all():
         raise NonFiniteError(
@@ -296,9 +333,16 @@ def _warning(message: str, category: type[Warning]) -> None:
     warnings.warn(message, category, stacklevel=6)
 
 
-def _report(arrays: _ldls.SegmentationArrays, views: tuple[View, ...], instances: tuple[Instance, ...]) -> Report:
+def _report(
+    arrays: _ldls.SegmentationArrays,
+    n_points: int,
+    n_in_view: int,
+    views: Sequence[SeenView],
+    instances: tuple[Instance, ...],
+) -> Report:
     counts = dict(arrays.report)
     del counts["bounds"], counts["only_islands"]
-    areas = [view.masks.core.areas() for view in views]
-    empty = tuple(i.label for i in instances if not any(areas[number][mask] for number, mask in i.sources))
-    return Report(n_points=len(arrays.labels), n_in_view=len(arrays.in_view), empty_masks=empty, **counts)
+    areas = [seen.view.masks.core.areas() for seen in views]
+    shown = (instance for instance in instances if instance.sources)
+    empty = tuple(i.label for i in shown if not any(areas[number][mask] for number, mask in i.sources))
+    return Report(n_points=n_points, n_in_view=n_in_view, empty_masks=empty, **counts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from dataclasses import asdict, replace
 from os import PathLike
 from typing import Any
@@ -48,6 +48,7 @@ def write(path: str | PathLike[str], result: Segmentation) -> None:
             "object_category": np.array([o.category for o in objects], np.int32),
             "object_name": np.array([o.name for o in objects], np.str_),
             "object_score": np.array([o.score for o in objects], np.float32),
+            **_tracks(result),
             "object_n_points": np.array([o.n_points for o in objects], np.int64),
             "object_centroid": np.array([_centroid(o) for o in objects]).reshape(-1, 3),
             "object_box": np.array([_box(o) for o in objects]).reshape(-1, 7),
@@ -79,11 +80,18 @@ def read(path: str | PathLike[str]) -> Segmentation:
         return result
 
 
+def _tracks(result: Segmentation) -> dict[str, NDArray[Any]]:
+    tracks = np.array([instance.track for instance in result.instances], np.int64)
+    return {"object_track": tracks} if tracks.any() else {}
+
+
 def _views(result: Segmentation) -> dict[str, NDArray[Any]]:
     if len(result.views) == 1:
         (seen,) = result.views
-        given = _given("", seen.view.camera, mask_arrays(seen.view.masks))
-        return {"view_names": np.array([seen.view.name], np.str_), "pixels": result.pixels, **given}
+        own = {"view_names": np.array([seen.view.name], np.str_), "pixels": result.pixels}
+        if not np.array_equal(seen.labels, _every_mask(result.instances)):
+            own["mask_labels"] = seen.labels  # of one sweep among several
+        return own | _given("", seen.view.camera, mask_arrays(seen.view.masks))
     arrays: dict[str, NDArray[Any]] = {
         "view_names": np.array([seen.view.name or f"camera {i}" for i, seen in enumerate(result.views)], np.str_)
     }
@@ -128,10 +136,13 @@ def _instances(arrays: Arrays, views: tuple[SeenView, ...]) -> tuple[Instance, .
     for number, seen in enumerate(views):
         for mask, label in enumerate(seen.labels.tolist()):
             sources[label - 1].append((number, mask))
-    parts = zip(arrays["object_category"].tolist(), names, arrays["object_score"].tolist(), sources, strict=True)
+    tracks = arrays["object_track"].tolist() if "object_track" in arrays else [0] * len(names)
+    parts = zip(
+        arrays["object_category"].tolist(), names, arrays["object_score"].tolist(), sources, tracks, strict=True
+    )
     return tuple(
-        Instance(label=label, category=category, name=name, score=score, sources=tuple(own))
-        for label, (category, name, score, own) in enumerate(parts, start=1)
+        Instance(label=label, category=category, name=name, score=score, sources=tuple(own), track=track)
+        for label, (category, name, score, own, track) in enumerate(parts, start=1)
     )
 
 
@@ -139,8 +150,12 @@ def _read_views(arrays: Arrays) -> tuple[SeenView, ...]:
     names = arrays["view_names"].tolist()
     if len(names) != 1:
         return tuple(_read_view(arrays, f"view{i}_", each, arrays[f"view{i}_labels"]) for i, each in enumerate(names))
-    every_mask = np.arange(1, len(arrays["object_name"]) + 1, dtype=np.int32)
-    return (_read_view(arrays, "", names[0], every_mask),)
+    labels = arrays["mask_labels"] if "mask_labels" in arrays else _every_mask(arrays["object_name"])
+    return (_read_view(arrays, "", names[0], labels),)
+
+
+def _every_mask(objects: Sized) -> NDArray[np.int32]:
+    return np.arange(1, len(objects) + 1, dtype=np.int32)
 
 
 def _read_view(arrays: Arrays, prefix: str, name: str, labels: NDArray[np.int32]) -> SeenView:

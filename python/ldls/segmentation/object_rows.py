@@ -41,19 +41,20 @@ def _rows(
     for each, own in zip(objects, sources, strict=True):
         if each.centroid is None or each.box is None:
             continue
-        view, mask = first_seen(own, views)
-        top, left, height, width = mask.bounding_box
+        shown = first_seen(own, views)
+        camera, box = ("", (None,) * 4) if shown is None else (cameras[shown[0]], shown[1].bounding_box)
+        top, left, height, width = box
         values = (
             each.label, each.category, each.name, float(each.score), each.n_points, each.distance_m,
             *each.centroid.tolist(),
             *each.box.center.tolist(), *each.box.size.tolist(), float(each.box.yaw),
-            cameras[view], left, top, width, height,
+            camera, left, top, width, height,
         )  # fmt: skip
         yield dict(zip(COLUMNS, values, strict=True))
 
 
-def first_seen(sources: Sequence[tuple[int, int]], views: Sequence[SeenView]) -> tuple[int, InstanceMask]:
-    """Number of the first view that shows an object with points, and its mask there."""
+def first_seen(sources: Sequence[tuple[int, int]], views: Sequence[SeenView]) -> tuple[int, InstanceMask] | None:
+    """Number of the first view that shows an object with points, and its mask there; None if none does."""
     masks = ((view, views[view].view.masks[mask]) for view, mask in sorted(sources))
     # of several masks of an object one may be empty
-    return next((view, mask) for view, mask in masks if mask.area)
+    return next(((view, mask) for view, mask in masks if mask.area), None)

@@ -32,7 +32,9 @@ class Instance:
         category: Category id.
         name: Category name.
         score: Highest score of its masks, 0 to 1.
-        sources: Its masks: number of the view and of the mask in it, both from 0; one a view that shows it.
+        sources: Its masks: number of the view and of the mask in it, both from 0; one a view that shows it, and none
+            where only images of other sweeps do.
+        track: Number of the object in its drive, from 1, the same in all sweeps; 0 where nobody tracked it.
     """
 
     label: int
@@ -40,6 +42,7 @@ class Instance:
     name: str
     score: float
     sources: tuple[tuple[int, int], ...]
+    track: int = 0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,5 +1,7 @@
-"""Drives: what belongs to several sweeps, one after the other."""
+"""Drives: sweeps of several moments together, and the objects that go through them."""
 
+from ldls.sequences.sweeps import Sweep, segment_sweeps
+from ldls.sequences.tracker import Tracker
 from ldls.sequences.trajectory import Trajectory
 
-__all__ = ["Trajectory"]
+__all__ = ["Sweep", "Tracker", "Trajectory", "segment_sweeps"]

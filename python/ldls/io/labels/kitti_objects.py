@@ -182,8 +182,8 @@ def write(path: Path, result: Segmentation) -> None:
 
 def _from_result(result: Segmentation, label: int) -> KittiObject:
     instance = result.instances[label - 1]
-    _, mask = first_seen(instance.sources, result.views)
-    top, left, rows, columns = mask.bounding_box
+    shown = first_seen(instance.sources, result.views)
+    top, left, rows, columns = (0, 0, 0, 0) if shown is None else shown[1].bounding_box
     box = _upright_box(in_camera_frame(result.points[result.labels == label], result.views[0].view.camera))
     x, _, z = box.location
     return replace(

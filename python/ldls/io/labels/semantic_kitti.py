@@ -48,8 +48,9 @@ def read_semantic_kitti(path: str | PathLike[str]) -> Labeling:
 
 
 def write(path: Path, result: Segmentation) -> None:
-    """Write the labels of `result`, one a point in the order of the cloud."""
+    """Write the labels of `result`, one a point in the order of the cloud; a tracked instance has its track."""
     classes = [CLASSES.get(instance.category, OTHER_OBJECT) for instance in result.instances]
-    codes = np.array([0, *classes], np.uint32) | np.arange(len(classes) + 1, dtype=np.uint32) << 16
+    numbers = [instance.track or instance.label for instance in result.instances]
+    codes = np.array([0, *classes], np.uint32) | np.array([0, *numbers], np.uint32) << 16
     with whole_file(path) as file:
         file.write(result.per_point(codes).astype("<u4").tobytes())

@@ -1,0 +1,136 @@
+"""Several sweeps of a drive in one graph: lines that one sweep lacks, and an object with one label in all of them.
+
+Points are brought together by where the lidar stood. Each takes the pixels of images of its own moment alone, for what
+moves is elsewhere in those of others; edges join points of all moments. Two instances of two moments are one object if
+the points that both images see fall on both: of what stands still nearly all of them do, and of what moves enough from
+one sweep to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.camera.rigid import as_transform, inverse, rigid
+from ldls.checks import checked
+from ldls.cloud import Points, as_points
+from ldls.errors import InputError
+from ldls.label_diffusion import check_finite, diffuse_labels, result_of
+from ldls.params import Params
+from ldls.segmentation import Segmentation
+from ldls.view import View
+
+SAME_OBJECT = 0.2
+"""Share of common points from which on instances of two images are one object: less than of one moment, for it may
+have moved."""
+SHARE_OF_NEIGHBORS = 0.5
+"""Neighbours that a sweep adds, as a share of those of one alone: of the nearest many are of the same line at other
+times, and only farther ones join lines."""
+
+
+@checked
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A sweep of the lidar, the images that go with it, and where the lidar stood.
+
+    Attributes:
+        points: (N, >= 3) float32 or float64, x y z first, in metres in the lidar frame.
+        views: Masks and camera of each image; cameras from the lidar at this sweep.
+        pose: (4, 4) T_world_lidar: from the lidar frame of this sweep to one that all sweeps share.
+        stamp: Time of the sweep in seconds.
+
+    Raises:
+        InputError: An argument is of another type.
+        CalibrationError: The pose is no rigid transform.
+    """
+
+    points: Points
+    views: Sequence[View]
+    pose: NDArray[np.float64]
+    stamp: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", as_points(self.points))
+        object.__setattr__(self, "views", tuple(self.views))
+        object.__setattr__(self, "pose", rigid("pose", as_transform("pose", self.pose)))
+        for view in self.views:
+            if not isinstance(view, View):
+                raise InputError(f"views: expected a list of View, got {type(view).__name__} in it")
+
+
+@checked
+def segment_sweeps(
+    sweeps: Sequence[Sweep],
+    *,
+    params: Params | None = None,
+    nonfinite: Literal["drop", "raise"] = "drop",
+    keep_origin: bool = False,
+    same_object: float = SAME_OBJECT,
+) -> tuple[Segmentation, ...]:
+    """Instance labels of the points of a few sweeps in a row, by label diffusion over all of them together.
+
+    A point that no image of its own sweep sees has a label too, if an image of another sees its place. With S sweeps
+    the graph has S / 2 times the `neighbors` of the parameters, and at least these.
+
+    Args:
+        sweeps: Some tenths of a second of a drive; five are a good number.
+        params: Parameters of the method; the best known by default.
+        nonfinite: As of `ldls.segment`.
+        keep_origin: As of `ldls.segment`.
+        same_object: As of `ldls.segment`, of images of one moment and of several.
+
+    Returns:
+        A result a sweep, points in its own lidar frame. A label stands for the same object in all of them; `instances`
+        are the same but for their sources. Report and timings are those of all sweeps together.
+
+    Raises:
+        InputError: There is no sweep, or one cannot be used; see its subclasses.
+        LimitError: The sweeps together have more points than the graph can index.
+    """
+    if not sweeps:
+        raise InputError("sweeps: got none, expected one or more")
+    if nonfinite == "raise":
+        for sweep in sweeps:
+            check_finite(sweep.points)
+    params = params or Params()
+    here = inverse(sweeps[len(sweeps) // 2].pose)
+    to_here = [here @ sweep.pose for sweep in sweeps]
+    clouds = [_moved(sweep.points, transform, keep_origin) for sweep, transform in zip(sweeps, to_here, strict=True)]
+    rows = list(pairwise(np.cumsum([0, *map(len, clouds)]).tolist()))
+    views = [
+        replace(view, camera=replace(view.camera, T_camera_lidar=view.camera.T_camera_lidar @ inverse(transform)))
+        for sweep, transform in zip(sweeps, to_here, strict=True)
+        for view in sweep.views
+    ]
+    neighbors = round(params.neighbors * max(1.0, SHARE_OF_NEIGHBORS * len(sweeps)))
+    arrays = diffuse_labels(
+        np.concatenate(clouds),
+        views,
+        [own for sweep, own in zip(sweeps, rows, strict=True) for _ in sweep.views] if len(sweeps) > 1 else None,
+        replace(params, neighbors=neighbors),
+        keep_origin=keep_origin,
+        same_object=same_object,
+    )
+    firsts = np.cumsum([0, *(len(sweep.views) for sweep in sweeps)]).tolist()
+    results = []
+    for number, (sweep, own) in enumerate(zip(sweeps, rows, strict=True)):
+        of_sweep = range(firsts[number], firsts[number + 1])
+        result = result_of(arrays, views, sweep.points, params, rows=own, own=of_sweep)
+        given = zip(result.views, sweep.views, strict=True)
+        results.append(replace(result, views=tuple(replace(seen, view=view) for seen, view in given)))
+    return tuple(results)
+
+
+def _moved(points: Points, transform: NDArray[np.float64], keep_origin: bool) -> NDArray[np.float64]:
+    xyz = points[:, :3].astype(np.float64)
+    with np.errstate(invalid="ignore"):  # of infinite coordinates
+        moved: NDArray[np.float64] = xyz @ transform[:3, :3].T + transform[:3, 3]
+    if not keep_origin:
+        # missing returns stay what they are
+        moved[(xyz == 0).all(axis=1)] = 0
+    return moved

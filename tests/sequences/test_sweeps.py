@@ -1,0 +1,175 @@
+"""Several sweeps in one graph: against plain double precision, and what each sweep gets back."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ldls
+import oracle
+from ldls.camera.rigid import from_parts, inverse
+from ring_samples import random_ring
+
+PLAIN = {"neighbors": 6, "sigma": 0.3, "pixel_weight": 0.01, "iterations": 40}
+
+
+def moments(seed):
+    """Points of three moments by turns, and the masks, categories and camera of each moment.
+
+    Every other time it is one camera, which sees all objects at the first moment and some at each of the others.
+    """
+    points, views = random_ring(seed)
+    if seed % 2:
+        pixels, _, camera = views[1]
+        views = [(pixels[some], None, camera) for some in ([0, 1, 2, 3], [0, 1], [1, 2, 3])]
+    points = points[np.random.default_rng(seed).permutation(len(points))]
+    # one category, so that objects of several moments abound
+    return np.array_split(points, 3), [(pixels, np.ones(len(pixels), int), camera) for pixels, _, camera in views]
+
+
+def poses(seed, n=3):
+    turns = Rotation.random(n, random_state=seed).as_matrix()
+    places = np.random.default_rng(seed).uniform(-9, 9, (n, 3))
+    return [from_parts(turn, place) for turn, place in zip(turns, places, strict=True)]
+
+
+def sweeps_of(seed, *, world_from_lidar=None):
+    world_from_lidar = world_from_lidar or [np.eye(4)] * 3
+    clouds, views = moments(seed)
+    sweeps = []
+    for number, (cloud, (pixels, categories, camera)) in enumerate(zip(clouds, views, strict=True)):
+        pose = world_from_lidar[number]
+        back = inverse(pose)
+        masks = ldls.InstanceMasks.from_array(pixels, categories=categories)
+        own = replace(camera, T_camera_lidar=camera.T_camera_lidar @ pose)
+        moved = cloud @ back[:3, :3].T + back[:3, 3]
+        sweeps.append(ldls.Sweep(moved, [ldls.View(masks, own)], pose, 0.1 * number))
+    return sweeps
+
+
+@pytest.mark.parametrize("base", [ldls.Params.paper(), ldls.Params()], ids=["paper", "best"])
+@pytest.mark.parametrize("seed", range(20))
+def test_labels_equal_those_of_plain_double_precision(seed, base):
+    params = replace(base, **PLAIN)
+    results = ldls.segment_sweeps(sweeps_of(seed), params=params)
+    clouds, views = moments(seed)
+    points = np.concatenate(clouds)
+    ends = np.cumsum([0, *map(len, clouds)])
+    in_view = np.concatenate([end + result.in_view for end, result in zip(ends, results, strict=False)])
+    asked = {}
+    if params.depth_gap:
+        asked["heights"] = ldls.stages.ground(points[in_view], views[0][2])
+        asked["centers"] = [np.linalg.inv(camera.T_camera_lidar)[:3, 3] for _, _, camera in views]
+    plain = [(pixels, categories, camera.projection @ camera.T_camera_lidar) for pixels, categories, camera in views]
+    rows = list(pairwise(ends.tolist()))
+    labels, groups = oracle.segment_ring(
+        points, plain, replace(params, neighbors=9), same_object=0.2, rows=rows, **asked
+    )
+    np.testing.assert_array_equal(np.concatenate([result.labels for result in results]), labels)
+    for moment, result in enumerate(results):
+        own = [tuple((0, mask) for view, mask in group if view == moment) for group in groups]
+        assert list(result.sources) == own
+
+
+def test_some_of_these_points_take_pixels_of_another_moment():
+    # the oracle above would not see a rule that is never asked for
+    lent = 0
+    for seed in range(20):
+        clouds, views = moments(seed)
+        points, ends = np.concatenate(clouds), np.cumsum([0, *map(len, clouds)]).tolist()
+        plain = [(pixels, kinds, camera.projection @ camera.T_camera_lidar) for pixels, kinds, camera in views]
+        seen = [oracle.project(points, matrix, pixels.shape[1:], 0.1) for pixels, _, matrix in plain]
+        groups = oracle.same_objects(plain, seen, 0.2)
+        rows = list(pairwise(ends))
+        taken = oracle.pixels_taken(plain, seen, groups, rows)
+        lent += sum(
+            int(((own < start) | (own >= end)).sum()) for (own, _), (start, end) in zip(taken, rows, strict=True)
+        )
+    assert lent > 50
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_where_the_lidar_stood_does_not_matter(seed):
+    still = ldls.segment_sweeps(sweeps_of(seed), params=ldls.Params.paper())
+    moving = ldls.segment_sweeps(sweeps_of(seed, world_from_lidar=poses(seed)), params=ldls.Params.paper())
+    for one, other in zip(still, moving, strict=True):
+        np.testing.assert_array_equal(one.labels, other.labels)
+        np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-4)
+
+
+def test_one_sweep_gives_what_it_gives_alone():
+    sweep = sweeps_of(1)[0]
+    (together,) = ldls.segment_sweeps([sweep])
+    alone = ldls.segment(sweep.points, sweep.views)
+    for name in ("labels", "diffused_labels", "confidence", "in_view"):
+        np.testing.assert_array_equal(getattr(together, name), getattr(alone, name))
+    assert together.instances == alone.instances
+    assert together.report == alone.report
+
+
+def test_each_sweep_has_its_own_points_views_and_files(tmp_path):
+    sweeps = sweeps_of(3, world_from_lidar=poses(3))
+    results = ldls.segment_sweeps(sweeps)
+    for sweep, result in zip(sweeps, results, strict=True):
+        assert result.points is sweep.points
+        assert result.views[0].view is sweep.views[0]
+        own, pixels = ldls.stages.project(sweep.points, sweep.views[0].camera, image_size=(40, 60))
+        np.testing.assert_array_equal(result.views[0].in_view, own)
+        np.testing.assert_allclose(result.views[0].pixels, pixels, atol=1e-9)
+        assert np.isin(own, result.in_view).all()
+        assert np.array_equal(result.labels >= 0, np.isin(np.arange(len(sweep.points)), result.in_view))
+        assert [i.label for i in result.instances] == [i.label for i in results[0].instances]
+        for suffix in ("npz", "label", "ply", "csv"):
+            ldls.save(result, tmp_path / f"sweep.{suffix}")
+        again = ldls.read_result(tmp_path / "sweep.npz")
+        assert again.instances == result.instances
+        np.testing.assert_array_equal(again.views[0].labels, result.views[0].labels)
+        assert again.to_table() == result.to_table()
+
+
+def test_an_object_that_no_image_of_a_sweep_shows_has_no_mask_in_its_tables():
+    with_mask, without = sweeps_of(2)[:2]
+    without = replace(without, views=[replace(without.views[0], masks=without.views[0].masks.select([]))])
+    _, result = ldls.segment_sweeps([with_mask, without], params=replace(ldls.Params.paper(), **PLAIN))
+    rows = result.to_table()
+    assert rows
+    assert {(row["camera"], row["mask_width_px"]) for row in rows} == {("", None)}
+    assert all(not instance.sources for instance in result.instances)
+
+
+def test_a_sweep_without_images_is_labelled_by_those_of_others():
+    first, second, third = sweeps_of(4)
+    results = ldls.segment_sweeps([first, replace(second, views=[]), third])
+    assert (results[1].labels > 0).any()
+    assert results[1].views == ()
+
+
+def test_missing_returns_stay_missing():
+    sweeps = sweeps_of(5, world_from_lidar=poses(5))
+    points = sweeps[0].points.copy()
+    points[::2] = 0
+    points[1] = np.nan
+    results = ldls.segment_sweeps([replace(sweeps[0], points=points), *sweeps[1:]])
+    assert (results[0].labels[::2] == -1).all()
+    assert results[0].labels[1] == -1
+    with pytest.raises(ldls.NonFiniteError, match="row 1"):
+        ldls.segment_sweeps([replace(sweeps[0], points=points)], nonfinite="raise")
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_threads_do_not_change_a_bit(threads):
+    one, other = (ldls.segment_sweeps(sweeps_of(6), params=ldls.Params(threads=n)) for n in (1, threads))
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a.labels, b.labels)
+        np.testing.assert_array_equal(a.confidence, b.confidence)
+
+
+def test_misuse_is_named():
+    with pytest.raises(ldls.InputError, match="got none, expected one or more"):
+        ldls.segment_sweeps([])
+    with pytest.raises(ldls.InputError, match="list of View, got int"):
+        ldls.Sweep(np.zeros((1, 3)), [3], np.eye(4), 0.0)
+    with pytest.raises(ldls.CalibrationError, match="pose: R"):
+        ldls.Sweep(np.zeros((1, 3)), [], 2 * np.eye(4), 0.0)

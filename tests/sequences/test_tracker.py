@@ -1,0 +1,163 @@
+"""Numbers of objects over a drive."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ldls
+from conftest import pinhole
+from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
+
+WIDE = pinhole(100.0, (320.0, 240.0), T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+PARAMS = replace(ldls.Params.paper(), iterations=2)
+
+
+def box_of_points(x, y, *, size=0.6):
+    steps = np.linspace(-size / 2, size / 2, 5)
+    return np.stack(np.meshgrid(x + steps, y + steps, steps), axis=-1).reshape(-1, 3)
+
+
+def sweep_at(stamp, objects, *, order=None, pose=None, category=1):
+    """A sweep of objects at (x, y) in the world, its masks in any order; None is one that the segmenter misses."""
+    pose = np.eye(4) if pose is None else pose
+    back = np.linalg.inv(pose)
+    clouds = [box_of_points(*place) @ back[:3, :3].T + back[:3, 3] for place, _ in objects]
+    pixels = []
+    for cloud, (_, seen) in zip(clouds, objects, strict=True):
+        _, uv = ldls.stages.project(cloud, WIDE, image_size=(480, 640))
+        mask = np.zeros((480, 640), bool)
+        if seen and len(uv):
+            (left, top), (right, bottom) = uv.min(axis=0).astype(int) - 1, uv.max(axis=0).astype(int) + 2
+            mask[top:bottom, left:right] = True
+            pixels.append(mask)
+    pixels = [pixels[number] for number in order or range(len(pixels))]
+    masks = ldls.InstanceMasks.from_array(np.array(pixels).reshape(-1, 480, 640), categories=[category] * len(pixels))
+    return ldls.Sweep(np.concatenate(clouds), [ldls.View(masks, WIDE)], pose, stamp)
+
+
+def tracks_of(tracker, sweeps, *, together=1):
+    """Tracks of each sweep by the object whose points they are on; 0 for none."""
+    rows = []
+    for start in range(0, len(sweeps), together):
+        window = sweeps[start : start + together]
+        for sweep, result in zip(
+            window, tracker.track(window, ldls.segment_sweeps(window, params=PARAMS)), strict=True
+        ):
+            numbers = np.array([0, *(instance.track for instance in result.instances)])
+            per_object = np.maximum(result.labels, 0).reshape(-1, 125)
+            assert sweep.points is result.points
+            rows.append([int(np.bincount(numbers[labels]).argmax()) for labels in per_object])
+    return rows
+
+
+def test_masks_in_any_order_are_the_same_objects():
+    places = [((6, -2), True), ((6, 0), True), ((7, 2), True)]
+    orders = [(0, 1, 2), (2, 1, 0), (1, 2, 0), (2, 0, 1)]
+    sweeps = [sweep_at(0.1 * k, places, order=order) for k, order in enumerate(orders)]
+    for together in (1, 2, 4):
+        rows = tracks_of(ldls.Tracker(), sweeps, together=together)
+        assert len(set(rows[0])) == 3
+        assert all(row == rows[0] for row in rows), together
+
+
+def test_an_object_is_itself_after_a_second_without_a_mask_though_it_moves():
+    def places(k):
+        return [((6, -2), not 5 <= k < 15), ((6 + 0.8 * k * 0.1, 1 + 0.5 * k * 0.1), not 8 <= k < 18)]
+
+    sweeps = [sweep_at(0.1 * k, places(k)) for k in range(25)]
+    rows = np.array(tracks_of(ldls.Tracker(), sweeps))
+    assert [sorted(set(column) - {0}) for column in rows.T] == [[1], [2]]
+    assert (rows[[6, 10], [0, 1]] == 0).all()
+
+
+def test_a_turn_of_the_lidar_moves_no_object():
+    places = [((6, -1.5), True), ((6.5, 1.5), True)]
+    sweeps = []
+    for k in range(6):
+        angle = 0.05 * k
+        c, s = np.cos(angle), np.sin(angle)
+        pose = np.array([[c, -s, 0, 0.1 * k], [s, c, 0, -0.05 * k], [0, 0, 1, 0.0], [0, 0, 0, 1]])
+        sweeps.append(sweep_at(0.1 * k, places, pose=pose))
+    assert tracks_of(ldls.Tracker(), sweeps) == [[1, 2]] * 6
+
+
+def test_two_who_meet_do_not_swap():
+    def places(k):
+        return [((6, -1 + 0.12 * k), True), ((7.2, 1 - 0.12 * k), True)]
+
+    sweeps = [sweep_at(0.1 * k, places(k), order=(0, 1) if k % 2 else (1, 0)) for k in range(16)]
+    rows = np.array(tracks_of(ldls.Tracker(), sweeps))
+    # one hides the other for a moment
+    assert [len(set(column) - {0}) for column in rows.T] == [1, 1]
+    assert (rows == 0).sum() <= 1
+    assert rows[0, 0] != rows[0, 1]
+
+
+def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():
+    tracker = ldls.Tracker()
+    place = [((6, 0), True)]
+    stamps_and_categories = [(0.0, 1), (0.1, 3), (0.2, 1), (9.0, 1)]
+    rows = [tracks_of(tracker, [sweep_at(stamp, place, category=kind)]) for stamp, kind in stamps_and_categories]
+    assert rows == [[[1]], [[2]], [[1]], [[3]]]
+
+
+def test_sweeps_without_objects_change_nothing():
+    tracker = ldls.Tracker()
+    seen, empty = [((6, 0), True)], [((6, 0), False)]
+    rows = tracks_of(tracker, [sweep_at(0.1 * k, empty if k % 2 else seen) for k in range(5)])
+    assert rows == [[1], [0], [1], [0], [1]]
+    (result,) = tracker.track([sweep_at(0.6, [((6, 0), False)])], ldls.segment_sweeps([sweep_at(0.6, empty)]))
+    assert result.instances == ()
+
+
+def test_memory_is_that_of_the_last_seconds():
+    tracker = ldls.Tracker()
+    for k in range(30):
+        sweep = sweep_at(float(k), [((6 + 3 * (k % 2), -2 + 4 * (k // 2 % 2)), True)])
+        tracker.track([sweep], ldls.segment_sweeps([sweep], params=PARAMS))
+    assert len(tracker._tracks) <= 4
+
+
+def test_tracks_are_kept_in_files(tmp_path):
+    sweep = sweep_at(0.0, [((6, 0), True)])
+    (result,) = ldls.Tracker().track([sweep], ldls.segment_sweeps([sweep], params=PARAMS))
+    result = replace(result, instances=tuple(replace(instance, track=77) for instance in result.instances))
+    ldls.save(result, tmp_path / "a.npz")
+    assert ldls.read_result(tmp_path / "a.npz").instances == result.instances
+    ldls.save(result, tmp_path / "a.label")
+    assert set(np.fromfile(tmp_path / "a.label", "<u4") >> 16) == {77}
+
+
+def test_misuse_is_named():
+    sweep = sweep_at(0.5, [((6, 0), True)])
+    results = ldls.segment_sweeps([sweep], params=PARAMS)
+    tracker = ldls.Tracker()
+    with pytest.raises(ldls.InputError, match="got 0, expected 1"):
+        tracker.track([sweep], [])
+    tracker.track([sweep], results)
+    with pytest.raises(ldls.InputError, match=r"one of 0\.5 s comes after one of 0\.5 s"):
+        tracker.track([sweep], results)
+
+
+def test_cars_of_a_simulated_drive_keep_their_numbers_though_masks_are_missing():
+    drive = Drive(n_frames=6, seed=5, lidar="vlp-16", segmenter=SegmenterErrors.none(), sensors=SensorErrors.none())
+    generator, tracker = np.random.default_rng(0), ldls.Tracker()
+    frames, results = [drive_frame(drive, number) for number in range(6)], []
+    for start in (0, 3):
+        sweeps = []
+        for frame in frames[start : start + 3]:
+            (image,) = frame.images
+            found = np.flatnonzero(generator.random(len(image.masks)) < 0.8)
+            view = ldls.View(image.masks.select(generator.permutation(found)), image.camera)
+            sweeps.append(ldls.Sweep(frame.points, [view], frame.pose, frame.stamp))
+        results += tracker.track(sweeps, ldls.segment_sweeps(sweeps))
+    numbers = {}
+    for frame, result in zip(frames, results, strict=True):
+        tracks = np.array([0, *(instance.track for instance in result.instances)])[np.maximum(result.labels, 0)]
+        for thing in np.unique(frame.truth.instances[frame.truth.classes == frame.truth.names.index("Car")]):
+            own = tracks[(frame.truth.instances == thing) & (result.labels > 0)]
+            if len(own) >= 20:
+                numbers.setdefault(int(thing), []).append(int(np.bincount(own).argmax()))
+    assert sum(len(own) == 6 for own in numbers.values()) >= 1
+    assert all(len(set(own)) == 1 for own in numbers.values()), numbers
