@@ -71,6 +71,18 @@ def test_an_object_is_itself_after_a_second_without_a_mask_though_it_moves():
     assert (rows[[6, 10], [0, 1]] == 0).all()
 
 
+def test_velocities_are_those_of_the_world():
+    tracker, speed = ldls.Tracker(), 1.2
+    for k in range(12):
+        pose = np.eye(4)
+        pose[0, 3] = 0.3 * k
+        sweep = sweep_at(0.1 * k, [((8, -2), True), ((9, 1 + speed * 0.1 * k), True)], pose=pose)
+        (result,) = tracker.track([sweep], ldls.segment_sweeps([sweep], params=PARAMS))
+    standing, walking = sorted((instance.velocity for instance in result.instances), key=np.linalg.norm)
+    assert standing == (0, 0)
+    assert walking == pytest.approx((0, speed), abs=0.1)
+
+
 def test_a_turn_of_the_lidar_moves_no_object():
     places = [((6, -1.5), True), ((6.5, 1.5), True)]
     sweeps = []
@@ -122,7 +134,8 @@ def test_memory_is_that_of_the_last_seconds():
 def test_tracks_are_kept_in_files(tmp_path):
     sweep = sweep_at(0.0, [((6, 0), True)])
     (result,) = ldls.Tracker().track([sweep], ldls.segment_sweeps([sweep], params=PARAMS))
-    result = replace(result, instances=tuple(replace(instance, track=77) for instance in result.instances))
+    changed = (replace(instance, track=77, velocity=(1.5, -0.25)) for instance in result.instances)
+    result = replace(result, instances=tuple(changed))
     ldls.save(result, tmp_path / "a.npz")
     assert ldls.read_result(tmp_path / "a.npz").instances == result.instances
     ldls.save(result, tmp_path / "a.label")

@@ -82,7 +82,8 @@ def read(path: str | PathLike[str]) -> Segmentation:
 
 def _tracks(result: Segmentation) -> dict[str, NDArray[Any]]:
     tracks = np.array([instance.track for instance in result.instances], np.int64)
-    return {"object_track": tracks} if tracks.any() else {}
+    velocities = np.array([instance.velocity for instance in result.instances]).reshape(-1, 2)
+    return {"object_track": tracks, "object_velocity": velocities} if tracks.any() else {}
 
 
 def _views(result: Segmentation) -> dict[str, NDArray[Any]]:
@@ -136,14 +137,15 @@ def _instances(arrays: Arrays, views: tuple[SeenView, ...]) -> tuple[Instance, .
     for number, seen in enumerate(views):
         for mask, label in enumerate(seen.labels.tolist()):
             sources[label - 1].append((number, mask))
-    tracks = arrays["object_track"].tolist() if "object_track" in arrays else [0] * len(names)
-    parts = zip(
-        arrays["object_category"].tolist(), names, arrays["object_score"].tolist(), sources, tracks, strict=True
+    parts = zip(arrays["object_category"].tolist(), names, arrays["object_score"].tolist(), sources, strict=True)
+    instances = tuple(
+        Instance(label=label, category=category, name=name, score=score, sources=tuple(own))
+        for label, (category, name, score, own) in enumerate(parts, start=1)
     )
-    return tuple(
-        Instance(label=label, category=category, name=name, score=score, sources=tuple(own), track=track)
-        for label, (category, name, score, own, track) in enumerate(parts, start=1)
-    )
+    if "object_track" not in arrays:
+        return instances
+    tracked = zip(instances, arrays["object_track"].tolist(), arrays["object_velocity"].tolist(), strict=True)
+    return tuple(replace(instance, track=track, velocity=(x, y)) for instance, track, (x, y) in tracked)
 
 
 def _read_views(arrays: Arrays) -> tuple[SeenView, ...]:

@@ -35,6 +35,8 @@ class Instance:
         sources: Its masks: number of the view and of the mask in it, both from 0; one a view that shows it, and none
             where only images of other sweeps do.
         track: Number of the object in its drive, from 1, the same in all sweeps; 0 where nobody tracked it.
+        velocity: Metres a second along x and y of the world in which the sweeps' poses are; 0 of what stands still, and
+            where nobody tracked it.
     """
 
     label: int
@@ -43,6 +45,7 @@ class Instance:
     score: float
     sources: tuple[tuple[int, int], ...]
     track: int = 0
+    velocity: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

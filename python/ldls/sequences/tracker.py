@@ -1,7 +1,7 @@
 """The objects of a drive: one number for each in all sweeps, through gaps of some seconds.
 
 Seen from above, an object goes on as itself where its points lie near those of a track, moved to the moment by its
-velocity, which is constant over a second. Pairs are chosen together (linear assignment), so that neighbours do not
+velocity, which is constant over some seconds. Pairs are chosen together (linear assignment), so that neighbours do not
 swap. Within sweeps that were segmented together an object keeps its label, and so its number.
 """
 
@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import InputError
-from ldls.segmentation import Segmentation
+from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.sweeps import Sweep
 
-LONGEST_GAP_S = 3.0
+LONGEST_GAP_S = 5.0
 """Time without a point after which a track ends."""
-NEAR_M = 1.5
+NEAR_M = 2.0
 """Distance from above up to which an object may be a track."""
-MEMORY_S = 1.0
+MEMORY_S = 2.0
 """Time over which a velocity is constant."""
 SLOWEST_M_S = 0.5
 """What is slower stands still: the middle of what is visible of it moves."""
@@ -91,7 +91,7 @@ class Tracker:
 
     @checked
     def track(self, sweeps: Sequence[Sweep], results: Sequence[Segmentation]) -> tuple[Segmentation, ...]:
-        """Return the results with the track of each instance that has points in any of the sweeps.
+        """Return the results with track and velocity of each instance that has points in any of the sweeps.
 
         Args:
             sweeps: The next sweeps of the drive, in the order of their stamps.
@@ -109,11 +109,13 @@ class Tracker:
         for sweep, result in zip(sweeps, results, strict=True):
             self._stamp = sweep.stamp
             self._follow(sweep, result, by_label)
-        numbers = {label: track.number for label, track in by_label.items()}
-        return tuple(
-            replace(result, instances=tuple(replace(i, track=numbers.get(i.label, 0)) for i in result.instances))
-            for result in results
-        )
+        known = {label: (track.number, track.velocity().tolist()) for label, track in by_label.items()}
+
+        def tracked(instance: Instance) -> Instance:
+            number, (x, y) = known.get(instance.label, (0, (0.0, 0.0)))
+            return replace(instance, track=number, velocity=(x, y))
+
+        return tuple(replace(result, instances=tuple(map(tracked, result.instances))) for result in results)
 
     def _follow(self, sweep: Sweep, result: Segmentation, by_label: dict[int, _Track]) -> None:
         """Take the tracks one sweep further; `by_label` has those of the labels that are known."""
