@@ -97,7 +97,9 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
 
 def pixels_taken(views, seen, groups, rows):
     """Rows and pixels of the points that take their pixels from each view: those of its moment, but for points where it
-    has no mask and the nearest view of another moment shows an object that two masks have and its moment misses."""
+    has no mask and the nearest view of another moment shows an object that its moment overlooks."""
+    times = sorted(set(rows))
+    moment = [times.index(own) for own in rows]
 
     def masks_at(view, row):
         (at,) = np.flatnonzero(seen[view][0] == row)
@@ -108,12 +110,16 @@ def pixels_taken(views, seen, groups, rows):
         if row not in seen[other][0]:
             return False
         shown = [next(g for g in groups if (other, m) in g) for m in masks_at(other, row)]
-        return any(len(g) >= 2 and all(rows[member] != rows[view] for member, _ in g) for g in shown)
+        return any(overlooked([moment[member] - moment[view] for member, _ in group]) for group in shown)
+
+    def overlooked(later):
+        around = min(later) < 0 < max(later)
+        return len(later) >= 2 and 0 not in later and (around or -1 in later or 1 in later)
 
     taken = [[] for _ in views]
     for view in range(len(views)):
         others = [other for other in range(len(views)) if rows[other] != rows[view]]
-        others.sort(key=lambda other: (abs(other - view), other > view))
+        others.sort(key=lambda other: (abs(moment[other] - moment[view]), moment[other]))
         for row in seen[view][0][(seen[view][0] >= rows[view][0]) & (seen[view][0] < rows[view][1])]:
             lenders = [] if masks_at(view, row) else [other for other in others if lends(other, view, row)]
             taken[lenders[0] if lenders else view].append(row)

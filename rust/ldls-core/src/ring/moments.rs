@@ -1,17 +1,18 @@
 //! Images of several moments: which of them a point takes its pixels from.
 //!
-//! A point takes those of the images of its own moment, for what moves is elsewhere in the others. Where these miss an
-//! object, of which at least two others have a mask, points on its place take those of the nearest of these: a segmenter
-//! that overlooks an object says nothing of it, though its pixels look like background.
+//! A point takes those of the images of its own moment, for what moves is elsewhere in the others. Where these overlook an
+//! object, points on its place take those of the nearest other that shows it: the pixels look like background and say
+//! nothing. An object is overlooked where at least two other images show it, at the moment before or after, or at some
+//! before and some after; a single mask may be a segmenter's mistake, and what is not seen again may have left.
 
 use super::same_objects::Objects;
 use super::view::View;
 use crate::Result;
 use crate::memory::push;
 use crate::projection::Sighting;
-use std::cmp::Reverse;
+use std::collections::BTreeSet;
 
-/// Masks from which on an object is believed to be where an image has none: a single one may be a segmenter's mistake.
+/// Masks from which on an object may be where an image has none.
 const MASKS_OF_AN_OBJECT: usize = 2;
 
 /// What is known of the points in view before each has its images.
@@ -34,19 +35,19 @@ impl Moments<'_> {
     pub(super) fn sightings(&self, own: &[[usize; 2]]) -> Result<Vec<Sighting>> {
         let mut taken: Vec<Vec<(u32, u32)>> = vec![Vec::new(); self.views.len()];
         for (image, &[start, end]) in own.iter().enumerate() {
-            let lenders = self.lenders(image);
+            let (lenders, objects) = self.lenders(image);
             for (slot, &point) in (0..).zip(&self.sightings[image].seen) {
                 if !(start..end).contains(&(point as usize)) {
                     continue;
                 }
                 // a mask of its own moment knows better
                 let free = !lenders.is_empty() && self.instances[image][slot as usize].is_empty();
-                let lends = |(lender, objects): &(usize, Vec<bool>)| {
-                    let slot = self.slots[*lender][point as usize];
-                    let shows = |&m: &u32| objects[self.labels[*lender][m as usize] as usize];
+                let lends = |&lender: &usize| {
+                    let slot = self.slots[lender][point as usize];
+                    let shows = |&m: &u32| objects[self.labels[lender][m as usize] as usize];
                     let there = slot != self.unseen
-                        && self.instances[*lender][slot as usize].iter().any(shows);
-                    there.then_some((*lender, slot))
+                        && self.instances[lender][slot as usize].iter().any(shows);
+                    there.then_some((lender, slot))
                 };
                 let (image, slot) = lenders
                     .iter()
@@ -69,25 +70,36 @@ impl Moments<'_> {
         Ok(self.sightings.iter().zip(taken).map(sighting).collect())
     }
 
-    /// The images of other moments, the nearest first, and by label the objects that each shows and that those of the
-    /// moment of `image` miss.
-    fn lenders(&self, image: usize) -> Vec<(usize, Vec<bool>)> {
-        let rows = self.views[image].rows;
-        let mut missed = vec![false; self.objects.len() + 1];
-        for (label, masks) in (1..).zip(self.objects) {
-            let shown = masks
-                .iter()
-                .any(|&(other, _)| self.views[other].rows == rows);
-            missed[label] = !shown && masks.len() >= MASKS_OF_AN_OBJECT;
+    /// The images of other moments, the nearest first and of these the earlier, and by label the objects that those of the
+    /// moment of `image` overlook; none where they overlook none.
+    fn lenders(&self, image: usize) -> (Vec<usize>, Vec<bool>) {
+        let moment = |image: usize| {
+            let starts = self.views.iter().map(|view| view.rows[0]);
+            let earlier = starts.filter(|&start| start < self.views[image].rows[0]);
+            earlier.collect::<BTreeSet<_>>().len()
+        };
+        let moments: Vec<usize> = (0..self.views.len()).map(moment).collect();
+        let own = moments[image];
+        let overlooked = |masks: &Vec<(usize, u32)>| {
+            let shown = || masks.iter().map(|&(image, _)| moments[image]);
+            let near = shown().any(|moment| moment.abs_diff(own) == 1);
+            let around = shown().any(|moment| moment < own) && shown().any(|moment| moment > own);
+            masks.len() >= MASKS_OF_AN_OBJECT
+                && shown().all(|moment| moment != own)
+                && (near || around)
+        };
+        let objects: Vec<bool> = [false]
+            .into_iter()
+            .chain(self.objects.iter().map(overlooked))
+            .collect();
+        let mut others: Vec<usize> = (0..self.views.len())
+            .filter(|&other| moments[other] != own)
+            .collect();
+        others.sort_by_key(|&other| (moments[other].abs_diff(own), moments[other]));
+        if !objects.contains(&true) {
+            others.clear();
         }
-        if !missed.contains(&true) {
-            return Vec::new();
-        }
-        let others = (0..self.views.len()).filter(|&other| self.views[other].rows != rows);
-        let mut lenders: Vec<_> = others.map(|other| (other, missed.clone())).collect();
-        // of equally near ones the earlier
-        lenders.sort_by_key(|&(other, _)| (other.abs_diff(image), Reverse(other < image)));
-        lenders
+        (others, objects)
     }
 }
 
