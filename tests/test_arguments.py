@@ -36,6 +36,7 @@ def world():
     A, b = stages.normalize_rows(graph, labels)
     z = stages.diffuse(A, b)
     labeling = ldls.labeling.Labeling.from_segmentation(result)
+    street = generator.uniform([-20, -20, -2], [20, 20, 2], (4000, 3))
     return SimpleNamespace(**locals())
 
 
@@ -248,6 +249,7 @@ CALLS = {
     ),
     "Trajectory": (ldls.Trajectory, {"stamps": [0, 0.1], "poses": np.stack([np.eye(4)] * 2)}),
     "Trajectory.at": (ldls.Trajectory([0, 0.1], np.stack([np.eye(4)] * 2)).at, {"stamp": 0.05}),
+    "odometry": (ldls.odometry, {"sweeps": [(0.0, W.street), (0.1, W.street)]}),
     "Labeling": (
         ldls.labeling.Labeling,
         {"classes": [0, 1], "instances": [0, 1], "ignored": [False, True], "names": NAMES},

@@ -52,10 +52,11 @@ if TYPE_CHECKING:
         Segmentation as Segmentation,
         SegmentedObject as SegmentedObject,
     )
-    from ldls.sequences import (
+    from ldls.sequences import (  # type: ignore[no-redef]
         Sweep as Sweep,
         Tracker as Tracker,
         Trajectory as Trajectory,
+        odometry as odometry,
         segment_sweeps as segment_sweeps,
     )
     from ldls.view import SeenView as SeenView, View as View
@@ -98,7 +99,7 @@ _NAMES = {
     "ldls.masks": ("InstanceMasks",),
     "ldls.params": ("Params",),
     "ldls.segmentation": ("Instance", "OrientedBox", "Report", "Segmentation", "SegmentedObject"),
-    "ldls.sequences": ("Sweep", "Tracker", "Trajectory", "segment_sweeps"),
+    "ldls.sequences": ("Sweep", "Tracker", "Trajectory", "odometry", "segment_sweeps"),
     "ldls.view": ("SeenView", "View"),
 }
 """The public names, by the module that they come from."""

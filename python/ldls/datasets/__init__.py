@@ -13,6 +13,7 @@ from ldls.datasets.kitti_odometry import KittiOdometrySource
 from ldls.datasets.kitti_raw import KittiRawSource
 from ldls.datasets.nuscenes import NuScenesSource
 from ldls.datasets.nuscenes_frame import Box2d, NuScenesFrameSource, read_boxes_2d
+from ldls.datasets.odometry import odometry_of
 from ldls.datasets.registry import SOURCES, SourceClass, open_source
 from ldls.datasets.rosbag import RosBag
 
@@ -30,6 +31,7 @@ __all__ = [
     "RosBag",
     "Source",
     "SourceClass",
+    "odometry_of",
     "open_source",
     "read_boxes_2d",
 ]

@@ -1,0 +1,131 @@
+"""The way of a lidar from its sweeps alone, by KISS-ICP.
+
+Source: Vizzo et al., "KISS-ICP: In Defense of Point-to-Point ICP", RA-L 2023, whose Python package does the work. It is
+given points that stand alone: lines on the ground go with the lidar, and laid on one another they say that it hardly
+moved. What lies low keeps the way level afterwards (`ground_level`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls._optional import require
+from ldls.camera.rigid import inverse
+from ldls.checks import checked, shown
+from ldls.cloud import Points, as_points, finite_rows
+from ldls.errors import InputError, PoseError, within
+from ldls.sequences.grid import cell_keys
+from ldls.sequences.ground_level import levelled, split_standing
+from ldls.sequences.trajectory import Trajectory
+
+FARTHEST_M = 100.0
+"""Points farther away are too sparse to be found again."""
+VOXEL_M = 0.5
+POINTS_A_VOXEL = 20
+LEAST_POINTS = 100
+"""Fewer points do not say how the lidar moved."""
+PLACE_M = 1.0
+LEAST_SHARE = 0.1
+"""Share of the cubes of `PLACE_M` of a sweep, that of fewer cubes, that the next has points in, or the way is lost."""
+
+
+@checked
+def odometry(sweeps: Iterable[tuple[float, Points]]) -> Trajectory:
+    """Return the poses of the lidar at sweeps of a drive, found by laying each on those before it.
+
+    The first pose is the identity, so that the world is the lidar's frame at the first sweep. Points are taken as they
+    are, all of the moment of their sweep: the library's own undoing of motion is off, for points have no times. The
+    same sweeps give the same poses, on one thread. Errors add up along the way.
+
+    Args:
+        sweeps: Stamp in seconds, ascending, and points (N, >= 3) in metres, z up, of each sweep; two or more, and
+            neighbours some tenths of a second apart. They are taken one after the other.
+
+    Raises:
+        PoseError: Stamps do not ascend, or a sweep has nothing in common with the one before it.
+        InputError: There are fewer than two sweeps, or one has too few finite points that stand on the ground.
+        ImportError: `ldls[odometry]` is not installed.
+    """
+    way = _Way()
+    for number, sweep in enumerate(sweeps):
+        stamp, points = _pair(number, sweep)
+        with within(f"sweep {number}"):
+            way.go_on(stamp, as_points(points))
+    if len(way.stamps) < 2:
+        raise InputError(f"sweeps: got {len(way.stamps)}, expected 2 or more")
+    return Trajectory(np.array(way.stamps), np.array(way.poses))
+
+
+class _Way:
+    """Stamps and poses so far, and what is known of the last sweep."""
+
+    def __init__(self) -> None:
+        self.stamps: list[float] = []
+        self.poses: list[NDArray[np.float64]] = []
+        self._registration = _registration()
+        self._low = np.zeros((0, 3))
+        self._places = np.zeros(0, np.int64)
+
+    def go_on(self, stamp: float, points: Points) -> None:
+        """Take the way to the next sweep."""
+        if self.stamps and not stamp > self.stamps[-1]:
+            raise PoseError(f"its stamp {stamp:.6f} s is not after that before it, {self.stamps[-1]:.6f} s; sort them")
+        xyz = points[finite_rows(points), :3].astype(np.float64)
+        ranges_m = np.linalg.norm(xyz, axis=1)
+        standing, low = split_standing(xyz[(ranges_m > 0) & (ranges_m < FARTHEST_M)])
+        if len(standing) < LEAST_POINTS:
+            raise InputError(
+                f"of {len(points):,} points {len(standing)} are finite, nearer than {FARTHEST_M:g} m and stand, "
+                f"expected {LEAST_POINTS} or more; leave this sweep out, or turn points so that z is up"
+            )
+        before: NDArray[np.float64] = self._registration.last_pose
+        self._registration.register_frame(standing, np.zeros(0))
+        pose: NDArray[np.float64] = self._registration.last_pose
+        self._check_common(stamp, standing, pose)
+        if self.poses:
+            # what was corrected in earlier poses goes on, for the library does not know of it
+            moved = self.poses[-1] @ inverse(before) @ pose
+            pose = levelled(moved, low, self.poses[-1], self._low)
+        self.stamps.append(stamp)
+        self.poses.append(pose)
+        self._low = low
+
+    def _check_common(self, stamp: float, standing: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
+        places = np.unique(cell_keys(standing @ pose[:3, :3].T + pose[:3, 3], PLACE_M))
+        common = len(np.intersect1d(places, self._places, assume_unique=True))
+        if self.stamps and common < LEAST_SHARE * min(len(places), len(self._places)):
+            raise PoseError(
+                f"the way is lost at {stamp:.6f} s: of {len(places)} places {common} are those of the sweep at "
+                f"{self.stamps[-1]:.6f} s; take sweeps of one drive without gaps, or poses of another origin"
+            )
+        self._places = places
+
+
+def _registration() -> Any:  # noqa: ANN401
+    """KISS-ICP with all of its parameters, of which none is left to the environment, and one thread."""
+    settings = require("kiss_icp.config.config", "odometry")
+    config = require("kiss_icp.config", "odometry").KISSConfig(
+        data=settings.DataConfig(max_range=FARTHEST_M, min_range=0.0, deskew=False),
+        mapping=settings.MappingConfig(voxel_size=VOXEL_M, max_points_per_voxel=POINTS_A_VOXEL),
+        registration=settings.RegistrationConfig(max_num_iterations=500, convergence_criterion=1e-4, max_num_threads=1),
+        adaptive_threshold=settings.AdaptiveThresholdConfig(
+            fixed_threshold=None, initial_threshold=2.0, min_motion_th=0.1
+        ),
+    )
+    return require("kiss_icp.kiss_icp", "odometry").KissICP(config)
+
+
+def _pair(number: int, sweep: object) -> tuple[float, Points]:
+    if not (isinstance(sweep, tuple | list) and len(sweep) == 2):
+        raise InputError(f"sweeps: sweep {number} is {shown(sweep)}, expected a pair (stamp, points)")
+    try:
+        stamp = float(sweep[0])
+    except (TypeError, ValueError, OverflowError):
+        stamp = float("nan")
+    if isinstance(sweep[0], str | bool) or not np.isfinite(stamp):
+        raise InputError(f"sweeps: stamp of sweep {number} is {shown(sweep[0])}, expected seconds")
+    return stamp, sweep[1]

@@ -1,0 +1,169 @@
+"""The way of a lidar from its sweeps: against true poses of simulated drives, and on real sweeps."""
+
+import re
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+import ldls
+from ldls.datasets import odometry_of, open_source
+from ldls.simulation import Drive, drive_frame
+from ldls.simulation.drives import drive_poses
+
+pytest.importorskip("kiss_icp", reason="the extra odometry is not installed")
+
+DRIVE = Drive(n_frames=20, seed=2, lidar="hdl-64e", turn_deg_s=15.0)
+"""Over a slope and to the left."""
+N_FRAMES = 8
+
+
+@pytest.fixture(scope="module")
+def sweeps():
+    return [(0.1 * number, drive_frame(DRIVE, number).points) for number in range(N_FRAMES)]
+
+
+@pytest.fixture(scope="module")
+def trajectory(sweeps):
+    return ldls.odometry(sweeps)
+
+
+def test_poses_are_those_of_the_drive(trajectory):
+    true = drive_poses(DRIVE)[:N_FRAMES]
+    assert np.array_equal(trajectory.poses[0], np.eye(4))
+    np.testing.assert_allclose(trajectory.stamps, 0.1 * np.arange(N_FRAMES))
+    assert np.linalg.norm(true[-1, :3, 3]) > 3
+    assert np.linalg.norm(trajectory.poses[:, :3, 3] - true[:, :3, 3], axis=1).max() < 0.04
+    turns = Rotation.from_matrix(true[:, :3, :3].transpose(0, 2, 1) @ trajectory.poses[:, :3, :3])
+    assert np.degrees(turns.magnitude()).max() < 0.1
+
+
+def test_the_same_sweeps_give_the_same_bits_whatever_else_the_points_hold(sweeps, trajectory, monkeypatch):
+    monkeypatch.setenv("KISS_ICP_DATA", '{"max_range": 5}')
+    points = np.column_stack([sweeps[3][1], np.zeros(len(sweeps[3][1]), np.float32)])
+    odd = np.full((2, points.shape[1]), np.nan, np.float32)
+    odd[1] = 0
+    some = [*sweeps[:3], (sweeps[3][0], np.vstack([odd, points]))]
+    assert ldls.odometry(iter(some)).poses.tobytes() == trajectory.poses[:4].tobytes()
+
+
+def test_a_lidar_of_few_lines_does_not_turn_by_itself():
+    drive = Drive(n_frames=10, seed=2, lidar="vlp-16", camera="robot", turn_deg_s=20.0)
+    found = ldls.odometry((0.1 * k, drive_frame(drive, k).points) for k in range(N_FRAMES))
+    true = drive_poses(drive)[:N_FRAMES]
+    assert np.linalg.norm(found.poses[:, :3, 3] - true[:, :3, 3], axis=1).max() < 0.06
+    turns = Rotation.from_matrix(true[:, :3, :3].transpose(0, 2, 1) @ found.poses[:, :3, :3])
+    # not levelled, it pitches by 0.9 degrees
+    assert np.degrees(turns.magnitude()).max() < 0.4
+
+
+def street(seed=0):
+    """Walls to both sides and across, and poles."""
+    generator = np.random.default_rng(seed)
+    ground = np.column_stack([generator.uniform(-30, 30, (4000, 2)), np.full(4000, -1.7)])
+    wall = np.column_stack([generator.uniform(-30, 30, 3000), np.full(3000, 8), generator.uniform(-1.7, 4, 3000)])
+    across = np.column_stack([np.full(3000, 25), generator.uniform(-30, 30, 3000), generator.uniform(-1.7, 4, 3000)])
+    return np.vstack([ground, wall, across])
+
+
+NO_PLACE = street() * np.array([0.2, 0.2, 1]) - np.array([70, 30, 0])
+
+
+@pytest.mark.parametrize(
+    ("sweeps", "error", "message"),
+    [
+        pytest.param([], ldls.InputError, "sweeps: got 0, expected 2 or more", id="none"),
+        pytest.param([(0, street())], ldls.InputError, "sweeps: got 1, expected 2 or more", id="one"),
+        pytest.param([(0, street()), (0.1, np.full((9, 3), np.nan))], ldls.InputError,
+                     "sweep 1: of 9 points 0 are finite, nearer than 100 m and stand, expected 100", id="NaN"),
+        pytest.param([(0, np.zeros((0, 3)))], ldls.InputError, "sweep 0: of 0 points", id="empty"),
+        pytest.param([(0, street() * [1, 1, 0])], ldls.InputError, "points 0 are finite, nearer", id="flat"),
+        pytest.param([(0, street() + np.array([1e30, 0, 0]))], ldls.InputError, "points 0 are finite", id="far"),
+        pytest.param([(0, street()), (0, street())], ldls.PoseError,
+                     "sweep 1: its stamp 0.000000 s is not after that before it", id="stamps"),
+        pytest.param([(0, street()), (0.1, NO_PLACE)], ldls.PoseError, "sweep 1: the way is lost at 0.1", id="lost"),
+        pytest.param([street()], ldls.InputError, "sweep 0 is an array of shape (10000, 3), exp", id="without stamps"),
+        pytest.param([("a", street())], ldls.InputError, "stamp of sweep 0 is 'a', expected seconds", id="text"),
+        pytest.param([(np.nan, street())], ldls.InputError, "stamp of sweep 0 is nan", id="NaN stamp"),
+        pytest.param([(0, street().astype(int))], ldls.DtypeError, "sweep 0: points: expected float32", id="integers"),
+    ],
+)  # fmt: skip
+def test_what_has_no_way_is_refused(sweeps, error, message):
+    with pytest.raises(error, match=re.escape(message)):
+        ldls.odometry(sweeps)
+
+
+def test_without_the_library_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "kiss_icp.config.config", None)
+    with pytest.raises(ImportError, match=r"ldls\[odometry\]"):
+        ldls.odometry([])
+
+
+class Frames(list):
+    """A source of so many frames, of which one is asked for at a time."""
+
+    path = "drive"
+
+
+def frames(stamps):
+    return Frames(
+        SimpleNamespace(name=str(k), stamp=stamp, points=street(k) - np.array([0.3 * k, 0, 0]))
+        for k, stamp in enumerate(stamps)
+    )
+
+
+def test_a_source_without_stamps_has_ten_sweeps_a_second():
+    assert odometry_of(frames([None] * 3)).stamps.tolist() == [0, 0.1, 0.2]
+    way = odometry_of(frames([5.0, 5.2, 5.3]))
+    assert way.stamps.tolist() == [5.0, 5.2, 5.3]
+    np.testing.assert_allclose(way.poses[:, 0, 3], [0, 0.3, 0.6], atol=0.1)
+
+
+@pytest.mark.parametrize("stamps", [[0.0, None], [None, 0.1]])
+def test_stamps_are_those_of_all_frames_or_of_none(stamps):
+    with pytest.raises(ldls.SourceError, match=r"^drive: frame 1 has (no|a) stamp, unlike those before it"):
+        odometry_of(frames(stamps))
+
+
+def test_faults_of_a_frame_name_the_source():
+    with pytest.raises(ldls.InputError, match="^drive: sweeps: got 1"):
+        odometry_of(frames([0.0]))
+
+
+@pytest.fixture(scope="module")
+def real_drive(data_folder):
+    folder = data_folder / "real/kitti_raw/2011_09_26"
+    if not folder.is_dir():
+        pytest.skip("LDLS_TEST_DATA has no folder real/kitti_raw")
+    return open_source(folder)
+
+
+def across_the_way(first, other):
+    """Distances of standing points of one sweep to faces across the way of another, the car ahead left out."""
+    tree = KDTree(first)
+    _, near = tree.query(first, 12)
+    off = first[near] - first[near].mean(axis=1, keepdims=True)
+    extents, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", off, off) / 12)
+    normals = axes[:, :, 0]
+    faces = (extents[:, 0] < 0.03**2) & (extents[:, 1] > 9 * extents[:, 0]) & (np.abs(normals[:, 0]) > 0.7)
+    distances, nearest = tree.query(other)
+    fits = (distances < 1) & faces[nearest] & ~((np.abs(other[:, 1]) < 1.3) & (other[:, 0] > 3) & (other[:, 0] < 20))
+    return np.abs(np.sum((other - first[near].mean(axis=1)[nearest]) * normals[nearest], axis=1))[fits]
+
+
+def test_what_stands_still_in_real_sweeps_coincides(real_drive):
+    """Rear ends of cars that wait, and walls: they show how far the car rolled, 0.74 m; the car ahead rolls too."""
+    way = odometry_of(real_drive)
+    clouds = []
+    for pose, frame in zip(way.poses, real_drive, strict=True):
+        xyz = frame.points[:, :3].astype(float)
+        xyz = xyz[(xyz[:, 2] > -0.73) & (np.linalg.norm(xyz, axis=1) < 30)]
+        clouds.append((xyz, xyz @ pose[:3, :3].T + pose[:3, 3]))
+    distances, _ = KDTree(clouds[0][1]).query(clouds[3][1])
+    assert np.median(distances) < 0.05
+    apart = across_the_way(clouds[0][1], clouds[3][1])
+    assert len(apart) > 500 and np.median(apart) < 0.05
+    assert np.median(across_the_way(clouds[0][0], clouds[3][0])) > 0.05, "lines alone would coincide, too"
