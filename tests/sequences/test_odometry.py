@@ -1,4 +1,4 @@
-"""The way of a lidar from its sweeps: against true poses of simulated drives, and on real sweeps."""
+"""The way of a lidar from its sweeps: against true poses of simulated drives, and what is refused."""
 
 import re
 import sys
@@ -6,11 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 import ldls
-from ldls.datasets import odometry_of, open_source
+from ldls.datasets import odometry_of
 from ldls.simulation import Drive, drive_frame
 from ldls.simulation.drives import drive_poses
 
@@ -131,39 +130,3 @@ def test_stamps_are_those_of_all_frames_or_of_none(stamps):
 def test_faults_of_a_frame_name_the_source():
     with pytest.raises(ldls.InputError, match="^drive: sweeps: got 1"):
         odometry_of(frames([0.0]))
-
-
-@pytest.fixture(scope="module")
-def real_drive(data_folder):
-    folder = data_folder / "real/kitti_raw/2011_09_26"
-    if not folder.is_dir():
-        pytest.skip("LDLS_TEST_DATA has no folder real/kitti_raw")
-    return open_source(folder)
-
-
-def across_the_way(first, other):
-    """Distances of standing points of one sweep to faces across the way of another, the car ahead left out."""
-    tree = KDTree(first)
-    _, near = tree.query(first, 12)
-    off = first[near] - first[near].mean(axis=1, keepdims=True)
-    extents, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", off, off) / 12)
-    normals = axes[:, :, 0]
-    faces = (extents[:, 0] < 0.03**2) & (extents[:, 1] > 9 * extents[:, 0]) & (np.abs(normals[:, 0]) > 0.7)
-    distances, nearest = tree.query(other)
-    fits = (distances < 1) & faces[nearest] & ~((np.abs(other[:, 1]) < 1.3) & (other[:, 0] > 3) & (other[:, 0] < 20))
-    return np.abs(np.sum((other - first[near].mean(axis=1)[nearest]) * normals[nearest], axis=1))[fits]
-
-
-def test_what_stands_still_in_real_sweeps_coincides(real_drive):
-    """Rear ends of cars that wait, and walls: they show how far the car rolled, 0.74 m; the car ahead rolls too."""
-    way = odometry_of(real_drive)
-    clouds = []
-    for pose, frame in zip(way.poses, real_drive, strict=True):
-        xyz = frame.points[:, :3].astype(float)
-        xyz = xyz[(xyz[:, 2] > -0.73) & (np.linalg.norm(xyz, axis=1) < 30)]
-        clouds.append((xyz, xyz @ pose[:3, :3].T + pose[:3, 3]))
-    distances, _ = KDTree(clouds[0][1]).query(clouds[3][1])
-    assert np.median(distances) < 0.05
-    apart = across_the_way(clouds[0][1], clouds[3][1])
-    assert len(apart) > 500 and np.median(apart) < 0.05
-    assert np.median(across_the_way(clouds[0][0], clouds[3][0])) > 0.05, "lines alone would coincide, too"
