@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,6 +37,8 @@ def world():
     A, b = stages.normalize_rows(graph, labels)
     z = stages.diffuse(A, b)
     labeling = ldls.labeling.Labeling.from_segmentation(result)
+    sweep = ldls.Sweep(points, [], np.eye(4), 0.0)
+    tracked = replace(result, instances=tuple(replace(each, track=each.label) for each in result.instances))
     street = generator.uniform([-20, -20, -2], [20, 20, 2], (4000, 3))
     return SimpleNamespace(**locals())
 
@@ -250,6 +253,8 @@ CALLS = {
     "Trajectory": (ldls.Trajectory, {"stamps": [0, 0.1], "poses": np.stack([np.eye(4)] * 2)}),
     "Trajectory.at": (ldls.Trajectory([0, 0.1], np.stack([np.eye(4)] * 2)).at, {"stamp": 0.05}),
     "odometry": (ldls.odometry, {"sweeps": [(0.0, W.street), (0.1, W.street)]}),
+    "LabelledMap": (ldls.LabelledMap, {"voxel_m": 0.1}),
+    "LabelledMap.add": (ldls.LabelledMap().add, {"sweep": W.sweep, "result": W.tracked}),
     "Labeling": (
         ldls.labeling.Labeling,
         {"classes": [0, 1], "instances": [0, 1], "ignored": [False, True], "names": NAMES},

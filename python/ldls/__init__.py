@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         SegmentedObject as SegmentedObject,
     )
     from ldls.sequences import (  # type: ignore[no-redef]
+        LabelledMap as LabelledMap,
         Sweep as Sweep,
         Tracker as Tracker,
         Trajectory as Trajectory,
@@ -99,7 +100,7 @@ _NAMES = {
     "ldls.masks": ("InstanceMasks",),
     "ldls.params": ("Params",),
     "ldls.segmentation": ("Instance", "OrientedBox", "Report", "Segmentation", "SegmentedObject"),
-    "ldls.sequences": ("Sweep", "Tracker", "Trajectory", "odometry", "segment_sweeps"),
+    "ldls.sequences": ("LabelledMap", "Sweep", "Tracker", "Trajectory", "odometry", "segment_sweeps"),
     "ldls.view": ("SeenView", "View"),
 }
 """The public names, by the module that they come from."""

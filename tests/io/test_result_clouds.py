@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import ldls
+from ldls.palette import category_colour
 
 
 def segmented(scene, dtype=np.float32, shift=(0, 0, 0), **changes):
@@ -200,3 +201,50 @@ def test_missing_libraries_name_their_extra(result, tmp_path, monkeypatch, suffi
     with pytest.raises(ImportError, match=rf"ldls\[{extra}\]"):
         ldls.save(result, tmp_path / f"a{suffix}")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def places(result):
+    """A map of the result: a person of track 7 and a car of track 5."""
+    instances = tuple(replace(i, track=track) for i, track in zip(result.instances, (7, 5), strict=True))
+    drawn = ldls.LabelledMap(0.1)
+    drawn.add(ldls.Sweep(result.points, [], translation([5e5, 5.4e6, 0]), 0.0), replace(result, instances=instances))
+    return drawn
+
+
+def test_maps_are_clouds(places, tmp_path):
+    pypcd4 = pytest.importorskip("pypcd4", reason="the extra pcd is not installed")
+    laspy = pytest.importorskip("laspy", reason="the extra las is not installed")
+    assert set(zip(places.categories.tolist(), places.tracks.tolist(), strict=True)) == {(0, 0), (1, 7), (3, 5)}
+    for ending in ("ply", "pcd", "las", "LAZ"):
+        ldls.save(places, tmp_path / f"a.{ending}")
+        found = ldls.read_points(tmp_path / f"a.{ending}")[:, :3]
+        np.testing.assert_allclose(found, places.points, rtol=0, atol=6e-5 if ending in ("las", "LAZ") else 0)
+    cloud = pypcd4.PointCloud.from_path(tmp_path / "a.pcd")
+    assert cloud.fields == ("x", "y", "z", "label", "instance", "confidence", "rgb")
+    las = laspy.read(tmp_path / "a.las")
+    assert las.header.are_points_compressed is False
+    for categories, tracks, confidence, colours in (
+        (*(cloud.pc_data[name] for name in ("label", "instance", "confidence")), decoded(pypcd4, cloud)),
+        (las.category, las.instance, las.confidence, np.stack([las.red, las.green, las.blue], axis=1) // 257),
+    ):
+        np.testing.assert_array_equal(categories, places.categories)
+        np.testing.assert_array_equal(tracks, places.tracks)
+        np.testing.assert_array_equal(confidence, places.confidence)
+        for track, category in ((0, None), (7, 1), (5, 3)):
+            expected = (128, 128, 128) if category is None else category_colour(category)
+            assert {tuple(each) for each in colours[places.tracks == track].tolist()} == {expected}
+
+
+def decoded(pypcd4, cloud):
+    return np.asarray(pypcd4.PointCloud.decode_rgb(cloud.pc_data["rgb"]), int)
+
+
+def test_maps_have_no_other_formats_and_no_options(places, tmp_path):
+    with pytest.raises(ldls.UnsupportedFormatError, match=r"cannot write a map to '.npz' files, expected .ply, .pcd"):
+        ldls.save(places, tmp_path / "a.npz")
+    with pytest.raises(ldls.ParameterError, match=r"image_id: no option of .ply maps"):
+        ldls.save(places, tmp_path / "a.ply", image_id=1)
+    ldls.save(ldls.LabelledMap(), tmp_path / "empty.ply")
+    assert ldls.read_points(tmp_path / "empty.ply").shape == (0, 3)
+    assert [path.name for path in tmp_path.iterdir()] == ["empty.ply"]

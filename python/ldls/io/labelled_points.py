@@ -7,23 +7,30 @@ from numpy.typing import NDArray
 
 from ldls.palette import label_colours
 from ldls.segmentation import Segmentation
+from ldls.sequences import LabelledMap
 
+Labelled = Segmentation | LabelledMap
+"""What has points with labels."""
 POSITION = ("x", "y", "z", "intensity")
 CHANNELS = ("red", "green", "blue")
 
 
-def positions(result: Segmentation) -> dict[str, NDArray[np.floating]]:
+def positions(result: Labelled) -> dict[str, NDArray[np.floating]]:
     """(N,) x, y, z in metres and, where the cloud has a fourth column, intensity, in the precision of the cloud."""
     return dict(zip(POSITION, result.points.T, strict=False))
 
 
-def instances(result: Segmentation) -> NDArray[np.uint32]:
-    """(N,) uint32: label of each point, 0 for background and out of view."""
+def instances(result: Labelled) -> NDArray[np.uint32]:
+    """(N,) uint32: label of each point, of a map its track; 0 for background and out of view."""
+    if isinstance(result, LabelledMap):
+        return result.tracks.astype(np.uint32)
     return np.maximum(result.labels, 0).astype(np.uint32)
 
 
-def colors(result: Segmentation) -> NDArray[np.uint8]:
+def colors(result: Labelled) -> NDArray[np.uint8]:
     """(N, 3) uint8: red, green and blue of each point, grey for background and out of view."""
+    if isinstance(result, LabelledMap):
+        return _map_colors(result)
     colours: NDArray[np.uint8] = result.per_point(label_colours(instance.category for instance in result.instances))
     return colours
 
@@ -31,3 +38,13 @@ def colors(result: Segmentation) -> NDArray[np.uint8]:
 def names(result: Segmentation) -> list[str | None]:
     """Category name of each label 0, 1, ..., and of -1 at the end; None for background and out of view."""
     return [None, *(instance.name for instance in result.instances), None]
+
+
+def _map_colors(places: LabelledMap) -> NDArray[np.uint8]:
+    """As of a result whose instances are the tracks of the map, ascending."""
+    pairs = np.stack([places.tracks, places.categories], axis=1)
+    found, numbers = np.unique(pairs, axis=0, return_inverse=True)
+    is_object = found[:, 1] > 0
+    labels = np.where(is_object, np.cumsum(is_object), 0)
+    colours: NDArray[np.uint8] = label_colours(found[is_object, 1].tolist())[labels[numbers.reshape(-1)]]
+    return colours

@@ -1,8 +1,8 @@
-"""Segmentations and masks to files: the ending of the name chooses the format."""
+"""Segmentations, maps and masks to files: the ending of the name chooses the format."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ from ldls.io.options import check_options
 from ldls.io.points import las, pcd, ply
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
+from ldls.sequences import LabelledMap
 
 
 class Format(NamedTuple):
@@ -39,6 +40,13 @@ FORMATS: dict[str, Format] = {
     "kitti-boxes": Format(".txt", kitti_objects.write),
 }
 """Formats of results, by the words that choose them on the command line."""
+MAP_WRITERS: dict[str, Callable[[Path, LabelledMap], None]] = {
+    ".ply": ply.write,
+    ".pcd": pcd.write,
+    ".las": las.write,
+    ".laz": las.write,
+}
+"""Writers of maps by the ending of the name."""
 
 
 @checked
@@ -59,17 +67,18 @@ def read_result(path: str | PathLike[str]) -> Segmentation:
 
 
 @checked
-def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
-    """Write a result or instance masks; the ending of the name chooses the format.
+def save(thing: Segmentation | InstanceMasks | LabelledMap, path: str | PathLike[str], **options: Any) -> None:  # noqa: ANN401
+    """Write a result, a map or instance masks; the ending of the name chooses the format.
 
     Of a result, `.npz` has everything, `.label` is SemanticKITTI's, `_lidarseg.bin` and `_panoptic.npz` are nuScenes',
     `.txt` is KITTI's label_2 with a line an object. `.ply`, `.pcd`, `.las` and `.laz` are point clouds with labels,
     confidence and colour; `.parquet` and `.csv` tables with a row a point; `save_objects` writes tables with a row an
-    object. docs/formats.md says what is in each. Of masks, `.json` is COCO's, `.png` has instance numbers (for masks
-    that do not overlap), `.npz` run lengths and `.npy` pixels only. The file appears only when it is whole.
+    object. docs/formats.md says what is in each. Of a map, the point clouds. Of masks, `.json` is COCO's, `.png` has
+    instance numbers (for masks that do not overlap), `.npz` run lengths and `.npy` pixels only. The file appears only
+    when it is whole.
 
     Args:
-        thing: What `ldls.segment` returns, or instance masks.
+        thing: What `ldls.segment` returns, a `LabelledMap`, or instance masks.
         path: The file.
         options: Of masks: `image_id`, `file_name` and `results` of `.json`, `layout` of `.npz`, `pixels_only` of
             `.npy`.
@@ -80,15 +89,18 @@ def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **optio
         NonFiniteError: The format cannot hold points that are not finite.
         MaskError: The format cannot keep these masks.
         ParameterError: The format has no such option.
-        InputError: It is neither a result nor masks, or a result of several cameras to `.txt`.
+        InputError: It is neither a result nor a map nor masks, or a result of several cameras to `.txt`.
         ImportError: The format needs an extra that is not installed; the message names it.
     """
     path = Path(path)
     if isinstance(thing, InstanceMasks):
         write_masks(path, thing, **options)
         return
+    if isinstance(thing, LabelledMap):
+        _save_map(thing, path, options)
+        return
     if not isinstance(thing, Segmentation):
-        raise InputError(f"save: expected a Segmentation or InstanceMasks, got {type(thing).__name__}")
+        raise InputError(f"save: expected a Segmentation, LabelledMap or InstanceMasks, got {type(thing).__name__}")
     fitting = [each for each in FORMATS.values() if path.name.lower().endswith(each.ending)]
     if not fitting:
         known = ", ".join(each.ending for each in FORMATS.values())
@@ -96,3 +108,13 @@ def save(thing: Segmentation | InstanceMasks, path: str | PathLike[str], **optio
     writer = max(fitting, key=lambda each: len(each.ending)).write
     check_options(f"{path.suffix} results ({path})", writer, options)
     writer(path, thing)
+
+
+def _save_map(places: LabelledMap, path: Path, options: Mapping[str, object]) -> None:
+    writer = MAP_WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise UnsupportedFormatError(
+            f"{path}: cannot write a map to {path.suffix!r} files, expected {', '.join(MAP_WRITERS)}"
+        )
+    check_options(f"{path.suffix} maps ({path})", writer, options)
+    writer(path, places)

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.errors import CorruptFileError, LimitError, NonFiniteError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import InputFile, open_file, whole_file
-from ldls.io.labelled_points import CHANNELS, colors, instances
+from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances
 from ldls.io.points.laz_chunks import check_chunks
-from ldls.segmentation import Segmentation
 
 SIGNATURE = b"LASF"
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}
@@ -155,11 +154,11 @@ def _check(header: Header, file_bytes: int) -> None:
         )
 
 
-def write(path: Path, result: Segmentation) -> None:
+def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z to 0.1 mm, intensity, colour, and `instance`, `category` and `confidence` of their own.
 
     `.laz` is packed. Intensities of 0 to 1 are spread over the 16 bits that LAS has; larger ones are rounded.
-    Points out of view have instance and category 0, as the background has.
+    Of a map, `instance` is the track. Points out of view have instance and category 0, as the background has.
 
     Raises:
         NonFiniteError: A point is not finite, which LAS cannot say.
@@ -179,7 +178,7 @@ def write(path: Path, result: Segmentation) -> None:
         las.write(file, do_compress=path.suffix.lower() == ".laz")
 
 
-def _fill(las: Any, xyz: NDArray[np.float64], result: Segmentation) -> None:  # noqa: ANN401
+def _fill(las: Any, xyz: NDArray[np.float64], result: Labelled) -> None:  # noqa: ANN401
     las.x, las.y, las.z = xyz.T
     if result.points.shape[1] > 3:
         las.intensity = _sixteen_bits(result.points[:, 3])

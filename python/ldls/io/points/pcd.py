@@ -16,10 +16,9 @@ from ldls._optional import require
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file, whole_file
-from ldls.io.labelled_points import colors, instances, positions
+from ldls.io.labelled_points import Labelled, colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
 from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
-from ldls.segmentation import Segmentation
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 TYPES = {
@@ -239,11 +238,11 @@ def _field(name: str, kind: str, size: str, count: str) -> Field:
     return Field(name, np.dtype(TYPES[key]), n_values)
 
 
-def write(path: Path, result: Segmentation) -> None:
+def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z (and intensity), `label` (category id), `instance`, `confidence` and `rgb`.
 
-    Points out of view have label and instance 0, as the background has. The colour is packed as the Point Cloud
-    Library has it: the bits of 0x00RRGGBB as a float.
+    Of a map, `instance` is the track. Points out of view have label and instance 0, as the background has. The colour
+    is packed as the Point Cloud Library has it: the bits of 0x00RRGGBB as a float.
 
     Raises:
         ImportError: The extra `pcd` is not installed.

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file, whole_file
-from ldls.io.labelled_points import CHANNELS, colors, instances, positions
+from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
 from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
-from ldls.segmentation import Segmentation
 
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 TYPES = {
@@ -143,10 +142,10 @@ def _add_property(place: str, element: Element, words: list[str]) -> None:
             raise CorruptFileError(f"{place}: expected a type and a name, got {' '.join(words)[:80]!r}")
 
 
-def write(path: Path, result: Segmentation) -> None:
+def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z (and intensity), colour, `label` (category id), `instance` and `confidence`.
 
-    Points out of view have label and instance 0, as the background has.
+    Of a map, `instance` is the track. Points out of view have label and instance 0, as the background has.
     """
     position = positions(result)
     columns: dict[str, NDArray[np.number]] = {
@@ -160,7 +159,7 @@ def write(path: Path, result: Segmentation) -> None:
     kinds = dict.fromkeys(position, real) | dict.fromkeys(CHANNELS, "|u1")
     # signed, for Open3D passes over unsigned properties of 32 bits
     kinds |= {"label": "<i4", "instance": "<i4", "confidence": "<f4"}
-    vertices = np.empty(len(result.labels), list(kinds.items()))
+    vertices = np.empty(len(result.points), list(kinds.items()))
     for name, column in columns.items():
         vertices[name] = column
     header = ["ply", "format binary_little_endian 1.0", "comment written by ldls"]
