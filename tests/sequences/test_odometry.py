@@ -2,6 +2,7 @@
 
 import re
 import sys
+import weakref
 from types import SimpleNamespace
 
 import numpy as np
@@ -119,6 +120,24 @@ def test_a_source_without_stamps_has_ten_sweeps_a_second():
     way = odometry_of(frames([5.0, 5.2, 5.3]))
     assert way.stamps.tolist() == [5.0, 5.2, 5.3]
     np.testing.assert_allclose(way.poses[:, 0, 3], [0, 0.3, 0.6], atol=0.1)
+
+
+def test_frames_of_a_source_are_not_kept():
+    read = []
+
+    class Source:
+        path = "drive"
+
+        def __iter__(self):
+            for number in range(6):
+                frame = frames([0.1 * number])[0]
+                read.append(weakref.ref(frame.points))
+                alive.append(sum(each() is not None for each in read))
+                yield frame
+
+    alive = []
+    assert len(odometry_of(Source())) == 6
+    assert max(alive) <= 2
 
 
 @pytest.mark.parametrize("stamps", [[0.0, None], [None, 0.1]])
