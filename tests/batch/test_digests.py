@@ -9,7 +9,7 @@ import pytest
 
 from batch import runs
 from ldls import batch
-from ldls.batch import frame_work
+from ldls.batch import known_files
 from ldls.errors import BatchError, ChangedFileWarning
 
 
@@ -74,8 +74,8 @@ def test_images_have_a_digest_where_they_are_read(few, tmp_path, formats, is_rea
 
 def test_a_file_that_all_frames_share_is_read_once(few, tmp_path, monkeypatch):
     digested = []
-    digest_of = frame_work.digest_of
-    monkeypatch.setattr(frame_work, "digest_of", lambda path: (digested.append(path), digest_of(path))[1])
+    digest_of = known_files.digest_of
+    monkeypatch.setattr(known_files, "digest_of", lambda path: (digested.append(path), digest_of(path))[1])
     shared = f"boxes:{few}/label_2/000000.txt"
     out = tmp_path / "out"
     batch.run(few, out, batch.RunSettings(segmenter=shared), workers=1)
@@ -86,7 +86,7 @@ def test_a_file_that_all_frames_share_is_read_once(few, tmp_path, monkeypatch):
 
 
 def test_files_of_many_frames_are_known_by_size_and_time(few, tmp_path, monkeypatch):
-    monkeypatch.setattr(frame_work, "LARGEST_DIGESTED_BYTES", 1500)
+    monkeypatch.setattr(known_files, "LARGEST_DIGESTED_BYTES", 1500)
     run(few, tmp_path / "out")
     states = {Path(path).suffix: state for path, state in records(tmp_path / "out")["000004"]["inputs"].items()}
     assert states[".bin"][0] > 1500

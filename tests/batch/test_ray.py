@@ -179,15 +179,16 @@ def worker(few, tmp_path):
 
 
 def test_a_worker_does_frames(worker, tmp_path):
-    assert worker[0].do(3, "000003").record["frame"] == "000003"
+    outcome = worker[0].do(((3, "000003"),))
+    assert [record["frame"] for record in outcome.records] == ["000003"]
     assert (tmp_path / "000003.label").exists()
 
 
 def test_a_worker_notes_what_it_did_for_whoever_loses_it(worker):
     worker, notes = worker
-    outcomes = {name: worker.do(number, name) for number, name in enumerate(["000000", "000001", "000002"])}
+    outcomes = {name: worker.do(((number, name),)) for number, name in enumerate(["000000", "000001", "000002"])}
     # the machine went down in the middle of a line
-    notes.write_bytes(notes.read_bytes() + b'{"record":{"fr')
+    notes.write_bytes(notes.read_bytes() + b'{"records":[{"fr')
     wanted = {"000001", "000002", "000003"}
     assert ray_engine._noted(notes, wanted) == {name: outcomes[name] for name in ("000001", "000002")}
     assert ray_engine._noted(notes, wanted) == {}
@@ -197,7 +198,7 @@ def test_a_worker_that_was_given_up_writes_nothing(worker, tmp_path):
     worker, notes = worker
     notes.unlink()
     with pytest.raises(BatchError, match="no longer wanted"):
-        worker.do(3, "000003")
+        worker.do(((3, "000003"),))
     assert not (tmp_path / "000003.label").exists()
 
 

@@ -52,14 +52,14 @@ if any("default_worker.py" in word for word in sys.orig_argv):
 
     read, write = FrameWork.read, FrameWork.write
 
-    def logged_read(self, work):
-        log("begun", work.name)
+    def logged_read(self, window):
+        log("begun", window.works[0].name)
         time.sleep(float(os.environ["FRAME_S"]))
-        read(self, work)
+        read(self, window)
 
-    def logged_write(self, work):
-        write(self, work)
-        log("done", work.name)
+    def logged_write(self, window):
+        write(self, window)
+        log("done", window.works[0].name)
 
     FrameWork.read, FrameWork.write = logged_read, logged_write
 """

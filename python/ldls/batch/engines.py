@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from functools import partial
 
 import ldls._ldls as _ldls
-from ldls.batch.frame_work import FrameWork, Outcome
+from ldls.batch.frame_work import FrameWork
 from ldls.batch.local import run_local
 from ldls.batch.ray_engine import RayCluster, run_ray
+from ldls.batch.window import Frames, Outcome
 from ldls.errors import ParameterError
 
 MAX_WORKERS = 1024
 
-Engine = Callable[[FrameWork, Sequence[tuple[int, str]]], Iterator[Outcome]]
-"""Yields what becomes of frames, given as number and name, in the order in which they are finished."""
+Engine = Callable[[FrameWork, Sequence[Frames]], Iterator[Outcome]]
+"""Yields what becomes of windows, frames given as number and name, in the order in which they are finished."""
 
 
 @dataclass(frozen=True, kw_only=True)

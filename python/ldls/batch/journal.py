@@ -10,6 +10,8 @@ The line of a frame has its name, `frame`, and
 
 - `files`: size and digest of each result;
 - `inputs`: size, time of change and digest of each file that it was made of, as far as they are known;
+- `window`: names of the frames that it was labelled together with, and its own;
+- `stamp` and `pose`: time of its sweep in seconds, and T_world_lidar in four rows, or null where they are not known;
 - `images`: name of the camera, height and width in pixels of each image;
 - `objects`: a row of a table for each object with points (`ldls.Segmentation.to_table`);
 - `nothing_in_view`: why nothing is labelled, or null;
@@ -204,6 +206,9 @@ def _is_of_frame(record: object) -> bool:
             "frame": str(),
             "files": dict() as files,
             "inputs": dict() as inputs,
+            "window": list() as window,
+            "stamp": int() | float() | None,
+            "pose": None | [[*_], [*_], [*_], [*_]] as pose,
             "images": list() as images,
             "objects": list() as objects,
             "nothing_in_view": str() | None,
@@ -211,6 +216,8 @@ def _is_of_frame(record: object) -> bool:
             return (
                 all(map(_is_of_file, files.values()))
                 and all(map(_is_of_input, inputs.values()))
+                and all(isinstance(name, str) for name in window)
+                and all(_is_of_pose(row) for row in pose or ())
                 and all(map(_is_of_image, images))
                 and all(isinstance(row, dict) and row.keys() == {*COLUMNS} for row in objects)
             )
@@ -227,6 +234,13 @@ def _is_of_file(state: object) -> bool:
 def _is_of_input(state: object) -> bool:
     match state:
         case None | [int(), int(), str() | None]:
+            return True
+    return False
+
+
+def _is_of_pose(row: object) -> bool:
+    match row:
+        case [int() | float(), int() | float(), int() | float(), int() | float()]:
             return True
     return False
 

@@ -1,4 +1,4 @@
-"""The frames of a source that a run takes, and the names of their outputs."""
+"""The frames of a source that a run takes, which of them are labelled together, and the names of their outputs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import unicodedata
 from collections.abc import Sequence
 from pathlib import PureWindowsPath
 
+from ldls.batch.window import Frames
 from ldls.errors import ParameterError, UnsafePathError
+from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.viewing.formats import file_name
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
@@ -29,6 +31,28 @@ def parse_frames(text: str | None) -> slice:
     if not re.fullmatch(r"\d*:\d*(:[1-9]\d*)?", text):
         raise ParameterError(f"frames: got {text!r}, expected START:STOP:STEP such as 100:500:5, from 0")
     return slice(*(int(part) if part else None for part in text.split(":")))
+
+
+def windows_of(chosen: Frames, stamps: Sequence[float | None], sweeps: int) -> list[Frames]:
+    """The windows of frames that are labelled together: 2 `sweeps` + 1 in a row, fewer at the end and before a gap.
+
+    A sweep more than `LONGEST_GAP_S` after the one before, or not later than it, begins a window.
+
+    Args:
+        chosen: Number in the source and name of each frame.
+        stamps: Times of all frames of the source in seconds; None where it is not known, which ends no window.
+        sweeps: Sweeps before and after the middle one; 0 for each frame alone.
+    """
+    windows: list[list[tuple[int, str]]] = []
+    last: float | None = None
+    for frame in chosen:
+        stamp = stamps[frame[0]] if sweeps else None
+        parted = last is not None and stamp is not None and not 0 < stamp - last <= LONGEST_GAP_S
+        if not windows or parted or len(windows[-1]) > 2 * sweeps:
+            windows.append([])
+        windows[-1].append(frame)
+        last = last if stamp is None else stamp
+    return [tuple(window) for window in windows]
 
 
 def check_names(names: Sequence[str], formats: Sequence[str]) -> None:

@@ -1,6 +1,6 @@
-"""The engine of a Ray cluster: workers in processes of their own, each a frame on one core.
+"""The engine of a Ray cluster: workers in processes of their own, each a window of frames on one core.
 
-Frames go one by one to whoever is free. A worker that dies, or whose machine is cut off, is replaced, and its frames
+Windows go one by one to whoever is free. A worker that dies, or whose machine is cut off, is replaced, and its windows
 are done elsewhere, save those whose outcome it could still note in the folder of the run. Machines that join the
 cluster on the way get workers too. Outcomes come back to the process that began the run, which alone keeps the journal.
 """
@@ -23,20 +23,21 @@ from typing import Any
 
 import ldls._ldls as _ldls
 from ldls._optional import require
-from ldls.batch.frame_work import FrameWork, Outcome
+from ldls.batch.frame_work import FrameWork
 from ldls.batch.lock import HOLDER_NAME
 from ldls.batch.ray_worker import RayWorker
+from ldls.batch.window import Frames, Outcome
 from ldls.errors import BatchError
 from ldls.io.files import UNFINISHED
 
 MAX_DEATHS = 3
-"""Workers that one frame may take along before it counts as failed."""
+"""Workers that one window may take along before its frames count as failed."""
 MAX_STILLBIRTHS = 20
 """Workers that may die one after the other before any of them is ready."""
 CONNECT_S = 10.0
 LOOK_S = 5.0
 """Seconds between looks for machines that have joined the cluster."""
-STARTING = (-1, "")
+STARTING: Frames = ()
 """State of a worker that is starting."""
 
 
@@ -86,25 +87,25 @@ def _check_reachable(address: str) -> None:
 
 def run_ray(
     work: FrameWork,
-    frames: Sequence[tuple[int, str]],
+    windows: Sequence[Frames],
     cluster: RayCluster,
     workers: int | None,
     gpus: float,
 ) -> Iterator[Outcome]:
-    """Yield the outcome of each of `frames`, in the order in which they are finished.
+    """Yield the outcome of each of `windows`, in the order in which they are finished.
 
     Args:
-        work: What is done with a frame; workers open it anew.
-        frames: Number and name of each frame.
+        work: What is done with a window; workers open it anew.
+        windows: Number and name of each frame of each.
         cluster: Where Ray runs.
         workers: Processes; one a core, or one for each share of a GPU, by default.
         gpus: GPUs of each worker. With any, the cores are shared out among the workers too, and each does as many
-            frames at a time: one segmenter a GPU, and a core for each cloud.
+            windows at a time: one segmenter a GPU, and a core for each cloud.
 
     Raises:
         BatchError: Workers cannot be started, do not see the folder, or are of another version.
     """
-    if not frames:
+    if not windows:
         return
     own_cores = _ldls.default_threads()
     with cluster.joined(own_cores if gpus else workers or own_cores) as ray:
@@ -123,8 +124,8 @@ def run_ray(
         share = max(cores // max(wanted(), 1), 1) if gpus else 1
         pool = _Pool(ray, work, {"num_cpus": share, "num_gpus": gpus, "max_concurrency": share})
         try:
-            pool.hire(min(max(wanted(), 1), len(frames)))
-            yield from pool.outcomes(frames, wanted)
+            pool.hire(min(max(wanted(), 1), len(windows)))
+            yield from pool.outcomes(windows, wanted)
         finally:
             pool.dismiss()
 
@@ -143,11 +144,11 @@ class _Pool:
             raise BatchError(f"source: cannot be sent to other processes: {error}") from error
         self._folder = work.out
         self._holder = (work.out / HOLDER_NAME).read_text(encoding="utf-8")
-        self._tasks: dict[Any, tuple[Any, tuple[int, str]]] = {}
+        self._tasks: dict[Any, tuple[Any, Frames]] = {}
         self._alive: set[Any] = set()
         self._notes: dict[Any, Path] = {}
         self._noted: dict[str, Outcome] = {}
-        self._deaths: Counter[str] = Counter()
+        self._deaths: Counter[Frames] = Counter()
         self._stillbirths = 0
 
     def hire(self, count: int) -> None:
@@ -168,10 +169,10 @@ class _Pool:
         for notes in self._notes.values():
             notes.unlink(missing_ok=True)
 
-    def outcomes(self, frames: Sequence[tuple[int, str]], wanted: Callable[[], int]) -> Iterator[Outcome]:
-        waiting = deque(frames)
+    def outcomes(self, windows: Sequence[Frames], wanted: Callable[[], int]) -> Iterator[Outcome]:
+        waiting = deque(windows)
         idle: deque[Any] = deque()
-        n_left = len(frames)
+        n_left = len(windows)
         looked = time.monotonic()
         while n_left:
             if time.monotonic() - looked > LOOK_S:
@@ -180,23 +181,23 @@ class _Pool:
             while idle and waiting:
                 worker = idle.popleft()
                 if worker in self._alive:
-                    frame = waiting.popleft()
-                    self._tasks[worker.do.remote(*frame)] = (worker, frame)
+                    frames = waiting.popleft()
+                    self._tasks[worker.do.remote(frames)] = (worker, frames)
             finished, _ = self._ray.wait(list(self._tasks), num_returns=1, timeout=LOOK_S)
             for task in finished:
-                worker, frame = self._tasks.pop(task)
-                outcome = self._result(task, worker, frame)
-                if frame == STARTING:
+                worker, frames = self._tasks.pop(task)
+                outcome = self._result(task, worker, frames)
+                if frames == STARTING:
                     idle.extend([worker] * self._share)
                 elif outcome is None:
-                    waiting.appendleft(frame)
+                    waiting.appendleft(frames)
                 else:
                     idle.append(worker)
                     n_left -= 1
                     yield outcome
 
-    def _result(self, task: Any, worker: Any, frame: tuple[int, str]) -> Outcome | None:  # noqa: ANN401
-        """What came of a frame; None for one that was lost with its worker and must be done again, or for a start."""
+    def _result(self, task: Any, worker: Any, frames: Frames) -> Outcome | None:  # noqa: ANN401
+        """What came of a window; None for one that was lost with its worker and must be done again, or for a start."""
         errors = self._ray.exceptions
         try:
             outcome: Outcome | None = self._ray.get(task)
@@ -204,33 +205,36 @@ class _Pool:
             if isinstance(error, errors.RayTaskError) and worker in self._alive:
                 # a full disk, for one: what stops a run on one machine stops it here
                 raise getattr(error, "cause", None) or error from None
-            self._replace(worker, frame, error)
-            if frame == STARTING or frame[1] in self._noted:
-                return self._noted.pop(frame[1], None)
-            self._deaths[frame[1]] += 1
-            return _killer(frame[1]) if self._deaths[frame[1]] >= MAX_DEATHS else None
-        if frame == STARTING:
+            self._replace(worker, frames, error)
+            if frames == STARTING or frames[0][1] in self._noted:
+                return None if frames == STARTING else self._noted.pop(frames[0][1])
+            self._deaths[frames] += 1
+            return _killer(frames) if self._deaths[frames] >= MAX_DEATHS else None
+        if frames == STARTING:
             self._stillbirths = 0
         return outcome
 
-    def _replace(self, worker: Any, frame: tuple[int, str], death: Exception) -> None:  # noqa: ANN401
-        if frame == STARTING:
+    def _replace(self, worker: Any, frames: Frames, death: Exception) -> None:  # noqa: ANN401
+        if frames == STARTING:
             self._stillbirths += 1
             if self._stillbirths > MAX_STILLBIRTHS:
                 raise BatchError(f"workers die before they are ready: {death}") from death
-        # all frames of a worker come back with its death; one successor is enough
+        # all windows of a worker come back with its death; one successor is enough
         if worker in self._alive:
             self._alive.remove(worker)
             # one that is only out of reach must not go on
             with contextlib.suppress(Exception):
                 self._ray.kill(worker)
-            in_hand = {frame[1], *(name for other, (_, name) in self._tasks.values() if other == worker)}
-            self._noted |= _noted(self._notes.pop(worker), in_hand)
+            in_hand = [frames, *(window for other, window in self._tasks.values() if other == worker)]
+            self._noted |= _noted(self._notes.pop(worker), {window[0][1] for window in in_hand if window})
             self.hire(1)
 
 
-def _noted(notes: Path, frames: set[str]) -> dict[str, Outcome]:
-    """The outcomes of frames that a worker noted; its notes are taken away, and it writes no more without them."""
+def _noted(notes: Path, firsts: set[str]) -> dict[str, Outcome]:
+    """The outcomes of windows that a worker noted, by the names of their first frames, of those that are asked for.
+
+    Its notes are taken away, and it writes no more without them.
+    """
     taken = notes.with_name(f".taken{notes.name}")
     try:
         notes.replace(taken)
@@ -242,9 +246,11 @@ def _noted(notes: Path, frames: set[str]) -> dict[str, Outcome]:
         with contextlib.suppress(ValueError):
             outcomes.append(Outcome(**json.loads(line)))
     taken.unlink()
-    return {outcome.record["frame"]: outcome for outcome in outcomes if outcome.record["frame"] in frames}
+    by_first = {outcome.records[0]["frame"]: outcome for outcome in outcomes}
+    return {first: outcome for first, outcome in by_first.items() if first in firsts}
 
 
-def _killer(frame: str) -> Outcome:
+def _killer(frames: Frames) -> Outcome:
     message = f"{MAX_DEATHS} workers died of it; is memory short?"
-    return Outcome({"frame": frame, "error": {"stage": "worker", "code": "worker_died", "message": message}})
+    error = {"stage": "worker", "code": "worker_died", "message": message}
+    return Outcome([{"frame": name, "error": error} for _, name in frames])

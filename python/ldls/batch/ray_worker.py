@@ -1,7 +1,7 @@
-"""A worker of a Ray cluster: a process, on some machine, that does frames.
+"""A worker of a Ray cluster: a process, on some machine, that does windows of frames.
 
 A worker notes each outcome in a file of its own in the folder of the run before it hands it back. If its machine is
-cut off meanwhile, whoever gave it the frame finds the outcome there, and the frame is not done again.
+cut off meanwhile, whoever gave it the window finds the outcome there, and it is not done again.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 
 import ldls._ldls as _ldls
-from ldls.batch.frame_work import FrameWork, Outcome, Work
+from ldls.batch.frame_work import FrameWork
 from ldls.batch.lock import HOLDER_NAME
+from ldls.batch.window import Frames, Outcome
 from ldls.errors import BatchError
 
 WAIT_S = 60.0
@@ -22,13 +23,13 @@ WAIT_S = 60.0
 
 
 class RayWorker:
-    """Does frames one after the other, or some at a time where it has several cores beside its GPU."""
+    """Does windows one after the other, or some at a time where it has several cores beside its GPU."""
 
     def open(self, work: FrameWork, version: str, holder: str, notes: str, wait_s: float = WAIT_S) -> None:
-        """Prepare for frames.
+        """Prepare for windows.
 
         Args:
-            work: What is done with a frame; it was opened anew on its way here.
+            work: What is done with a window; it was opened anew on its way here.
             version: Version of ldls of the run.
             holder: What the run says of itself in its folder.
             notes: Name of the file of notes of this worker, which is there until the worker is given up.
@@ -46,14 +47,14 @@ class RayWorker:
             )
         self._work, self._notes = work, work.out / notes
 
-    def do(self, index: int, name: str) -> Outcome:
-        """Segment a frame; return its outcome.
+    def do(self, frames: Frames) -> Outcome:
+        """Segment the frames of a window; return its outcome.
 
         Raises:
-            BatchError: This worker was given up, and the frame is done by another.
+            BatchError: This worker was given up, and the window is done by another.
         """
-        outcome = self._work.do(Work(index, name), self._still_wanted)
-        line = json.dumps({"record": outcome.record, "seconds": outcome.seconds}) + "\n"
+        outcome = self._work.do(frames, self._still_wanted)
+        line = json.dumps({"records": outcome.records, "seconds": outcome.seconds}) + "\n"
         # without its notes it was given up; on a full disk the outcome still goes its usual way
         with contextlib.suppress(OSError), os.fdopen(os.open(self._notes, os.O_WRONLY | os.O_APPEND), "ab") as file:
             # closed at once, for only then network file systems show it to others

@@ -13,15 +13,18 @@ from typing import Any
 
 import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
-from ldls.batch.frame_work import Earlier, FrameWork, Outcome
+from ldls.batch.frame_work import Earlier, FrameWork
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
-from ldls.batch.plan import check_names
+from ldls.batch.plan import check_names, windows_of
+from ldls.batch.poses import Poses
 from ldls.batch.run_bag import RunBag
+from ldls.batch.run_tracks import RunTracks
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
+from ldls.batch.window import Frames, Outcome
 from ldls.datasets import Source, open_source
-from ldls.errors import ChangedFileWarning, NothingInView, some
+from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, some
 from ldls.io.files import check_folder, sweep
 from ldls.io.objects import objects_writer
 from ldls.viewing.formats import BAG, RESULT, file_name, written_formats
@@ -52,7 +55,8 @@ def run(
     Files appear under their name only when they are whole. A journal in `out` knows what is done: a run that was
     interrupted, however it was, goes on where it stopped when it is called again in the same way, and one that is
     finished does what is missing when frames or formats are added. A frame that fails is recorded and passed over, and
-    tried again by the next call.
+    tried again by the next call. With `settings.sweeps`, frames in a row are labelled together; such a window is done
+    again as a whole where one of its frames is.
 
     Args:
         source: A source of `ldls.datasets`, or a path that one is guessed from.
@@ -63,7 +67,8 @@ def run(
             that it was opened with: a run goes on only with the same ones.
         objects: A `.csv` or `.json` file for one table of the objects of all frames, in the order of the frames, as
             `ldls.save_objects` writes it; it is written at the end, of what earlier runs did, too.
-        workers: Frames segmented at a time; as many as the process, or the cluster, may use cores by default.
+        workers: Frames, or windows of them, segmented at a time; as many as the process, or the cluster, may use cores
+            by default.
         engine: Where they are segmented: "local", "ray", or an engine of your own.
         ray_address: Address of the Ray cluster to join; by default one is started on this machine.
         gpus: GPUs that a worker of the Ray cluster needs for its segmenter.
@@ -77,19 +82,24 @@ def run(
         CorruptFileError: The journal in `out` is none.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
-        ImportError: The engine needs an extra that is not installed.
+        PoseError: Sweeps are to be joined or objects tracked, and frames have no stamps or poses.
+        LimitError: There are more tracks than 16 bits number.
+        ImportError: The engine, or the tracks, need an extra that is not installed.
         OSError: The results cannot be written, as on a full disk; what is written stays, and the run can go on.
         KeyboardInterrupt: It was interrupted; failures.jsonl has the frames that failed until then.
     """
     options = dict(options or {})
     opened = open_source(source, truth=False, **options) if isinstance(source, str | PathLike) else source
     runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
-    chosen = list(zip(range(len(opened))[frames], opened.names[frames], strict=True))
+    chosen = tuple(zip(range(len(opened))[frames], opened.names[frames], strict=True))
     names = [name for _, name in chosen]
     check_names(names, settings.frame_formats)
     write_objects = None if objects is None else objects_writer(objects)
-    bag = RunBag(opened, Path(out)) if BAG in settings.formats else None
     folder = Path(out)
+    bag = RunBag(opened, folder) if BAG in settings.formats else None
+    tracks = RunTracks(folder, names) if settings.track else None
+    Poses(opened, settings).check(chosen)
+    windows = windows_of(chosen, opened.stamps if settings.sweeps else (), settings.sweeps)
     folder.mkdir(parents=True, exist_ok=True)
     if objects is not None:
         check_folder(objects)
@@ -99,16 +109,17 @@ def run(
             bag.check_place()
         work = FrameWork(opened, settings, folder)
         header = {
-            "settings": settings.record() | {"masks_sha256": work.masks_sha256},
+            "settings": settings.record() | work.digests,
             "source": source_record(opened.kind, str(Path(opened.path).resolve()), options),
         }
         journal = Journal(folder, header)
         try:
             check_names(sorted({*names, *journal.frames}), written_formats(journal.endings, settings.frame_formats))
             # what an earlier run did must still be there, and of the same input
-            pending = _pending(chosen, work, journal)
-            work.records = journal.kept(name for _, name in pending)
-            n_earlier = len(chosen) - len(pending)
+            pending = _pending(windows, work, journal)
+            to_do = [name for window in pending for _, name in window]
+            work.records = journal.kept(to_do)
+            n_earlier = len(chosen) - len(to_do)
             start = time.perf_counter()
             seconds: Counter[str] = Counter()
             n_finished, n_failed = n_earlier, 0
@@ -117,8 +128,8 @@ def run(
                 warnings.simplefilter("ignore", NothingInView)
                 for outcome in _recorded(runner(work, pending), journal):
                     seconds.update(outcome.seconds)
-                    n_finished += 1
-                    n_failed += "error" in outcome.record
+                    n_finished += len(outcome.records)
+                    n_failed += sum("error" in record for record in outcome.records)
                     if on_progress is not None:
                         on_progress(n_finished, n_failed, len(names))
         except KeyboardInterrupt:
@@ -135,7 +146,12 @@ def run(
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
         if bag is not None:
-            bag.write(_stored(journal, opened.names, folder), anew=n_finished - n_failed > n_earlier)
+            stored = [record["frame"] for record in _stored(journal, opened.names, folder)]
+            bag.write(stored, anew=n_finished - n_failed > n_earlier)
+        unplaced = [] if tracks is None else tracks.write(lambda: _stored(journal, opened.names, folder))
+    if unplaced:
+        message = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
+        warnings.warn(message, LeftOutWarning, stacklevel=2)
     doubts = doubts_of(journal.records(names))
     for doubt, frames_in_doubt in doubts.items():
         message = f"{len(frames_in_doubt):,} of {len(names):,} frames ({some(frames_in_doubt)}): {doubt}"
@@ -152,25 +168,26 @@ def run(
     )
 
 
-def _stored(journal: Journal, names: Sequence[str], folder: Path) -> list[str]:
-    """The frames of which a whole result is in the folder."""
-    done = (record["frame"] for record in journal.records(names) if "error" not in record)
-    return [name for name in done if (folder / file_name(name, RESULT)).is_file()]
+def _stored(journal: Journal, names: Sequence[str], folder: Path) -> Iterator[Record]:
+    """The records of the frames of which a whole result is in the folder."""
+    done = (record for record in journal.records(names) if "error" not in record)
+    return (record for record in done if (folder / file_name(record["frame"], RESULT)).is_file())
 
 
-def _pending(chosen: Sequence[tuple[int, str]], work: FrameWork, journal: Journal) -> list[tuple[int, str]]:
-    """The frames that an earlier run left to do; warns of those whose files were changed since."""
+def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> list[Frames]:
+    """The windows that an earlier run left to do; warns of frames whose files were changed since."""
+    frames = [(name, [name for _, name in window]) for window in windows for _, name in window]
     with ThreadPoolExecutor(_ldls.default_threads()) as threads:
-        left = list(threads.map(lambda frame: work.earlier(journal.get(frame[1])), chosen))
-    pairs = list(zip(chosen, left, strict=True))
-    changed = [name for (_, name), earlier in pairs if earlier is Earlier.CHANGED]
+        left = list(threads.map(lambda frame: work.earlier(journal.get(frame[0]), frame[1]), frames))
+    changed = [name for (name, _), earlier in zip(frames, left, strict=True) if earlier is Earlier.CHANGED]
     if changed:
         message = (
             f"{work.out}: files of {len(changed):,} frames were changed since they were written ({some(changed)}); "
             "these frames are done again"
         )
         warnings.warn(message, ChangedFileWarning, stacklevel=3)
-    return [frame for frame, earlier in pairs if earlier is not Earlier.DONE]
+    done = {name for (name, _), earlier in zip(frames, left, strict=True) if earlier is Earlier.DONE}
+    return [window for window in windows if any(name not in done for _, name in window)]
 
 
 def _recorded(outcomes: Iterator[Outcome], journal: Journal) -> Iterator[Outcome]:
@@ -179,7 +196,7 @@ def _recorded(outcomes: Iterator[Outcome], journal: Journal) -> Iterator[Outcome
     since = time.monotonic()
     try:
         for outcome in outcomes:
-            waiting.append(outcome.record)
+            waiting.extend(outcome.records)
             if time.monotonic() - since > GROUP_S:
                 _flush(journal, waiting)
                 since = time.monotonic()

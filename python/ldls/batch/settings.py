@@ -13,7 +13,11 @@ from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
+from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS
 from ldls.viewing.formats import BAG, RESULT, check_formats
+
+MOST_SWEEPS = 100
+"""More than memory has room for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,10 +34,16 @@ class RunSettings:
         formats: Files written for each frame, by the words of `ldls.viewing.formats`: npz, label, ply and so on, and
             png for the image with masks and points; bag for one labelled bag of all frames of a ROS bag, which is made
             of their npz, so that these are written too.
-        same_object: See `ldls.segment`.
+        same_object: By default that of `ldls.segment`, or of `ldls.segment_sweeps` where sweeps are joined.
+        sweeps: Sweeps before and after the middle one of a window, whose 2 `sweeps` + 1 frames in a row are labelled
+            together; 0 for each frame alone.
+        poses: File of poses in TUM's or KITTI's format, instead of those that the source has, if it has any.
+        track: Number the objects over the drive when its frames are done, which is made of their npz, so that these
+            are written too; run_tracks.py.
 
     Raises:
-        ParameterError: Both `masks` and `segmenter` are given, or there is no format, or an unknown one.
+        ParameterError: Both `masks` and `segmenter` are given, there is no format, or an unknown one, or `sweeps` is
+            out of its range.
     """
 
     masks: str | None = None
@@ -42,18 +52,29 @@ class RunSettings:
     categories: tuple[int | str, ...] | None = None
     params: Params = field(default_factory=Params)
     formats: tuple[str, ...] = ("npz", "label")
-    same_object: float = SAME_OBJECT
+    same_object: float | None = None
+    sweeps: int = 0
+    poses: str | None = None
+    track: bool = False
 
     def __post_init__(self) -> None:
         if self.masks is not None and self.segmenter is not None:
             raise ParameterError("masks, segmenter: give one of them, got both")
+        if not 0 <= self.sweeps <= MOST_SWEEPS:
+            raise ParameterError(f"sweeps: got {self.sweeps}, expected 0 to {MOST_SWEEPS}; 2 is a good number")
         check_formats(self.formats, of_run=True)
 
     @property
     def frame_formats(self) -> tuple[str, ...]:
-        """The formats of each frame; those that the bag of the run is made of are among them."""
-        needed = (RESULT,) if BAG in self.formats else ()
+        """The formats of each frame; those that the bag of the run and the tracks are made of are among them."""
+        needed = (RESULT,) if self.track or BAG in self.formats else ()
         return tuple(dict.fromkeys([*(word for word in self.formats if word != BAG), *needed]))
+
+    @property
+    def share_of_same(self) -> float:
+        """Share of common points from which on instances of two images are one object."""
+        usual = SAME_OBJECT_OF_SWEEPS if self.sweeps else SAME_OBJECT
+        return usual if self.same_object is None else self.same_object
 
     def segmenter_file(self, frame: str, camera: str) -> Path | None:
         """The file that the segmenter of an image is made of, as a model or boxes; None where there is none."""
@@ -64,11 +85,12 @@ class RunSettings:
         """What labels depend on, as a journal stores it."""
         settings = asdict(self)
         # other files of the same labels may be added
-        del settings["formats"]
+        del settings["formats"], settings["track"]
         # the same bits for any number of threads
         del settings["params"]["threads"]
-        if self.masks is not None:
-            settings["masks"] = str(Path(self.masks).absolute())
+        settings["same_object"] = self.share_of_same
+        for name, path in (("masks", self.masks), ("poses", self.poses)):
+            settings[name] = None if path is None else str(Path(path).absolute())
         settings["version"] = _ldls.__version__
         recorded: dict[str, Any] = json.loads(json.dumps(settings))
         return recorded

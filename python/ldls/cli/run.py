@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ldls.cli.frame_files import EXISTING
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories, say_own_masks
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
@@ -48,6 +49,30 @@ def run(
     dataset: DatasetOption = None,
     option: SourceOption = None,
     cores: CoresOption = None,
+    sweeps: Annotated[
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Label 2 N + 1 sweeps in a row together; 2 is a good number. The drive needs stamps and poses.",
+            show_default="0, each frame alone",
+        ),
+    ] = 0,
+    track: Annotated[
+        bool,
+        typer.Option(
+            "--track", help="Number objects over the drive: OUT/tracks/FRAME.label and OUT/tracks.csv. Extra eval."
+        ),
+    ] = False,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Poses of the lidar (TUM) or of camera 0 (KITTI, a line a frame), instead of those of the source.",
+            show_default=False,
+            **EXISTING,
+        ),
+    ] = None,
     engine: Annotated[
         str, typer.Option(metavar="NAME", help="local, or ray for a Ray cluster; docs/scale.md.")
     ] = "local",
@@ -67,10 +92,15 @@ def run(
     Files appear in --out only when they are whole, and a journal there knows which frames are done: give the same
     command again to go on. A frame that fails is listed in failures.jsonl and passed over; the exit status is then 2.
 
+    With --sweeps, frames of a drive in a row are labelled together; with --track, an object keeps its number over the
+    drive.
+
     Examples:
     ldls run kitti/training --masks kitti/training/masks --out labels
 
     ldls run 2011_09_26/2011_09_26_drive_0064_sync --segmenter onnx:yolo11n-seg.onnx --out labels --formats npz,ply
+
+    ldls run 2011_09_26/2011_09_26_drive_0064_sync --segmenter onnx:yolo11n-seg.onnx --out labels --sweeps 2 --track
     """
     import ldls.batch as batch
     from ldls.batch.plan import parse_frames
@@ -83,6 +113,9 @@ def run(
         categories=chosen_categories(categories),
         params=params,
         formats=words(formats),
+        sweeps=sweeps,
+        poses=None if poses is None else str(poses),
+        track=track,
     )
     options = parse_options(option or [])
     opened = open_source(source, kind=dataset, truth=False, **options)
@@ -118,6 +151,8 @@ def run(
     show(summary, out)
     if objects is not None:
         console().print(f"objects in {objects}", highlight=False, soft_wrap=True)
+    if track:
+        console().print(f"tracks in {out / 'tracks'} and {out / 'tracks.csv'}", highlight=False, soft_wrap=True)
     if summary.failures:
         raise typer.Exit(FRAMES_FAILED)
 

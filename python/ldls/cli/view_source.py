@@ -120,15 +120,15 @@ def record_frames(
 
 
 def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segmentation]:
-    from ldls.batch.frame_work import StageError, Work
+    from ldls.batch.window import Window
 
-    item = Work(index, source.names[index])
-    try:
-        work.read(item)
-        frame = item.frame
-        work.segment(item)
-    except StageError as error:
-        raise error.error from None
+    window = Window.of(((index, source.names[index]),))
+    (item,) = window.works
+    work.read(window)
+    frame = item.frame
+    work.segment(window)
+    if item.error is not None:
+        raise item.error.error from None
     assert frame is not None and item.result is not None
     return frame, item.result
 

@@ -73,6 +73,11 @@ class Source(Protocol):
     names: tuple[str, ...]
 
     @property
+    def stamps(self) -> tuple[float | None, ...]:
+        """Time of each sweep in seconds, known without reading any; None where the source does not say."""
+        ...
+
+    @property
     def camera_names(self) -> tuple[str, ...]:
         """Name of the camera of each image of a frame."""
         ...

@@ -58,12 +58,13 @@ def read_poses(
         raise ParameterError(f"format: got {format!r}, expected one of {', '.join(READERS)}")
     options: dict[str, Any] = {"stamps": stamps, "T_camera_lidar": T_camera_lidar}
     given = {name: value for name, value in options.items() if value is not None}
-    format = _format_of(path) if format is None else format
+    format = format_of(path) if format is None else format
     check_options(f"{format} poses ({path})", READERS[format], given)
     return READERS[format](path, **given)
 
 
-def _format_of(path: Path) -> str:
+def format_of(path: Path) -> str:
+    """The format of a file of poses, by its content; errors as of `read_poses`."""
     if path.is_dir():
         return "kitti-raw"
     with open_file(path, "file of poses", limit=MAX_TEXT_BYTES) as file:

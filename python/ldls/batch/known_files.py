@@ -1,0 +1,64 @@
+"""What is known of the files of a run, so that changes are noticed: size, time of change and digest."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from ldls.io.files import digest_of
+
+LARGEST_DIGESTED_BYTES = 1 << 26
+"""Larger inputs hold many frames, as bags do, and are known by size and time of change alone."""
+DIGESTS_KEPT = 256
+"""More than the frames on their way have files, so that what many share, as a model, is read once."""
+
+Look = tuple[int, int] | None
+"""Size and time of change of a file; None where there is none."""
+State = list[int | str | None] | None
+"""Size, time of change and digest of a file; None where there is none, and for the digest where it is not read."""
+
+
+class KnownFiles:
+    """The states of input files, of which digests are kept for a while."""
+
+    def __init__(self) -> None:
+        """Nothing is known yet."""
+        self._digest = lru_cache(DIGESTS_KEPT)(_digest)
+
+    def state(self, path: Path, seen: Look, *, read: bool = True) -> State:
+        """State of a file that was seen so, for the journal."""
+        if seen is None:
+            return None
+        known = read and seen[0] <= LARGEST_DIGESTED_BYTES
+        return [*seen, self._digest(path, seen) if known else None]
+
+    def is_same(self, path: Path, state: State) -> bool:
+        """True for a file that is as it was in this state."""
+        seen = look(path)
+        if seen is None or state is None:
+            return seen is None and state is None
+        return [*seen] == state[:2] and (state[2] is None or self._digest(path, seen) == state[2])
+
+
+def look(path: Path) -> Look:
+    """Size and time of change of a file."""
+    try:
+        found = path.stat()
+    except (FileNotFoundError, ValueError):  # a name with a NUL, for one
+        return None
+    return found.st_size, found.st_mtime_ns
+
+
+def written(path: Path) -> list[int | str]:
+    """Size and digest of a result."""
+    return [path.stat().st_size, digest_of(path)]
+
+
+def is_written(path: Path, state: list[int | str]) -> bool:
+    """True for a result that is there and has this size and digest."""
+    return path.is_file() and path.stat().st_size == state[0] and digest_of(path) == state[1]
+
+
+def _digest(path: Path, seen: Look) -> str:
+    """Digest of a file; `seen` tells two states of it apart."""
+    return digest_of(path)

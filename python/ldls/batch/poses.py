@@ -1,0 +1,115 @@
+"""Where the lidar was at each frame of a run: by a file of poses, or as the source says."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.batch.settings import RunSettings
+from ldls.batch.window import Frames
+from ldls.datasets import Frame, Source
+from ldls.errors import LdlsError, PoseError, within
+from ldls.io import read_poses
+from ldls.io.files import digest_of
+from ldls.io.poses.read import format_of
+from ldls.sequences import Trajectory
+
+WHENCE = (
+    "kitti-raw has them if oxts/ and the day's calib_imu_to_velo.txt are there, kitti-odometry if poses.txt and "
+    "times.txt are, nuscenes always, rosbag with --option world=odom; else give --poses FILE"
+)
+
+
+class Poses:
+    """The poses of the frames of a source.
+
+    Attributes:
+        sha256: Digest of the file of poses; None without one.
+    """
+
+    def __init__(self, source: Source, settings: RunSettings) -> None:
+        """Read the file of poses, if one is given.
+
+        Raises:
+            LdlsError: The file is broken, or is of another drive.
+            FileNotFoundError: There is no such file.
+        """
+        self._source, self._settings = source, settings
+        self._trajectory: Trajectory | None = None
+        self.sha256: str | None = None
+        if settings.poses is not None:
+            path = Path(settings.poses)
+            self.sha256 = digest_of(path)
+            self._trajectory = _trajectory(path, source)
+
+    def of(self, frame: Frame) -> NDArray[np.float64] | None:
+        """(4, 4) T_world_lidar of a frame; None where it is not known and not needed.
+
+        Raises:
+            PoseError: It is needed and not known, or the file of poses has none at its stamp.
+        """
+        pose = frame.pose
+        if self._trajectory is not None:
+            with within(str(self._settings.poses)):
+                pose = None if frame.stamp is None else self._trajectory.at(frame.stamp)
+        if self._settings.sweeps and (frame.stamp is None or pose is None):
+            what = "stamp" if frame.stamp is None else "pose"
+            raise PoseError(f"the frame has no {what}, without which it cannot be joined with others; leave it out")
+        return pose
+
+    def check(self, chosen: Frames) -> None:
+        """Refuse, before any work, frames without poses where they are needed, or in another order than their stamps.
+
+        Raises:
+            PoseError: There is no stamp or no pose, or stamps do not ascend where objects are tracked.
+        """
+        if not self._settings.sweeps and not self._settings.track:
+            return
+        named = zip(self._source.names, self._source.stamps, strict=True)
+        known = [(name, stamp) for name, stamp in named if stamp is not None]
+        if not known:
+            raise PoseError(
+                f"{self._source.path}: frames of this source ({self._source.kind}) have no stamps, expected them and "
+                "poses for --sweeps and --track; take a source with times, as an ldls.toml with stamps"
+            )
+        unordered = (pair for pair in pairwise(known) if not pair[0][1] < pair[1][1])
+        if self._settings.track and (pair := next(unordered, None)) is not None:
+            (one, before), (other, after) = pair
+            raise PoseError(
+                f"{self._source.path}: frame {other} ({after:.6f} s) comes after {one} ({before:.6f} s), expected "
+                "ascending stamps to track objects; take one drive, as by --option scene=NAME"
+            )
+        if self._trajectory is None and not self._has_poses(chosen):
+            raise PoseError(
+                f"{self._source.path}: frames of this source ({self._source.kind}) have no poses, expected them for "
+                f"--sweeps and --track; {WHENCE}"
+            )
+
+    def _has_poses(self, chosen: Frames) -> bool:
+        """False if the first frame that can be read and has a stamp has no pose."""
+        for index, _ in chosen:
+            if self._source.stamps[index] is not None:
+                try:
+                    return self._source[index].pose is not None
+                except (LdlsError, OSError):
+                    # it fails alone, when it is its turn
+                    continue
+        return True
+
+
+def _trajectory(path: Path, source: Source) -> Trajectory:
+    """The way of the lidar by a file; a file of KITTI's has a line for each frame of the source."""
+    if format_of(path) != "kitti":
+        return read_poses(path)
+    stamps = [stamp for stamp in source.stamps if stamp is not None]
+    if len(stamps) < len(source):
+        raise PoseError(
+            f"{path}: KITTI's poses have no times, and {len(source) - len(stamps)} of {len(source)} frames of "
+            f"{source.path} have none either; give a file in TUM's format, or add times"
+        )
+    camera = source[0].images[0].camera
+    with within(path):
+        return read_poses(path, stamps=stamps, T_camera_lidar=camera.T_camera_lidar)

@@ -1,0 +1,155 @@
+"""The tracks of a run: the objects of a drive, numbered over all its frames when these are done.
+
+The folder of the run then has
+
+- `tracks/FRAME.label`: labels after SemanticKITTI, with the track in the upper 16 bits;
+- `tracks.csv`: a row for each object with points of each frame;
+- `tracks/tracks.json`: a digest of what they were made of, and size and digest of each of these files.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import ldls._ldls as _ldls
+from ldls.batch.journal import Record
+from ldls.batch.known_files import is_written, written
+from ldls.errors import LimitError, UnsafePathError
+from ldls.io import read_result, save
+from ldls.io.files import LARGE_BYTES, open_file, refuse_link, sweep, whole_file
+from ldls.io.objects import DECIMALS
+from ldls.segmentation import Segmentation
+from ldls.sequences import Sweep, Tracker
+from ldls.viewing.formats import RESULT, file_name
+
+FOLDER, TABLE, STATE = "tracks", "tracks.csv", "tracks.json"
+COLUMNS = ("frame", "track", "label", "category", "name", "score", "n_points", "world_x_m", "world_y_m", "world_z_m")
+"""Columns of the table: those of tables of objects, and the mean of the points in the world of the poses."""
+MOST_TRACKS = (1 << 16) - 1
+"""A `.label` has 16 bits for them."""
+
+
+class RunTracks:
+    """The tracks in the folder of a run."""
+
+    def __init__(self, folder: Path, names: Iterable[str]) -> None:
+        """Tracks in `folder`, of frames of these names.
+
+        Raises:
+            ImportError: `ldls[eval]` is not installed.
+            UnsafePathError: Files of a frame and of the tracks would be one.
+        """
+        Tracker()
+        if any(name.casefold() == FOLDER for name in names):
+            raise UnsafePathError(f"frame {FOLDER!r}: its files and {TABLE} may be one; rename it, or do not track")
+        self._folder, self._place = folder, folder / FOLDER
+
+    def write(self, records: Callable[[], Iterable[Record]]) -> list[str]:
+        """Number the objects of all frames that are done, if that was not done; the frames left out, without a pose.
+
+        One window at a time is in memory.
+
+        Args:
+            records: Gives the journal's records of the frames that have a stored result, in the order of the source.
+
+        Raises:
+            LimitError: There are more objects than a `.label` has numbers for.
+            FileFormatError: A stored result is broken.
+            UnsafePathError: The folder of the tracks is a link.
+            OSError: A file cannot be written, as on a full disk; give the same command again.
+        """
+        refuse_link(self._place)
+        unplaced = [record["frame"] for record in records() if not _is_placed(record)]
+        made_of, before = _digest(records()), self._before()
+        files: dict[str, list[int | str]] = before["files"]
+        if before["made_of"] == made_of and all(is_written(self._folder / name, files[name]) for name in files):
+            return unplaced
+        self._place.mkdir(exist_ok=True)
+        sweep(self._place)
+        now: dict[str, list[int | str]] = {}
+        with whole_file(self._folder / TABLE) as file:
+            text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+            table = csv.writer(text, lineterminator="\n")
+            table.writerow(COLUMNS)
+            for frame, placed, result in self._tracked(filter(_is_placed, records())):
+                path = self._place / file_name(frame, "label")
+                save(result, path)
+                now[f"{FOLDER}/{path.name}"] = written(path)
+                table.writerows(_rows(frame, placed, result))
+            # the file outlives the wrapper
+            text.detach()
+        now[TABLE] = written(self._folder / TABLE)
+        for name in files.keys() - now.keys():
+            (self._folder / name).unlink(missing_ok=True)
+        with whole_file(self._place / STATE) as file:
+            file.write(json.dumps({"files": now, "made_of": made_of}, indent=0).encode())
+        return unplaced
+
+    def _tracked(self, records: Iterable[Record]) -> Iterator[tuple[str, Sweep, Segmentation]]:
+        """Name, sweep and tracked result of each frame, window by window."""
+        tracker = Tracker()
+        # frames that were labelled together share their labels
+        for _, window in groupby(records, key=lambda record: record["window"]):
+            frames = list(window)
+            results = [read_result(self._folder / file_name(each["frame"], RESULT)) for each in frames]
+            sweeps = [
+                Sweep(result.points, (), np.array(each["pose"], np.float64), float(each["stamp"]))
+                for each, result in zip(frames, results, strict=True)
+            ]
+            for each, placed, result in zip(frames, sweeps, tracker.track(sweeps, results), strict=True):
+                if any(instance.track > MOST_TRACKS for instance in result.instances):
+                    raise LimitError(
+                        f"track: more than {MOST_TRACKS:,} objects up to frame {each['frame']}, which is what a .label "
+                        "can number; take parts of the drive by --frames, each to a folder of its own"
+                    )
+                yield each["frame"], placed, result
+
+    def _before(self) -> dict[str, Any]:
+        """What an earlier run noted of its tracks."""
+        try:
+            with open_file(self._place / STATE, "note of tracks", limit=LARGE_BYTES) as file:
+                match json.loads(file.text()):
+                    case {"files": dict() as files, "made_of": str() as made_of}:
+                        return {"files": {name: files[name] for name in files if _is_ours(name)}, "made_of": made_of}
+        except (FileNotFoundError, ValueError, RecursionError):
+            pass
+        return {"files": {}, "made_of": None}
+
+
+def _is_placed(record: Record) -> bool:
+    return record["pose"] is not None and record["stamp"] is not None
+
+
+def _is_ours(name: str) -> bool:
+    """True for the name of a file that tracks have; nothing else is removed."""
+    return name == TABLE or (name.startswith(f"{FOLDER}/") and name.endswith(".label") and len(Path(name).parts) == 2)
+
+
+def _digest(records: Iterable[Record]) -> str:
+    """Digest of all that tracks depend on."""
+    digest = hashlib.sha256(_ldls.__version__.encode())
+    for record in records:
+        name = file_name(record["frame"], RESULT)
+        parts = [record["frame"], record["files"].get(name), record["window"], record["stamp"], record["pose"]]
+        digest.update(json.dumps(parts).encode())
+    return digest.hexdigest()
+
+
+def _rows(frame: str, placed: Sweep, result: Segmentation) -> Iterator[Sequence[object]]:
+    """A row for each object with points."""
+    for instance, each in zip(result.instances, result.objects, strict=True):
+        if each.centroid is None:
+            continue
+        world = placed.pose[:3, :3] @ each.centroid + placed.pose[:3, 3]
+        score = round(float(each.score), DECIMALS)
+        place = [round(value, DECIMALS) for value in world.tolist()]
+        yield frame, instance.track, each.label, each.category, each.name, score, each.n_points, *place
