@@ -4,8 +4,9 @@ import sys
 
 import pytest
 
-from batch import runs
+from batch import drives, runs
 from datasets import layouts
+from ldls.simulation import Drive, drive_folder, write_drive
 
 
 @pytest.fixture(scope="session")
@@ -39,3 +40,18 @@ def small_disk(tmp_path):
         pytest.skip("only root may mount a small file system")
     yield place
     subprocess.run(["umount", str(place)], check=True)
+
+
+@pytest.fixture(scope="session")
+def simulated(tmp_path_factory):
+    """A simulated drive of five frames with masks and poses; nobody changes it."""
+    folder, drive = tmp_path_factory.mktemp("simulated"), Drive(n_frames=5, seed=2, lidar="vlp-16", camera="robot")
+    for _ in write_drive(folder, drive):
+        pass
+    return drive_folder(folder, drive)
+
+
+@pytest.fixture
+def drive(tmp_path):
+    """A small drive of eight frames that a test may change."""
+    return drives.small_drive(tmp_path / "drive")

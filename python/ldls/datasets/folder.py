@@ -83,7 +83,8 @@ class FolderSource(FileSource):
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
         masks = dict.fromkeys(self._one(place, self.names[index]) for place in self.stored_masks.values())
-        return (self._file, *super().files(index), *(path for path in masks if path.exists()))
+        shared = (self._file,) if self._described.stamps is None else (self._file, self._safe(self._described.stamps))
+        return (*shared, *super().files(index), *(path for path in masks if path.exists()))
 
     def _image(self, camera: str, index: int) -> CameraImage:
         name = self.names[index]

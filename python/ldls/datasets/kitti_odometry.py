@@ -73,12 +73,20 @@ class KittiOdometrySource(FileSource):
         calib = path / "calib.txt"
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}
         self.stamps = _read_stamps(path, self.names)
-        self._trajectory = _trajectory(path, next(iter(self._cameras.values())))
+        self._poses_file = _poses_file(path)
+        self._trajectory = _trajectory(path, self._poses_file, next(iter(self._cameras.values())))
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """True for a path that looks like a sequence, or holds some."""
         return _is_sequence(path) or bool(_sequences(path)) or bool(_sequences(path / "sequences"))
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from, those of times and poses among them."""
+        return (
+            *super().files(index),
+            *(file for file in (self.path / TIMES, self._poses_file) if file and file.exists()),
+        )
 
     def _image(self, name: str, index: int) -> CameraImage:
         path = self._parts[name][self.names[index]]
@@ -110,17 +118,20 @@ def _read_stamps(path: Path, names: Sequence[str]) -> tuple[float | None, ...]:
     return read_stamps(path / TIMES, names, _seconds, example="0.103736")
 
 
-def _trajectory(path: Path, camera: Camera) -> Trajectory | None:
-    """The way of the lidar, where the sequence has times and poses; every camera's transform is that to camera 0."""
+def _poses_file(path: Path) -> Path | None:
     files = [path / "poses.txt"]
     if path.absolute().parent.name == "sequences":
         files.append(path.absolute().parents[1] / "poses" / f"{path.name}.txt")
-    there = [file for file in files if file.exists()]
-    if not there or not (path / TIMES).exists():
+    return next((file for file in files if file.exists()), None)
+
+
+def _trajectory(path: Path, poses: Path | None, camera: Camera) -> Trajectory | None:
+    """The way of the lidar, where the sequence has times and poses; every camera's transform is that to camera 0."""
+    if poses is None or not (path / TIMES).exists():
         return None
     lines = [str(number) for number in range(len(read_lines(path / TIMES)))]
     stamps = np.array(_read_stamps(path, lines), np.float64)
-    return read_poses(there[0], format="kitti", stamps=stamps, T_camera_lidar=camera.T_camera_lidar)
+    return read_poses(poses, format="kitti", stamps=stamps, T_camera_lidar=camera.T_camera_lidar)
 
 
 def _seconds(line: str) -> float:

@@ -11,13 +11,23 @@ from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
-from ldls.datasets.file_source import FileSource, check_folders, choose, find_images, find_points, image_from_file
+import numpy as np
+
+from ldls.datasets.file_source import (
+    FileSource,
+    check_folders,
+    choose,
+    find_files,
+    find_images,
+    find_points,
+    image_from_file,
+)
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import SourceError
 from ldls.io import read_camera, read_poses
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
-from ldls.io.poses.kitti_raw import CALIBRATION
+from ldls.io.poses.kitti_raw import CALIBRATION, STAMPS
 from ldls.sequences import Trajectory
 
 LIDAR, OXTS = "velodyne_points", "oxts"
@@ -73,6 +83,7 @@ class KittiRawSource(FileSource):
         super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
         self.stamps = _stamps(path / LIDAR, self.names)
         self._trajectory = _trajectory(path)
+        self._measured = _measured(path) if self._trajectory is not None else ()
         self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}
 
     @classmethod
@@ -83,6 +94,20 @@ class KittiRawSource(FileSource):
     def _image(self, camera: str, index: int) -> CameraImage:
         path = self._parts[camera][self.names[index]]
         return image_from_file(camera, path, self._cameras[camera], stamp=self._image_stamps[camera][index])
+
+    def files(self, index: int) -> tuple[Path, ...]:
+        """The files that a frame is read from; of the poses those beside its stamp, and what all of them share."""
+        own, clock = super().files(index), self.path / LIDAR / STAMPS
+        if clock.exists():
+            own += (clock,)
+        stamp = self.stamps[index]
+        if self._trajectory is None or stamp is None:
+            return own
+        after = int(np.searchsorted(self._trajectory.stamps, stamp))
+        beside = self._measured[max(min(after, len(self._measured) - 1) - 1, 0) :][:2]
+        shared = (self.path.parent / CALIBRATION, self.path / OXTS / STAMPS)
+        # the world begins at the first
+        return (*own, *shared, *dict.fromkeys((self._measured[0], *beside)))
 
     def _truth_files(self, name: str) -> Iterable[tuple[Path, str]]:
         return [(self.path / "annotations" / f"{name}.txt", "annotations")]
@@ -107,5 +132,12 @@ def _trajectory(path: Path) -> Trajectory | None:
     return read_poses(path / OXTS, format="kitti-raw") if there else None
 
 
+def _measured(path: Path) -> tuple[Path, ...]:
+    """The file of each pose; what has no stamp is none."""
+    files = find_files(path / OXTS / "data", (".txt",))
+    stamps = _stamps(path / OXTS, tuple(files))
+    return tuple(file for file, stamp in zip(files.values(), stamps, strict=True) if stamp is not None)
+
+
 def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:
-    return read_stamps(folder / "timestamps.txt", names, clock_seconds, example=CLOCK_EXAMPLE)
+    return read_stamps(folder / STAMPS, names, clock_seconds, example=CLOCK_EXAMPLE)

@@ -95,6 +95,7 @@ class NuScenesSource:
         warn_left_out(self.path, self.left_out.values(), len(samples))
         self._frames = tuple(readings[token] for token in samples if token not in missing)
         self.stamps: tuple[float | None, ...] = tuple(frame[self._lidar].stamp_us / 1e6 for frame in self._frames)
+        self._tables = folder
         self._poses = tables.read_poses(folder, {taken.pose for frame in self._frames for taken in frame.values()})
         sweeps = {frame[self._lidar].token for frame in self._frames} if truth else set()
         self._truths = {name: tables.read_truth_files(folder, name, sweeps) for name in TRUTHS}
@@ -112,8 +113,9 @@ class NuScenesSource:
         return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from."""
-        return tuple(self._file(taken.filename) for taken in self._frames[index].values())
+        """The files that a frame is read from, the table of poses among them."""
+        taken = (self._file(taken.filename) for taken in self._frames[index].values())
+        return (*taken, self._tables / "ego_pose.json")
 
     def __getitem__(self, index: int) -> Frame:
         frame = self._frames[index]

@@ -29,7 +29,8 @@ def write(path: str | PathLike[str], result: Segmentation) -> None:
     """Write the arrays of `result` under their names, its objects as `object_*`, the rest as JSON text.
 
     `view_names` has a name for each camera. With one, `pixels` belongs to `in_view`, `camera` is its calibration, and
-    `masks_size`, `masks_runs` and so on are those of a `.npz` of masks; with several, `view0_in_view`,
+    `masks_size`, `masks_runs` and so on are those of a `.npz` of masks (of a sweep among others `mask_labels` and
+    `mask_in_view` are those of the view, where they differ); with several, `view0_in_view`,
     `view0_pixels`, `view0_labels`, `view0_camera`, `view0_masks_size` and so on are those of each.
     `object_box` has a row for each object: x y z of the middle, length, width, height in metres, yaw in radians; NaN
     where the object has no point.
@@ -92,6 +93,8 @@ def _views(result: Segmentation) -> dict[str, NDArray[Any]]:
         own = {"view_names": np.array([seen.view.name], np.str_), "pixels": result.pixels}
         if not np.array_equal(seen.labels, _every_mask(result.instances)):
             own["mask_labels"] = seen.labels  # of one sweep among several
+        if not np.array_equal(seen.in_view, result.in_view):
+            own["mask_in_view"] = seen.in_view  # images of other sweeps see more
         return own | _given("", seen.view.camera, mask_arrays(seen.view.masks))
     arrays: dict[str, NDArray[Any]] = {
         "view_names": np.array([seen.view.name or f"camera {i}" for i, seen in enumerate(result.views)], np.str_)
@@ -153,7 +156,8 @@ def _read_views(arrays: Arrays) -> tuple[SeenView, ...]:
     if len(names) != 1:
         return tuple(_read_view(arrays, f"view{i}_", each, arrays[f"view{i}_labels"]) for i, each in enumerate(names))
     labels = arrays["mask_labels"] if "mask_labels" in arrays else _every_mask(arrays["object_name"])
-    return (_read_view(arrays, "", names[0], labels),)
+    in_view = arrays["mask_in_view" if "mask_in_view" in arrays else "in_view"]
+    return (replace(_read_view(arrays, "", names[0], labels), in_view=in_view),)
 
 
 def _every_mask(objects: Sized) -> NDArray[np.int32]:

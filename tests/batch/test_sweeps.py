@@ -1,0 +1,302 @@
+"""Runs that label sweeps of a drive together: the labels, windows, frames that fail, and what is done again."""
+
+import json
+import shutil
+import signal
+
+import numpy as np
+import pytest
+
+import ldls
+from batch import drives, runs
+from ldls import batch
+from ldls.batch import frame_work
+from ldls.batch.frame_work import FrameWork
+from ldls.batch.lock import HOLDER_NAME
+from ldls.batch.plan import windows_of
+from ldls.batch.ray_engine import _noted
+from ldls.batch.ray_worker import RayWorker
+from ldls.datasets import open_source
+from ldls.errors import BatchError, InputError, ParameterError, PoseError
+
+N_FRAMES = 8
+
+
+def run(drive, out, *, frames=slice(None), workers=None, engine="local", **settings):
+    settings = {"masks": str(drive / "masks"), "sweeps": 1, **settings}
+    return batch.run(drive, out, batch.RunSettings(**settings), frames=frames, workers=workers, engine=engine)
+
+
+def words(drive, out, *more):
+    return [*runs.arguments(drive, out, "--sweeps", 1), *map(str, more)]
+
+
+def by_hand(source, masks, frames):
+    """The results of `segment_sweeps` of these frames together."""
+    sweeps = []
+    for index in frames:
+        frame = source[index]
+        (image,) = frame.images
+        view = ldls.View(ldls.read_masks(masks / f"{frame.name}.json"), image.camera, image.name)
+        sweeps.append(ldls.Sweep(frame.points, [view], frame.pose, frame.stamp))
+    return ldls.segment_sweeps(sweeps)
+
+
+def records(out):
+    _, *lines = (out / "journal.jsonl").read_text().splitlines()
+    return {record["frame"]: record for record in map(json.loads, lines)}
+
+
+def windows(out):
+    """The frames by their last digits, as the journal says that they were labelled together."""
+    return ["".join(name[-1] for name in record["window"]) for record in records(out).values() if "window" in record]
+
+
+def times(out):
+    return {path.name: path.stat().st_mtime_ns for path in out.iterdir() if path.name != "journal.jsonl"}
+
+
+@pytest.fixture
+def labelled(monkeypatch):
+    """How many sweeps were labelled together each time from now on."""
+    done = []
+    segment_sweeps = frame_work.segment_sweeps
+    noted = lambda sweeps, **options: done.append(len(sweeps)) or segment_sweeps(sweeps, **options)  # noqa: E731
+    monkeypatch.setattr(frame_work, "segment_sweeps", noted)
+    return done
+
+
+@pytest.fixture
+def whole(drive, tmp_path):
+    """The files of an undisturbed run."""
+    run(drive, tmp_path / "whole", workers=1)
+    return runs.contents(tmp_path / "whole")
+
+
+def test_labels_are_those_of_segment_sweeps_window_by_window(simulated, tmp_path):
+    run(simulated, tmp_path / "out", masks=str(simulated / "masks_02"))
+    source = open_source(simulated, truth=False)
+    expected = [*by_hand(source, simulated / "masks_02", (0, 1, 2)), *by_hand(source, simulated / "masks_02", (3, 4))]
+    alone = 0
+    for name, frame, own in zip(source.names, source, expected, strict=True):
+        result = ldls.read_result(tmp_path / f"out/{name}.npz")
+        np.testing.assert_array_equal(result.labels, own.labels)
+        np.testing.assert_array_equal(result.confidence, own.confidence)
+        np.testing.assert_array_equal(result.views[0].in_view, own.views[0].in_view)
+        assert result.instances == own.instances
+        ldls.save(own, tmp_path / "one.label")
+        assert (tmp_path / f"out/{name}.label").read_bytes() == (tmp_path / "one.label").read_bytes()
+        single = ldls.segment(frame.points, [seen.view for seen in own.views])
+        alone += int((single.categories != own.categories).sum())
+        record = records(tmp_path / "out")[name]
+        assert record["stamp"] == frame.stamp and np.array_equal(record["pose"], frame.pose)
+    assert alone > 50, "points that one sweep alone labels in another way"
+    assert windows(tmp_path / "out") == ["012", "012", "012", "34", "34"]
+
+
+@pytest.mark.parametrize("workers", [2, 5])
+def test_any_number_of_workers_yields_the_same_bytes(drive, whole, tmp_path, workers):
+    assert run(drive, tmp_path / "out", workers=workers).n_done == N_FRAMES
+    assert runs.contents(tmp_path / "out") == whole
+
+
+def test_a_ray_cluster_yields_the_same_bytes(drive, whole, tmp_path):
+    pytest.importorskip("ray")
+    assert run(drive, tmp_path / "out", workers=2, engine="ray").n_done == N_FRAMES
+    assert runs.contents(tmp_path / "out") == whole
+
+
+def test_a_worker_of_a_cluster_does_windows_and_notes_them(drive, whole, tmp_path):
+    out, notes = tmp_path / "out", tmp_path / "out/.worker-0"
+    out.mkdir()
+    notes.touch()
+    (out / HOLDER_NAME).write_text("this run")
+    worker = RayWorker()
+    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1)
+    worker.open(FrameWork(open_source(drive), settings, out), ldls.__version__, "this run", notes.name)
+    outcome = worker.do(((3, "000003"), (4, "000004"), (5, "000005")))
+    assert [record["window"] for record in outcome.records] == [["000003", "000004", "000005"]] * 3
+    assert (out / "000004.npz").read_bytes() == whole["000004.npz"]
+    assert _noted(notes, {"000003", "000006"}) == {"000003": outcome}
+
+
+@pytest.mark.parametrize(
+    ("step", "n"), [("file renamed", 5), ("line half written", 1), ("file written, not synced", 20)]
+)
+def test_a_run_that_was_killed_goes_on(tmp_path, step, n):
+    drive = drives.small_drive(tmp_path / "drive", 24)
+    run(drive, tmp_path / "whole")
+    out = tmp_path / "out"
+    killed = runs.finished([step, str(n), *words(drive, out)], program=[str(runs.KILLED_AT)])
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    outcome = runs.resumed(words(drive, out))
+    assert outcome.exit_code == 0, outcome.output
+    assert runs.contents(out) == runs.contents(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("part", ["velodyne/000004.bin", "masks/000004.json"])
+def test_a_frame_that_fails_leaves_its_window_alone_until_it_is_mended(drive, whole, tmp_path, part):
+    out, sound = tmp_path / "out", (drive / part).read_bytes()
+    (drive / part).write_bytes(sound[:-7])
+    for _ in "again":
+        summary = run(drive, out, formats=("npz", "label"))
+        assert [failure.frame for failure in summary.failures] == ["000004"]
+        assert (summary.n_done, windows(out)) == (7, ["012", "012", "012", "35", "35", "67", "67"])
+    (one, _) = by_hand(open_source(drive), drive / "masks", (3, 5)) if "masks" in part else (None, None)
+    if one is not None:
+        np.testing.assert_array_equal(ldls.read_result(out / "000003.npz").labels, one.labels)
+    run(drive, out, formats=("npz", "label", "ply"))
+    (drive / part).write_bytes(sound)
+    # the .ply is not asked for any more, but must not stay as it is
+    summary = run(drive, out)
+    assert (summary.n_done, summary.n_earlier) == (8, 5)
+    run(drive, tmp_path / "at once", formats=("npz", "label", "ply"))
+    at_once = runs.contents(tmp_path / "at once")
+    assert all(runs.contents(out)[name] == at_once[name] for name in ("000003.ply", "000005.ply"))
+    assert {name: runs.contents(out)[name] for name in whole if "jsonl" not in name} == {
+        name: content for name, content in whole.items() if "jsonl" not in name
+    }
+
+
+def test_a_frame_that_fails_again_makes_nothing_be_written(drive, tmp_path):
+    (drive / "masks/000004.json").unlink()
+    run(drive, tmp_path / "out")
+    before, journal = times(tmp_path / "out"), (tmp_path / "out/journal.jsonl").read_bytes()
+    assert run(drive, tmp_path / "out").n_earlier == 5
+    assert {name: at for name, at in times(tmp_path / "out").items() if "failures" not in name} == {
+        name: at for name, at in before.items() if "failures" not in name
+    }
+    assert (tmp_path / "out/journal.jsonl").read_bytes() == journal
+
+
+def test_a_file_that_is_missing_is_written_and_no_other(drive, whole, tmp_path, labelled):
+    run(drive, tmp_path / "out")
+    before = times(tmp_path / "out")
+    labelled.clear()
+    (tmp_path / "out/000004.npz").unlink()
+    assert run(drive, tmp_path / "out").n_earlier == 5
+    assert labelled == [3]
+    assert {name for name, at in times(tmp_path / "out").items() if before[name] != at} == {"000004.npz"}
+    assert runs.contents(tmp_path / "out") == whole
+
+
+def test_formats_that_are_added_are_made_of_the_stored_results(drive, whole, tmp_path, labelled):
+    run(drive, tmp_path / "out", formats=("npz",))
+    assert sorted(labelled) == [2, 3, 3]
+    labelled.clear()
+    assert run(drive, tmp_path / "out").n_done == N_FRAMES
+    assert not labelled
+    assert runs.contents(tmp_path / "out") == whole
+
+
+def test_frames_that_are_added_end_with_the_same_bytes(drive, whole, tmp_path):
+    run(drive, tmp_path / "out", frames=slice(0, 4))
+    assert windows(tmp_path / "out") == ["012", "012", "012", "3"]
+    assert run(drive, tmp_path / "out").n_earlier == 3
+    assert runs.contents(tmp_path / "out") == whole
+
+
+def test_sweeps_are_a_setting(drive, tmp_path):
+    run(drive, tmp_path / "out")
+    with pytest.raises(BatchError, match=r"settings\.sweeps was 1, is 2"):
+        run(drive, tmp_path / "out", sweeps=2)
+    with pytest.raises(ParameterError, match="sweeps: got -1, expected 0 to 100"):
+        batch.RunSettings(sweeps=-1)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "expected"),
+    [
+        pytest.param([0.1 * k for k in range(7)], "012 345 6", id="in a row"),
+        pytest.param([0, 0.1, 1.2, 1.3, 2.3, 2.4, 2.5], "01 234 56", id="gaps"),
+        pytest.param([5, 5.1, 4, 4.1, 4.1, 4.2, 4.3], "01 23 456", id="back, and twice"),
+        pytest.param([0, None, 0.2, 0.3, None, 9, 9.1], "012 34 56", id="not known"),
+    ],
+)
+def test_windows_end_where_time_does_not_go_on(stamps, expected):
+    chosen = tuple((k, str(k)) for k in range(7))
+    found = windows_of(chosen, stamps, 1)
+    assert " ".join("".join(name for _, name in window) for window in found) == expected
+    assert windows_of(chosen, stamps, 0) == [(frame,) for frame in chosen]
+    assert windows_of(chosen[::3], stamps, 0) == [(frame,) for frame in chosen[::3]]
+
+
+def test_a_gap_in_a_drive_ends_a_window(tmp_path):
+    drive = drives.small_drive(tmp_path / "drive", 5)
+    lines = [0, 0.1, 1.5, 1.6, 1.7]
+    (drive / "times.txt").write_text("".join(f"{stamp:e}\n" for stamp in lines))
+    run(drive, tmp_path / "out")
+    assert windows(tmp_path / "out") == ["01", "01", "234", "234", "234"]
+
+
+@pytest.mark.parametrize("settings", [{}, {"sweeps": 0, "track": True}])
+def test_without_poses_nothing_is_begun(tmp_path, settings):
+    drive = drives.small_drive(tmp_path / "drive", 2, poses=False)
+    with pytest.raises(PoseError, match=r"kitti-odometry\) have no poses, .* if poses\.txt .* give --poses FILE"):
+        run(drive, tmp_path / "out", **settings)
+    (drive / "times.txt").unlink()
+    with pytest.raises(PoseError, match="have no stamps, expected them"):
+        run(drive, tmp_path / "out", **settings)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_first_frame_that_can_be_read_tells_whether_there_are_poses(drive, tmp_path):
+    (drive / "velodyne/000000.bin").write_bytes(b"x")
+    assert run(drive, tmp_path / "out").n_done == 7
+
+
+def test_a_frame_without_a_pose_fails_alone(drive, tmp_path):
+    (tmp_path / "poses.txt").write_text(drives.tum_poses(5))
+    summary = run(drive, tmp_path / "out", poses=str(tmp_path / "poses.txt"))
+    assert [failure.frame for failure in summary.failures] == ["000005", "000006", "000007"]
+    assert summary.failures[0].code == "pose" and "no pose at 0.5" in summary.failures[0].message
+    assert windows(tmp_path / "out") == ["012", "012", "012", "34", "34"]
+
+
+def test_poses_that_were_changed_are_noticed(drive, tmp_path):
+    run(drive, tmp_path / "out")
+    (drive / "poses.txt").write_text(drives.kitti_poses(N_FRAMES, step=1.1))
+    with pytest.raises(BatchError, match=r"poses\.txt, of which frame 000000 was made, was changed since"):
+        run(drive, tmp_path / "out")
+
+
+def test_measurements_of_raw_drives_are_inputs_of_the_frames_beside_them(simulated, tmp_path):
+    drive = shutil.copytree(simulated.parent, tmp_path / simulated.parent.name) / simulated.name
+    run(drive, tmp_path / "out", masks=str(drive / "masks_02"))
+    path = drive / "oxts/data/0000000003.txt"
+    path.write_text(path.read_text().replace("49.", "49.0"))
+    with pytest.raises(BatchError, match=r"0000000003\.txt, of which frame 000000000[234] was made, was changed"):
+        run(drive, tmp_path / "out", masks=str(drive / "masks_02"))
+
+
+@pytest.mark.parametrize("write", [drives.tum_poses, drives.kitti_poses])
+def test_a_file_of_poses_stands_for_those_of_the_source(drive, whole, tmp_path, write):
+    shutil.move(drive / "poses.txt", tmp_path / "unused.txt")
+    (tmp_path / "given.txt").write_text(write(N_FRAMES))
+    outcome = runs.resumed(words(drive, tmp_path / "out", "--poses", tmp_path / "given.txt"))
+    assert outcome.exit_code == 0, outcome.output
+    assert windows(tmp_path / "out") == ["012"] * 3 + ["345"] * 3 + ["67"] * 2
+    for name in ("000003.label", "000006.label"):
+        assert (tmp_path / "out" / name).read_bytes() == whole[name]
+    (tmp_path / "given.txt").write_text(write(N_FRAMES, step=1.1))
+    outcome = runs.resumed(words(drive, tmp_path / "out", "--poses", tmp_path / "given.txt"))
+    assert outcome.exit_code == 1
+    assert "settings.poses_sha256 was" in outcome.output
+
+
+def test_a_file_of_poses_of_another_drive_is_refused(drive, tmp_path):
+    (tmp_path / "given.txt").write_text(drives.kitti_poses(3))
+    with pytest.raises(PoseError, match=r"given\.txt: stamps: there are 8 for 3 poses"):
+        run(drive, tmp_path / "out", poses=str(tmp_path / "given.txt"))
+    (tmp_path / "given.txt").write_text("1 2 3\n")
+    with pytest.raises((InputError, ValueError), match=r"given\.txt"):
+        run(drive, tmp_path / "out", poses=str(tmp_path / "given.txt"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_takes_sweeps_of_two(drive, tmp_path):
+    outcome = runs.resumed([*runs.arguments(drive, tmp_path / "out"), "--sweeps", "2"])
+    assert outcome.exit_code == 0, outcome.output
+    assert windows(tmp_path / "out") == ["01234"] * 5 + ["567"] * 3
+    outcome = runs.resumed([*runs.arguments(drive, tmp_path / "out"), "--sweeps", "-1"])
+    assert outcome.exit_code == 2
