@@ -1,0 +1,211 @@
+"""The tracks of a run: what the tracker says of the stored results, whole or not there, and done again when need be."""
+
+import csv
+import re
+import signal
+import sys
+
+import numpy as np
+import pytest
+
+import ldls
+from batch import drives, runs
+from ldls import batch
+from ldls.batch import run_tracks
+from ldls.datasets import open_source
+from ldls.errors import LeftOutWarning, LimitError, PoseError, UnsafePathError
+from ldls.io.labels import read_labeling
+
+
+def run(drive, out, **settings):
+    frames = settings.pop("frames", slice(None))
+    settings = {"masks": str(drive / "masks"), "sweeps": 1, "track": True, "formats": ("npz",), **settings}
+    return batch.run(drive, out, batch.RunSettings(**settings), frames=frames)
+
+
+def rows(out):
+    with (out / "tracks.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def tracks(out):
+    """The files of the tracks."""
+    return {name: content for name, content in runs.contents(out).items() if name.startswith("tracks")}
+
+
+@pytest.fixture
+def tracked(drive, tmp_path):
+    """A finished run, and the files of its tracks."""
+    run(drive, tmp_path / "out")
+    return tmp_path / "out", tracks(tmp_path / "out")
+
+
+@pytest.fixture
+def numbered(monkeypatch):
+    """The sweeps that are tracked together each time from now on."""
+    done = []
+
+    class Noted(ldls.Tracker):
+        def track(self, sweeps, results):
+            done.append(len(sweeps))
+            return super().track(sweeps, results)
+
+    monkeypatch.setattr(run_tracks, "Tracker", Noted)
+    return done
+
+
+@pytest.mark.parametrize("sweeps", [0, 1])
+def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, sweeps):
+    out = tmp_path / "out"
+    run(simulated, out, masks=str(simulated / "masks_02"), sweeps=sweeps)
+    source, tracker = open_source(simulated, truth=False), ldls.Tracker()
+    found = iter(rows(out))
+    for window in ((0, 1, 2), (3, 4)) if sweeps else ((0,), (1,), (2,), (3,), (4,)):
+        results = [ldls.read_result(out / f"{source.names[index]}.npz") for index in window]
+        placed = [ldls.Sweep(source[k].points, (), source[k].pose, source[k].stamp) for k in window]
+        for index, sweep, result in zip(window, placed, tracker.track(placed, results), strict=True):
+            ldls.save(result, tmp_path / "one.label")
+            path = out / f"tracks/{source.names[index]}.label"
+            assert path.read_bytes() == (tmp_path / "one.label").read_bytes()
+            numbers = {instance.label: instance.track for instance in result.instances}
+            read = read_labeling(path).instances
+            np.testing.assert_array_equal(read, [numbers.get(label, 0) for label in result.labels.tolist()])
+            for each in result.objects:
+                if each.n_points:
+                    row = next(found)
+                    world = sweep.pose @ [*each.centroid, 1]
+                    assert (row["frame"], int(row["track"])) == (source.names[index], numbers[each.label])
+                    assert (int(row["label"]), int(row["category"]), row["name"]) == (
+                        each.label, each.category, each.name,
+                    )  # fmt: skip
+                    assert int(row["n_points"]) == each.n_points
+                    place = [float(row[f"world_{axis}_m"]) for axis in "xyz"]
+                    np.testing.assert_allclose(place, world[:3], atol=1e-4)
+    assert next(found, None) is None
+    by_frame = [{row["track"] for row in rows(out) if row["frame"] == name} for name in source.names]
+    assert len(set.intersection(*by_frame)) >= 3, "objects go on as themselves over all windows"
+
+
+def test_a_finished_run_is_not_tracked_again(drive, tracked, numbered):
+    out, before = tracked
+    run(drive, out)
+    assert numbered == []
+    assert tracks(out) == before
+
+
+@pytest.mark.parametrize("name", ["tracks/000004.label", "tracks.csv", "tracks/tracks.json"])
+@pytest.mark.parametrize("change", ["missing", "changed"])
+def test_tracks_that_are_not_whole_are_made_again(drive, tracked, numbered, name, change):
+    out, before = tracked
+    (out / name).unlink()
+    if change == "changed":
+        (out / name).write_text("{")
+    (out / "tracks/.left.ldls-part").write_text("of a killed run")
+    run(drive, out)
+    assert numbered == [3, 3, 2]
+    assert tracks(out) == before
+
+
+def test_tracks_are_those_of_all_frames_that_are_done(drive, tracked, tmp_path, numbered):
+    _, before = tracked
+    parts = tmp_path / "parts"
+    run(drive, parts, frames=slice(0, 3))
+    assert {row["frame"] for row in rows(parts)} == {"000000", "000001", "000002"}
+    run(drive, parts, frames=slice(3, None))
+    assert numbered == [3, 3, 3, 2]
+    assert tracks(parts) == before
+
+
+def test_tracks_may_be_added_to_a_finished_run(drive, tracked, tmp_path):
+    later = tmp_path / "later"
+    run(drive, later, track=False)
+    assert not tracks(later)
+    run(drive, later)
+    assert runs.contents(later) == runs.contents(tracked[0])
+
+
+def test_frames_that_failed_are_passed_over(drive, tmp_path, numbered):
+    sound = (drive / "velodyne/000004.bin").read_bytes()
+    (drive / "velodyne/000004.bin").write_bytes(b"x")
+    assert run(drive, tmp_path / "out").n_done == 7
+    assert numbered == [3, 2, 2]
+    assert not (tmp_path / "out/tracks/000004.label").exists()
+    (drive / "velodyne/000004.bin").write_bytes(sound)
+    run(drive, tmp_path / "out")
+    assert numbered == [3, 2, 2, 3, 3, 2]
+    assert (tmp_path / "out/tracks/000004.label").exists()
+
+
+def test_a_frame_without_a_pose_is_left_out_where_each_is_alone(drive, tmp_path):
+    (drive / "times.txt").unlink()
+    (drive / "times.txt").write_text("".join(f"{0.1 * k:e}\n" for k in range(8)))
+    (tmp_path / "poses.txt").write_text(drives.tum_poses(8))
+    out = tmp_path / "out"
+    run(drive, out, sweeps=0, poses=str(tmp_path / "poses.txt"))
+    journal = (out / "journal.jsonl").read_text()
+    line = next(line for line in journal.splitlines() if '"frame":"000005"' in line)
+    (out / "journal.jsonl").write_text(journal.replace(line, re.sub(r'"pose":\[\[.*?\]\]', '"pose":null', line)))
+    with pytest.warns(LeftOutWarning, match=r"1 frames \(000005\) have no pose"):
+        run(drive, out, sweeps=0, poses=str(tmp_path / "poses.txt"))
+    assert not (out / "tracks/000005.label").exists() and (out / "tracks/000006.label").exists()
+
+
+@pytest.mark.parametrize(("step", "n"), [("file renamed", 19), ("file synced, not renamed", 16)])
+def test_killed_while_tracks_are_written(drive, tracked, tmp_path, step, n):
+    out = tmp_path / "killed"
+    words = runs.arguments(drive, out, "--sweeps", 1, "--track", "--formats", "npz")
+    killed = runs.finished([step, str(n), *words], program=[str(runs.KILLED_AT)])
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    assert not (out / "tracks/tracks.json").exists()
+    outcome = runs.resumed(words)
+    assert outcome.exit_code == 0, outcome.output
+    assert f"tracks in {out / 'tracks'}" in outcome.output
+    assert runs.contents(out) == runs.contents(tracked[0])
+
+
+def test_more_objects_than_sixteen_bits_number(drive, tmp_path, monkeypatch):
+    monkeypatch.setattr(run_tracks, "MOST_TRACKS", 1)
+    with pytest.raises(LimitError, match=r"more than 1 objects up to frame 000000, .* --frames"):
+        run(drive, tmp_path / "out")
+    assert not (tmp_path / "out/tracks.csv").exists()
+
+
+def test_without_scipy_nothing_is_begun(drive, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
+    with pytest.raises(ImportError, match=r"pip install 'ldls\[eval\]'"):
+        run(drive, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_sweeps_in_disorder_are_refused_before_anything_is_done(drive, tmp_path):
+    stamps = [0, 0.1, 0.2, 0.25, 0.24, 0.5, 0.6, 0.7]
+    (drive / "times.txt").write_text("".join(f"{stamp:e}\n" for stamp in stamps))
+    (drive / "poses.txt").unlink()
+    (tmp_path / "poses.txt").write_text(drives.tum_poses(8))
+    with pytest.raises(PoseError, match=r"frame 000004 \(0\.240000 s\) comes after 000003 \(0\.250000 s\)"):
+        run(drive, tmp_path / "out", poses=str(tmp_path / "poses.txt"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_link_in_the_place_of_the_tracks_is_not_followed(drive, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "out/tracks").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(UnsafePathError, match="is a link"):
+        run(drive, tmp_path / "out")
+    assert not list((tmp_path / "elsewhere").iterdir())
+
+
+def test_frames_whose_files_would_be_those_of_the_tracks(tmp_path):
+    with pytest.raises(UnsafePathError, match="frame 'tracks'"):
+        run_tracks.RunTracks(tmp_path, ["a", "Tracks"])
+
+
+def test_a_note_that_names_other_files_has_nothing_removed(drive, tracked):
+    out, before = tracked
+    note = (out / "tracks/tracks.json").read_text()
+    (out / "tracks/tracks.json").write_text(note.replace('"files": {', '"files": {"000001.npz": [0, ""],'))
+    (out / "tracks.csv").unlink()
+    run(drive, out)
+    assert (out / "000001.npz").exists()
+    assert tracks(out) == before
