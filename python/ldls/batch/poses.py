@@ -38,6 +38,7 @@ class Poses:
             FileNotFoundError: There is no such file.
         """
         self._source, self._settings = source, settings
+        self._stamps = _stamps(source)
         self._trajectory: Trajectory | None = None
         self.sha256: str | None = None
         if settings.poses is not None:
@@ -68,7 +69,7 @@ class Poses:
         """
         if not self._settings.sweeps and not self._settings.track:
             return
-        named = zip(self._source.names, self._source.stamps, strict=True)
+        named = zip(self._source.names, self._stamps, strict=True)
         known = [(name, stamp) for name, stamp in named if stamp is not None]
         if not known:
             raise PoseError(
@@ -91,7 +92,7 @@ class Poses:
     def _has_poses(self, chosen: Frames) -> bool:
         """False if the first frame that can be read and has a stamp has no pose."""
         for index, _ in chosen:
-            if self._source.stamps[index] is not None:
+            if self._stamps[index] is not None:
                 try:
                     return self._source[index].pose is not None
                 except (LdlsError, OSError):
@@ -100,11 +101,16 @@ class Poses:
         return True
 
 
+def _stamps(source: Source) -> tuple[float | None, ...]:
+    """Times of the sweeps; sources of others may have no such attribute."""
+    return tuple(getattr(source, "stamps", (None,) * len(source)))
+
+
 def _trajectory(path: Path, source: Source) -> Trajectory:
     """The way of the lidar by a file; a file of KITTI's has a line for each frame of the source."""
     if format_of(path) != "kitti":
         return read_poses(path)
-    stamps = [stamp for stamp in source.stamps if stamp is not None]
+    stamps = [stamp for stamp in _stamps(source) if stamp is not None]
     if len(stamps) < len(source):
         raise PoseError(
             f"{path}: KITTI's poses have no times, and {len(source) - len(stamps)} of {len(source)} frames of "
