@@ -196,6 +196,21 @@ def test_frames_that_are_added_end_with_the_same_bytes(drive, whole, tmp_path):
     assert runs.contents(tmp_path / "out") == whole
 
 
+def test_other_frames_have_other_neighbours_and_are_labelled_again(drive, whole, tmp_path, labelled):
+    out = tmp_path / "out"
+    run(drive, out)
+    run(drive, tmp_path / "at once", frames=slice(1, None))
+    labelled.clear()
+    assert run(drive, out, frames=slice(1, None)).n_earlier == 0
+    assert sorted(labelled) == [1, 3, 3]
+    assert windows(out) == ["012", *["123"] * 3, *["456"] * 3, "7"]
+    at_once = runs.without_journal(tmp_path / "at once")
+    assert {name: content for name, content in runs.without_journal(out).items() if name in at_once} == at_once
+    assert any(at_once[name] != whole[name] for name in at_once)
+    run(drive, out)
+    assert runs.contents(out) == whole
+
+
 def test_sweeps_are_a_setting(drive, tmp_path):
     run(drive, tmp_path / "out")
     with pytest.raises(BatchError, match=r"settings\.sweeps was 1, is 2"):

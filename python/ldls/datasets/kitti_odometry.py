@@ -83,10 +83,8 @@ class KittiOdometrySource(FileSource):
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from, those of times and poses among them."""
-        return (
-            *super().files(index),
-            *(file for file in (self.path / TIMES, self._poses_file) if file and file.exists()),
-        )
+        shared = (self.path / TIMES, self._poses_file)
+        return (*super().files(index), *(file for file in shared if file is not None and file.exists()))
 
     def _image(self, name: str, index: int) -> CameraImage:
         path = self._parts[name][self.names[index]]
