@@ -120,9 +120,7 @@ def test_a_worker_of_a_cluster_does_windows_and_notes_them(drive, whole, tmp_pat
     assert _noted(notes, {"000003", "000006"}) == {"000003": outcome}
 
 
-@pytest.mark.parametrize(
-    ("step", "n"), [("file renamed", 5), ("line half written", 1), ("file written, not synced", 20)]
-)
+@pytest.mark.parametrize(("step", "n"), [("line half written", 1), ("file written, not synced", 20)])
 def test_a_run_that_was_killed_goes_on(tmp_path, step, n):
     drive = drives.small_drive(tmp_path / "drive", 24)
     run(drive, tmp_path / "whole")
