@@ -16,7 +16,7 @@ from ldls.batch.lock import HOLDER_NAME
 from ldls.batch.plan import windows_of
 from ldls.batch.ray_engine import _noted
 from ldls.batch.ray_worker import RayWorker
-from ldls.datasets import open_source
+from ldls.datasets import odometry_of, open_source
 from ldls.errors import BatchError, InputError, ParameterError, PoseError
 
 N_FRAMES = 8
@@ -295,6 +295,24 @@ def test_a_file_of_poses_stands_for_those_of_the_source(drive, whole, tmp_path, 
     outcome = runs.resumed(words(drive, tmp_path / "out", "--poses", tmp_path / "given.txt"))
     assert outcome.exit_code == 1
     assert "settings.poses_sha256 was" in outcome.output
+
+
+def test_odometry_stands_for_poses_and_is_kept(simulated, tmp_path):
+    pytest.importorskip("kiss_icp", reason="the extra odometry is not installed")
+    drive = shutil.copytree(simulated.parent, tmp_path / simulated.parent.name) / simulated.name
+    shutil.rmtree(drive / "oxts")
+    for clock in drive.glob("*/timestamps.txt"):
+        clock.unlink()
+    settings = {"masks": str(drive / "masks_02"), "poses": "kiss-icp"}
+    run(drive, tmp_path / "out", **settings)
+    kept = ldls.read_poses(tmp_path / "out/poses.txt")
+    expected = odometry_of(open_source(drive))
+    np.testing.assert_array_equal(kept.stamps, expected.stamps)
+    np.testing.assert_allclose(kept.poses, expected.poses, atol=1e-12)
+    assert windows(tmp_path / "out") == ["012"] * 3 + ["34"] * 2
+    before = (tmp_path / "out/poses.txt").stat().st_mtime_ns
+    assert run(drive, tmp_path / "out", **settings).n_earlier == 5
+    assert (tmp_path / "out/poses.txt").stat().st_mtime_ns == before
 
 
 def test_a_file_of_poses_of_another_drive_is_refused(drive, tmp_path):

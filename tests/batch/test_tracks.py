@@ -13,7 +13,14 @@ from batch import drives, runs
 from ldls import batch
 from ldls.batch import run_tracks
 from ldls.datasets import open_source
-from ldls.errors import LeftOutWarning, LimitError, PoseError, UnsafePathError
+from ldls.errors import (
+    LeftOutWarning,
+    LimitError,
+    ParameterError,
+    PoseError,
+    UnsafePathError,
+    UnsupportedFormatError,
+)
 from ldls.io.labels import read_labeling
 
 
@@ -31,6 +38,11 @@ def rows(out):
 def tracks(out):
     """The files of the tracks."""
     return {name: content for name, content in runs.contents(out).items() if name.startswith("tracks")}
+
+
+def run_with_map(drive, out, path, **settings):
+    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, formats=("npz",), **settings)
+    return batch.run(drive, out, settings, map_file=path)
 
 
 @pytest.fixture
@@ -81,9 +93,36 @@ def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, s
                     assert int(row["n_points"]) == each.n_points
                     place = [float(row[f"world_{axis}_m"]) for axis in "xyz"]
                     np.testing.assert_allclose(place, world[:3], atol=1e-4)
+                    velocity = [float(row[f"velocity_{axis}_m_s"]) for axis in "xy"]
+                    np.testing.assert_allclose(velocity, result.instances[each.label - 1].velocity, atol=1e-4)
     assert next(found, None) is None
     by_frame = [{row["track"] for row in rows(out) if row["frame"] == name} for name in source.names]
     assert len(set.intersection(*by_frame)) >= 3, "objects go on as themselves over all windows"
+
+
+def test_a_map_holds_what_the_tracked_results_leave_standing(drive, tmp_path):
+    run_with_map(drive, tmp_path / "out", tmp_path / "map.ply", track=True)
+    before = (tmp_path / "map.ply").read_bytes()
+    source, tracker, places = open_source(drive, truth=False), ldls.Tracker(), ldls.LabelledMap()
+    for window in ((0, 1, 2), (3, 4, 5), (6, 7)):
+        results = [ldls.read_result(tmp_path / f"out/{source.names[index]}.npz") for index in window]
+        placed = [ldls.Sweep(source[k].points, (), source[k].pose, source[k].stamp) for k in window]
+        for sweep, result in zip(placed, tracker.track(placed, results), strict=True):
+            places.add(sweep, result)
+    assert len(places) > 100
+    ldls.save(places, tmp_path / "expected.ply")
+    assert before == (tmp_path / "expected.ply").read_bytes()
+    (tmp_path / "map.ply").unlink()
+    run_with_map(drive, tmp_path / "out", tmp_path / "map.ply", track=True)
+    assert (tmp_path / "map.ply").read_bytes() == before, "of what earlier runs did, too"
+
+
+def test_a_map_without_tracks_or_of_no_format_is_refused_before_anything_is_done(drive, tmp_path):
+    with pytest.raises(ParameterError, match=r"map: .*map\.ply is without what moves, .* add --track"):
+        run_with_map(drive, tmp_path / "out", tmp_path / "map.ply")
+    with pytest.raises(UnsupportedFormatError, match=r"cannot write a map to '\.xyz'"):
+        run_with_map(drive, tmp_path / "out", tmp_path / "map.xyz", track=True)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_finished_run_is_not_tracked_again(drive, tracked, numbered):

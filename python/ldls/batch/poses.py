@@ -1,7 +1,8 @@
-"""Where the lidar was at each frame of a run: by a file of poses, or as the source says."""
+"""Where the lidar was at each frame of a run: by a file of poses, by odometry, or as the source says."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,23 +11,48 @@ from numpy.typing import NDArray
 
 from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames
-from ldls.datasets import Frame, Source
+from ldls.datasets import Frame, Source, odometry_of
+from ldls.datasets.odometry import PERIOD_S
 from ldls.errors import LdlsError, PoseError, within
 from ldls.io import read_poses
 from ldls.io.files import digest_of
+from ldls.io.poses import tum
 from ldls.io.poses.read import format_of
 from ldls.sequences import Trajectory
 
 WHENCE = (
     "kitti-raw has them if oxts/ and the day's calib_imu_to_velo.txt are there, kitti-odometry if poses.txt and "
-    "times.txt are, nuscenes always, rosbag with --option world=odom; else give --poses FILE"
+    "times.txt are, nuscenes always, rosbag with --option world=odom; else give --poses FILE, or --poses kiss-icp"
 )
+ODOMETRY = "kiss-icp"
+"""What stands in the place of a file where the sweeps themselves are to say how the lidar moved."""
+FOUND = "poses.txt"
+"""File in the folder of the run that these poses are kept in, in TUM's format."""
+
+
+def with_odometry(source: Source, settings: RunSettings, folder: Path) -> RunSettings:
+    """The settings with a file of poses where these are to be found from the sweeps, which is done once a folder.
+
+    Raises:
+        LdlsError: The sweeps do not say how the lidar moved; see `ldls.datasets.odometry_of`.
+        ImportError: `ldls[odometry]` is not installed.
+    """
+    if settings.poses != ODOMETRY:
+        return settings
+    path = folder / FOUND
+    if not path.is_file():
+        trajectory = odometry_of(source)
+        folder.mkdir(parents=True, exist_ok=True)
+        tum.write(path, trajectory)
+    return replace(settings, poses=str(path))
 
 
 class Poses:
     """The poses of the frames of a source.
 
     Attributes:
+        stamps: Time of each frame in seconds; None where it is not known. Frames of a source without any time are
+            taken 0.1 s apart where poses are given.
         sha256: Digest of the file of poses; None without one.
     """
 
@@ -38,26 +64,26 @@ class Poses:
             FileNotFoundError: There is no such file.
         """
         self._source, self._settings = source, settings
-        self._stamps = _stamps(source)
+        self.stamps = _stamps(source, settings)
         self._trajectory: Trajectory | None = None
         self.sha256: str | None = None
         if settings.poses is not None:
             path = Path(settings.poses)
             self.sha256 = digest_of(path)
-            self._trajectory = _trajectory(path, source)
+            self._trajectory = _trajectory(path, source, self.stamps)
 
-    def of(self, frame: Frame) -> NDArray[np.float64] | None:
-        """(4, 4) T_world_lidar of a frame; None where it is not known and not needed.
+    def of(self, index: int, frame: Frame) -> NDArray[np.float64] | None:
+        """(4, 4) T_world_lidar of frame `index`; None where it is not known and not needed.
 
         Raises:
             PoseError: It is needed and not known, or the file of poses has none at its stamp.
         """
-        pose = frame.pose
+        pose, stamp = frame.pose, self.stamps[index]
         if self._trajectory is not None:
             with within(str(self._settings.poses)):
-                pose = None if frame.stamp is None else self._trajectory.at(frame.stamp)
-        if self._settings.sweeps and (frame.stamp is None or pose is None):
-            what = "stamp" if frame.stamp is None else "pose"
+                pose = None if stamp is None else self._trajectory.at(stamp)
+        if self._settings.sweeps and (stamp is None or pose is None):
+            what = "stamp" if stamp is None else "pose"
             raise PoseError(f"the frame has no {what}, without which it cannot be joined with others; leave it out")
         return pose
 
@@ -69,12 +95,12 @@ class Poses:
         """
         if not self._settings.sweeps and not self._settings.track:
             return
-        named = zip(self._source.names, self._stamps, strict=True)
+        named = zip(self._source.names, self.stamps, strict=True)
         known = [(name, stamp) for name, stamp in named if stamp is not None]
         if not known:
             raise PoseError(
                 f"{self._source.path}: frames of this source ({self._source.kind}) have no stamps, expected them and "
-                "poses for --sweeps and --track; take a source with times, as an ldls.toml with stamps"
+                "poses for --sweeps and --track; take a source with times, as an ldls.toml with stamps, or give --poses"
             )
         unordered = (pair for pair in pairwise(known) if not pair[0][1] < pair[1][1])
         if self._settings.track and (pair := next(unordered, None)) is not None:
@@ -92,7 +118,7 @@ class Poses:
     def _has_poses(self, chosen: Frames) -> bool:
         """False if the first frame that can be read and has a stamp has no pose."""
         for index, _ in chosen:
-            if self._stamps[index] is not None:
+            if self.stamps[index] is not None:
                 try:
                     return self._source[index].pose is not None
                 except (LdlsError, OSError):
@@ -101,16 +127,19 @@ class Poses:
         return True
 
 
-def _stamps(source: Source) -> tuple[float | None, ...]:
-    """Times of the sweeps; sources of others may have no such attribute."""
-    return tuple(getattr(source, "stamps", (None,) * len(source)))
+def _stamps(source: Source, settings: RunSettings) -> tuple[float | None, ...]:
+    # sources of others may have no such attribute
+    stamps = tuple(getattr(source, "stamps", (None,) * len(source)))
+    if settings.poses is None or any(stamp is not None for stamp in stamps):
+        return stamps
+    return tuple(PERIOD_S * number for number in range(len(source)))
 
 
-def _trajectory(path: Path, source: Source) -> Trajectory:
+def _trajectory(path: Path, source: Source, times: tuple[float | None, ...]) -> Trajectory:
     """The way of the lidar by a file; a file of KITTI's has a line for each frame of the source."""
     if format_of(path) != "kitti":
         return read_poses(path)
-    stamps = [stamp for stamp in _stamps(source) if stamp is not None]
+    stamps = [stamp for stamp in times if stamp is not None]
     if len(stamps) < len(source):
         raise PoseError(
             f"{path}: KITTI's poses have no times, and {len(source) - len(stamps)} of {len(source)} frames of "

@@ -17,14 +17,14 @@ from ldls.batch.frame_work import Earlier, FrameWork
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
 from ldls.batch.plan import check_names, windows_of
-from ldls.batch.poses import Poses
+from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import RunBag
 from ldls.batch.run_tracks import RunTracks
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
 from ldls.batch.window import Frames, Outcome
 from ldls.datasets import Source, open_source
-from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, some
+from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, ParameterError, some
 from ldls.io.files import check_folder, sweep
 from ldls.io.objects import objects_writer
 from ldls.viewing.formats import BAG, RESULT, file_name, written_formats
@@ -44,6 +44,7 @@ def run(
     frames: slice = slice(None),
     options: Mapping[str, Any] | None = None,
     objects: str | PathLike[str] | None = None,
+    map_file: str | PathLike[str] | None = None,
     workers: int | None = None,
     engine: str | Engine = "local",
     ray_address: str | None = None,
@@ -67,6 +68,8 @@ def run(
             that it was opened with: a run goes on only with the same ones.
         objects: A `.csv` or `.json` file for one table of the objects of all frames, in the order of the frames, as
             `ldls.save_objects` writes it; it is written at the end, of what earlier runs did, too.
+        map_file: A `.ply`, `.pcd`, `.las` or `.laz` file for what stands still in the drive (`ldls.LabelledMap`), as
+            all frames tell that are done; needs `settings.track`.
         workers: Frames, or windows of them, segmented at a time; as many as the process, or the cluster, may use cores
             by default.
         engine: Where they are segmented: "local", "ray", or an engine of your own.
@@ -80,7 +83,8 @@ def run(
     Raises:
         BatchError: Another run is at work in `out`, or `out` holds a run of other settings, source or version.
         CorruptFileError: The journal in `out` is none.
-        UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`.
+        ParameterError: A map is asked for, and no tracks.
+        UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
         PoseError: Sweeps are to be joined or objects tracked, and frames have no stamps or poses.
         LimitError: There are more tracks than 16 bits number.
@@ -97,9 +101,11 @@ def run(
     write_objects = None if objects is None else objects_writer(objects)
     folder = Path(out)
     bag = RunBag(opened, folder) if BAG in settings.formats else None
-    tracks = RunTracks(folder, names) if settings.track else None
-    Poses(opened, settings).check(chosen)
-    windows = windows_of(chosen, opened.stamps if settings.sweeps else (), settings.sweeps)
+    tracks = _tracks(settings, folder, names, map_file)
+    settings = with_odometry(opened, settings, folder)
+    poses = Poses(opened, settings)
+    poses.check(chosen)
+    windows = windows_of(chosen, poses.stamps, settings.sweeps)
     folder.mkdir(parents=True, exist_ok=True)
     if objects is not None:
         check_folder(objects)
@@ -166,6 +172,17 @@ def run(
         seconds=dict(seconds),
         elapsed=elapsed,
     )
+
+
+def _tracks(
+    settings: RunSettings, folder: Path, names: Sequence[str], map_file: str | PathLike[str] | None
+) -> RunTracks | None:
+    """The tracks of a run, and its map, where they are asked for."""
+    if settings.track:
+        return RunTracks(folder, names, None if map_file is None else Path(map_file))
+    if map_file is not None:
+        raise ParameterError(f"map: {map_file} is without what moves, which tracks tell; add --track")
+    return None
 
 
 def _stored(journal: Journal, names: Sequence[str], folder: Path) -> Iterator[Record]:

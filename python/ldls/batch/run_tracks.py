@@ -5,6 +5,8 @@ The folder of the run then has
 - `tracks/FRAME.label`: labels after SemanticKITTI, with the track in the upper 16 bits;
 - `tracks.csv`: a row for each object with points of each frame;
 - `tracks/tracks.json`: a digest of what they were made of, and size and digest of each of these files.
+
+The map of the drive, where one is asked for, is made in the same pass, each time anew.
 """
 
 from __future__ import annotations
@@ -25,15 +27,19 @@ from ldls.batch.journal import Record
 from ldls.batch.known_files import is_written, written
 from ldls.errors import LimitError, UnsafePathError
 from ldls.io import read_result, save
-from ldls.io.files import LARGE_BYTES, open_file, refuse_link, sweep, whole_file
+from ldls.io.files import LARGE_BYTES, check_folder, open_file, refuse_link, sweep, whole_file
 from ldls.io.objects import DECIMALS
+from ldls.io.results import map_writer
 from ldls.segmentation import Segmentation
-from ldls.sequences import Sweep, Tracker
+from ldls.sequences import LabelledMap, Sweep, Tracker
 from ldls.viewing.formats import RESULT, file_name
 
 FOLDER, TABLE, STATE = "tracks", "tracks.csv", "tracks.json"
-COLUMNS = ("frame", "track", "label", "category", "name", "score", "n_points", "world_x_m", "world_y_m", "world_z_m")
-"""Columns of the table: those of tables of objects, and the mean of the points in the world of the poses."""
+COLUMNS = (
+    "frame", "track", "label", "category", "name", "score", "n_points", "world_x_m", "world_y_m", "world_z_m",
+    "velocity_x_m_s", "velocity_y_m_s",
+)  # fmt: skip
+"""Columns of the table: those of tables of objects, and the mean of the points and their velocity in the world."""
 MOST_TRACKS = (1 << 16) - 1
 """A `.label` has 16 bits for them."""
 
@@ -41,17 +47,21 @@ MOST_TRACKS = (1 << 16) - 1
 class RunTracks:
     """The tracks in the folder of a run."""
 
-    def __init__(self, folder: Path, names: Iterable[str]) -> None:
-        """Tracks in `folder`, of frames of these names.
+    def __init__(self, folder: Path, names: Iterable[str], map_file: Path | None = None) -> None:
+        """Tracks in `folder`, of frames of these names, and a file for the map.
 
         Raises:
             ImportError: `ldls[eval]` is not installed.
+            UnsupportedFormatError: Maps are not written to such files.
             UnsafePathError: Files of a frame and of the tracks would be one.
         """
         Tracker()
         if any(name.casefold() == FOLDER for name in names):
             raise UnsafePathError(f"frame {FOLDER!r}: its files and {TABLE} may be one; rename it, or do not track")
-        self._folder, self._place = folder, folder / FOLDER
+        if map_file is not None:
+            map_writer(map_file)
+            check_folder(map_file)
+        self._folder, self._place, self._map = folder, folder / FOLDER, map_file
 
     def write(self, records: Callable[[], Iterable[Record]]) -> list[str]:
         """Number the objects of all frames that are done, if that was not done; the frames left out, without a pose.
@@ -62,7 +72,7 @@ class RunTracks:
             records: Gives the journal's records of the frames that have a stored result, in the order of the source.
 
         Raises:
-            LimitError: There are more objects than a `.label` has numbers for.
+            LimitError: There are more objects than a `.label` has numbers for, or the map has too many voxels.
             FileFormatError: A stored result is broken.
             UnsafePathError: The folder of the tracks is a link.
             OSError: A file cannot be written, as on a full disk; give the same command again.
@@ -71,8 +81,10 @@ class RunTracks:
         unplaced = [record["frame"] for record in records() if not _is_placed(record)]
         made_of, before = _digest(records()), self._before()
         files: dict[str, list[int | str]] = before["files"]
-        if before["made_of"] == made_of and all(is_written(self._folder / name, files[name]) for name in files):
+        current = before["made_of"] == made_of and all(is_written(self._folder / name, files[name]) for name in files)
+        if current and self._map is None:
             return unplaced
+        places = LabelledMap()
         self._place.mkdir(exist_ok=True)
         sweep(self._place)
         now: dict[str, list[int | str]] = {}
@@ -85,6 +97,8 @@ class RunTracks:
                 save(result, path)
                 now[f"{FOLDER}/{path.name}"] = written(path)
                 table.writerows(_rows(frame, placed, result))
+                if self._map is not None:
+                    places.add(placed, result)
             # the file outlives the wrapper
             text.detach()
         now[TABLE] = written(self._folder / TABLE)
@@ -92,6 +106,8 @@ class RunTracks:
             (self._folder / name).unlink(missing_ok=True)
         with whole_file(self._place / STATE) as file:
             file.write(json.dumps({"files": now, "made_of": made_of}, indent=0).encode())
+        if self._map is not None:
+            save(places, self._map)
         return unplaced
 
     def _tracked(self, records: Iterable[Record]) -> Iterator[tuple[str, Sweep, Segmentation]]:
@@ -151,5 +167,5 @@ def _rows(frame: str, placed: Sweep, result: Segmentation) -> Iterator[Sequence[
             continue
         world = placed.pose[:3, :3] @ each.centroid + placed.pose[:3, 3]
         score = round(float(each.score), DECIMALS)
-        place = [round(value, DECIMALS) for value in world.tolist()]
+        place = [round(value, DECIMALS) for value in (*world.tolist(), *instance.velocity)]
         yield frame, instance.track, each.label, each.category, each.name, score, each.n_points, *place

@@ -37,7 +37,8 @@ class RunSettings:
         same_object: By default that of `ldls.segment`, or of `ldls.segment_sweeps` where sweeps are joined.
         sweeps: Sweeps before and after the middle one of a window, whose 2 `sweeps` + 1 frames in a row are labelled
             together; 0 for each frame alone.
-        poses: File of poses in TUM's or KITTI's format, instead of those that the source has, if it has any.
+        poses: File of poses in TUM's or KITTI's format, instead of those that the source has, if it has any; "kiss-icp"
+            for those that the sweeps tell, which the folder of the run keeps in poses.txt.
         track: Number the objects over the drive when its frames are done, which is made of their npz, so that these
             are written too; run_tracks.py.
 

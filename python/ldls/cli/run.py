@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ldls.cli.frame_files import EXISTING
 from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories, say_own_masks
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
@@ -64,13 +63,23 @@ def run(
             "--track", help="Number objects over the drive: OUT/tracks/FRAME.label and OUT/tracks.csv. Extra eval."
         ),
     ] = False,
-    poses: Annotated[
+    map_file: Annotated[
         Path | None,
         typer.Option(
+            "--map",
             metavar="FILE",
-            help="Poses of the lidar (TUM) or of camera 0 (KITTI, a line a frame), instead of those of the source.",
+            help="Map of what stands still in the drive, in voxels of 0.1 m: .ply, .pcd, .las or .laz. Needs --track.",
             show_default=False,
-            **EXISTING,
+            dir_okay=False,
+        ),
+    ] = None,
+    poses: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|kiss-icp",
+            help="Poses of the lidar (TUM) or of camera 0 (KITTI, a line a frame) instead of those of the source; "
+            "kiss-icp finds them from the sweeps (extra odometry).",
+            show_default="those of the source",
         ),
     ] = None,
     engine: Annotated[
@@ -114,7 +123,7 @@ def run(
         params=params,
         formats=words(formats),
         sweeps=sweeps,
-        poses=None if poses is None else str(poses),
+        poses=poses,
         track=track,
     )
     options = parse_options(option or [])
@@ -137,6 +146,7 @@ def run(
                 frames=chosen,
                 options=options,
                 objects=objects,
+                map_file=map_file,
                 workers=cores,
                 engine=engine,
                 ray_address=ray_address,
@@ -153,6 +163,8 @@ def run(
         console().print(f"objects in {objects}", highlight=False, soft_wrap=True)
     if track:
         console().print(f"tracks in {out / 'tracks'} and {out / 'tracks.csv'}", highlight=False, soft_wrap=True)
+    if map_file is not None:
+        console().print(f"map in {map_file}", highlight=False, soft_wrap=True)
     if summary.failures:
         raise typer.Exit(FRAMES_FAILED)
 

@@ -110,11 +110,21 @@ def save(thing: Segmentation | InstanceMasks | LabelledMap, path: str | PathLike
     writer(path, thing)
 
 
-def _save_map(places: LabelledMap, path: Path, options: Mapping[str, object]) -> None:
+def map_writer(path: Path) -> Callable[[Path, LabelledMap], None]:
+    """The writer of a map to files with the ending of `path`.
+
+    Raises:
+        UnsupportedFormatError: There is none.
+    """
     writer = MAP_WRITERS.get(path.suffix.lower())
     if writer is None:
         raise UnsupportedFormatError(
             f"{path}: cannot write a map to {path.suffix!r} files, expected {', '.join(MAP_WRITERS)}"
         )
+    return writer
+
+
+def _save_map(places: LabelledMap, path: Path, options: Mapping[str, object]) -> None:
+    writer = map_writer(path)
     check_options(f"{path.suffix} maps ({path})", writer, options)
     writer(path, places)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ldls.camera.rigid import ROTATION_LIMIT, from_parts, from_quaternion, rigid
+from ldls.camera.rigid import ROTATION_LIMIT, from_parts, from_quaternion, rigid, to_quaternion
 from ldls.errors import CorruptFileError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
-from ldls.io.files import MAX_TEXT_BYTES, open_file
+from ldls.io.files import MAX_TEXT_BYTES, open_file, whole_file
 from ldls.io.poses.pose_rows import check_ascending, read_pose_rows
 from ldls.sequences import Trajectory
 
@@ -37,3 +37,13 @@ def read(path: Path, *, T_camera_lidar: Extrinsic | None = None) -> Trajectory:
     poses = [from_parts(rotation, row[1:4]) for rotation, row in zip(rotations, rows, strict=True)]
     with within(path), np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
         return Trajectory(rows[:, 0], np.array(poses) @ from_lidar)
+
+
+def write(path: Path, trajectory: Trajectory) -> None:
+    """Write the poses of the lidar, to the last digit."""
+    lines = [f"# {COLUMNS}"]
+    for stamp, pose in zip(trajectory.stamps.tolist(), trajectory.poses, strict=True):
+        numbers = [stamp, *pose[:3, 3].tolist(), *np.roll(to_quaternion(pose[:3, :3]), -1).tolist()]
+        lines.append(" ".join(map(repr, numbers)))
+    with whole_file(path) as file:
+        file.write("".join(f"{line}\n" for line in lines).encode())
