@@ -65,7 +65,7 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
     xyz = points[in_view, :3].astype(np.float64)
     heights = np.full(len(xyz), np.nan) if heights is None else heights
     ground = (heights > -0.3) & (heights < 0.15)
-    groups = same_objects(views, seen, same_object)
+    groups = same_objects(views, seen, same_object, rows)
     if rows is not None:
         seen = pixels_taken(views, seen, groups, rows)
     labels, mass = np.zeros((len(in_view), len(groups) + 1)), np.zeros(len(in_view))
@@ -127,8 +127,9 @@ def pixels_taken(views, seen, groups, rows):
     return [(own_rows[part], pixels[part]) for (own_rows, pixels), part in zip(seen, parts, strict=True)]
 
 
-def same_objects(views, seen, same_object):
-    """Groups of instances, the pairs that agree best joined first; one instance a camera."""
+def same_objects(views, seen, same_object, rows=None):
+    """Groups of instances, the pairs that agree best joined first; one instance a camera. Those of two categories come
+    last, must agree on half, and are of views of two moments."""
     pairs = []
     for one in range(len(views)):
         for other in range(one + 1, len(views)):
@@ -140,11 +141,12 @@ def same_objects(views, seen, same_object):
             for m, first in enumerate(covers[0]):
                 for k, second in enumerate(covers[1]):
                     both, either = (first & second).sum(), (first | second).sum()
-                    same_category = views[one][1][m] == views[other][1][k]
-                    if both and same_category and both >= same_object * either:
-                        pairs.append((-both / either, (one, m), (other, k)))
+                    differ = views[one][1][m] != views[other][1][k]
+                    possible = not differ or (rows is not None and rows[one] != rows[other])
+                    if both and possible and both >= max(same_object, 0.5 * differ) * either:
+                        pairs.append((differ, -both / either, (one, m), (other, k)))
     groups = [[(camera, m)] for camera, view in enumerate(views) for m in range(len(view[0]))]
-    for _, first, second in sorted(pairs):
+    for _, _, first, second in sorted(pairs):
         a, b = (next(g for g in groups if instance in g) for instance in (first, second))
         if a is not b and not {camera for camera, _ in a} & {camera for camera, _ in b}:
             groups[min(groups.index(a), groups.index(b))] = sorted(a + b)

@@ -249,14 +249,20 @@ def _expected_on_masks(views: Sequence[SeenView]) -> float:
 
 def _instance(label: int, parts: Sequence[tuple[int, int]], views: Sequence[View], own: range) -> Instance:
     """Return the instance that the core's parts, numbers of a view and of a mask from 1, are one object of."""
-    number, first = parts[0]
-    masks = views[number].masks
-    category = int(masks.categories[first - 1])
+    scores = [float(views[number].masks.scores[mask - 1]) for number, mask in parts]
+    # of several moments they may be of several categories; that counts which the segmenter is the surest of
+    sums: dict[tuple[int, str], float] = {}
+    for (number, mask), score in zip(parts, scores, strict=True):
+        masks = views[number].masks
+        category = int(masks.categories[mask - 1])
+        named = category, masks.names[category]
+        sums[named] = sums.get(named, 0.0) + score
+    category, name = max(sums, key=sums.__getitem__)
     return Instance(
         label=label,
         category=category,
-        name=masks.names[category],
-        score=max(float(views[number].masks.scores[mask - 1]) for number, mask in parts),
+        name=name,
+        score=max(scores),
         sources=tuple((number - own.start, mask - 1) for number, mask in parts if number in own),
     )
 

@@ -25,8 +25,11 @@ def moments(seed):
         pixels, _, camera = views[1]
         views = [(pixels[some], None, camera) for some in ([0, 1, 2, 3], [0, 1], [1, 2, 3])]
     points = points[np.random.default_rng(seed).permutation(len(points))]
-    # one category, so that objects of several moments abound
-    return np.array_split(points, 3), [(pixels, np.ones(len(pixels), int), camera) for pixels, _, camera in views]
+    # mostly one category, so that objects of several moments abound
+    kinds = np.random.default_rng(seed)
+    return np.array_split(points, 3), [
+        (pixels, 1 + (kinds.random(len(pixels)) < 0.2), camera) for pixels, _, camera in views
+    ]
 
 
 def poses(seed, n=3):
@@ -81,8 +84,8 @@ def test_some_of_these_points_take_pixels_of_another_moment():
         points, ends = np.concatenate(clouds), np.cumsum([0, *map(len, clouds)]).tolist()
         plain = [(pixels, kinds, camera.projection @ camera.T_camera_lidar) for pixels, kinds, camera in views]
         seen = [oracle.project(points, matrix, pixels.shape[1:], 0.1) for pixels, _, matrix in plain]
-        groups = oracle.same_objects(plain, seen, 0.2)
         rows = list(pairwise(ends))
+        groups = oracle.same_objects(plain, seen, 0.2, rows)
         taken = oracle.pixels_taken(plain, seen, groups, rows)
         lent += sum(
             int(((own < start) | (own >= end)).sum()) for (own, _), (start, end) in zip(taken, rows, strict=True)
@@ -97,6 +100,28 @@ def test_where_the_lidar_stood_does_not_matter(seed):
     for one, other in zip(still, moving, strict=True):
         np.testing.assert_array_equal(one.labels, other.labels)
         np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-4)
+
+
+def test_an_object_has_the_category_that_most_of_its_masks_have():
+    first, second, third = (replace(sweep, pose=np.eye(4)) for sweep in sweeps_of(1))
+    masks = first.views[0].masks
+    named = {1: "car", 2: "truck"}
+    kinds = ([1, 1, 1, 1], [2, 1, 1, 1], [1, 1, 2, 1])
+    sweeps = [
+        replace(sweep, views=[ldls.View(replace_categories(masks, kind, named), first.views[0].camera)])
+        for sweep, kind in zip((first, second, third), kinds, strict=True)
+    ]
+    results = ldls.segment_sweeps(sweeps, params=replace(ldls.Params.paper(), **PLAIN))
+    together = [instance for instance in results[0].instances if instance.sources]
+    assert [instance.category for instance in together] == [1, 1, 1, 1]
+    assert {instance.name for instance in together} == {"car"}
+    for result in results:
+        seen = [mask for instance in result.instances for _, mask in instance.sources]
+        assert sorted(seen) == [0, 1, 2, 3]
+
+
+def replace_categories(masks, categories, names):
+    return ldls.InstanceMasks.from_array(masks.to_array(), categories=categories, names=names)
 
 
 def test_one_sweep_gives_what_it_gives_alone():

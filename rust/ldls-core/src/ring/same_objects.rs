@@ -18,6 +18,10 @@ pub(super) fn instances_of(views: &[View], sightings: &[Sighting]) -> Vec<Vec<Ve
     images.map(of_image).collect()
 }
 
+/// Least share of common points of instances of two categories: an object has one category, but a segmenter that takes a
+/// van for a lorry at one moment does not at the next.
+const SAME_OBJECT_OF_OTHER_CATEGORY: f64 = 0.5;
+
 /// The instances of all views, those that show one object together. `instances` are those at the points that each image
 /// sees, and `shared` yields where, among these, the points are that two images see.
 pub(super) fn same_objects<Shared: IntoIterator<Item = [u32; 2]>>(
@@ -56,6 +60,8 @@ pub(super) fn same_objects<Shared: IntoIterator<Item = [u32; 2]>>(
 /// Numbers of points on which two instances agree, and in all.
 #[derive(Debug, Clone, Copy)]
 struct Agreement {
+    /// Whether they are of two categories.
+    other_category: bool,
     /// Points on both masks.
     both: usize,
     /// Points on at least one of them.
@@ -64,18 +70,28 @@ struct Agreement {
 
 type Pair = [(usize, u32); 2];
 
-/// Pairs that agree well enough, the best first.
+/// Pairs that agree well enough, those of one category before others and the best first.
 fn best_first(agreements: BTreeMap<Pair, Agreement>, same_object: f64) -> Vec<Pair> {
-    let mut pairs: Vec<(Pair, Agreement)> = agreements
-        .into_iter()
-        .filter(|(_, agreement)| agreement.both as f64 >= same_object * agreement.either as f64)
-        .collect();
+    let agree = |agreement: &Agreement| {
+        let least = if agreement.other_category {
+            same_object.max(SAME_OBJECT_OF_OTHER_CATEGORY)
+        } else {
+            same_object
+        };
+        agreement.both as f64 >= least * agreement.either as f64
+    };
+    let pairs = agreements.into_iter();
+    let mut pairs: Vec<(Pair, Agreement)> = pairs.filter(|(_, found)| agree(found)).collect();
     // a / b > c / d where a d > c b; the order of the map among equals
-    pairs.sort_by(|(_, a), (_, b)| (b.both * a.either).cmp(&(a.both * b.either)));
+    pairs.sort_by(|(_, a), (_, b)| {
+        let better = (b.both * a.either).cmp(&(a.both * b.either));
+        a.other_category.cmp(&b.other_category).then(better)
+    });
     pairs.into_iter().map(|(pair, _)| pair).collect()
 }
 
-/// Agreement of each two instances of one category in two images on which a point falls that both images see.
+/// Agreement of each two instances in two images on which a point falls that both images see; those of two categories
+/// in images of two moments alone.
 fn agreements<Shared: IntoIterator<Item = [u32; 2]>>(
     views: &[View],
     instances: &[Vec<Vec<u32>>],
@@ -102,10 +118,14 @@ fn agreements<Shared: IntoIterator<Item = [u32; 2]>>(
             }
             for (at, both) in both.into_iter().enumerate().filter(|(_, both)| *both > 0) {
                 let (m, k) = (at / there, at % there);
-                if views[one].categories[m - 1] == views[other].categories[k - 1] {
-                    let either = either[0][m] + either[1][k] - both;
-                    let pair = [(one, m as u32), (other, k as u32)];
-                    agreements.insert(pair, Agreement { both, either });
+                let other_category = views[one].categories[m - 1] != views[other].categories[k - 1];
+                if !other_category || views[one].rows != views[other].rows {
+                    let agreement = Agreement {
+                        other_category,
+                        both,
+                        either: either[0][m] + either[1][k] - both,
+                    };
+                    agreements.insert([(one, m as u32), (other, k as u32)], agreement);
                 }
             }
         }

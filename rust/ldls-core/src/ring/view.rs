@@ -9,7 +9,7 @@ use crate::{Error, Result};
 pub struct View<'a> {
     /// Instance masks of the image.
     pub masks: &'a InstanceMasks,
-    /// Category of each of them: only instances of one category become one object.
+    /// Category of each of them: of the instances of one moment, only those of one category become one object.
     pub categories: &'a [i32],
     /// Score of each of them, 0 to 1.
     pub scores: &'a [f32],
