@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 import ldls
 import oracle
 from ldls.camera.rigid import from_parts, inverse
+from ldls.io.labels.kitti_objects import read_kitti_objects
 from ring_samples import random_ring
 
 PLAIN = {"neighbors": 6, "sigma": 0.3, "pixel_weight": 0.01, "iterations": 40}
@@ -154,7 +155,7 @@ def test_each_sweep_has_its_own_points_views_and_files(tmp_path):
         assert again.to_table() == result.to_table()
 
 
-def test_an_object_that_no_image_of_a_sweep_shows_has_no_mask_in_its_tables():
+def test_an_object_that_no_image_of_a_sweep_shows_has_no_mask_in_its_tables(tmp_path):
     with_mask, without = sweeps_of(2)[:2]
     without = replace(without, views=[replace(without.views[0], masks=without.views[0].masks.select([]))])
     _, result = ldls.segment_sweeps([with_mask, without], params=replace(ldls.Params.paper(), **PLAIN))
@@ -162,6 +163,8 @@ def test_an_object_that_no_image_of_a_sweep_shows_has_no_mask_in_its_tables():
     assert rows
     assert {(row["camera"], row["mask_width_px"]) for row in rows} == {("", None)}
     assert all(not instance.sources for instance in result.instances)
+    ldls.save(result, tmp_path / "result.txt")
+    assert [each.bbox for each in read_kitti_objects(tmp_path / "result.txt")] == [(-1, -1, -1, -1)] * len(rows)
 
 
 def test_a_sweep_without_images_is_labelled_by_those_of_others():

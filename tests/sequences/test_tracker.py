@@ -140,6 +140,10 @@ def test_tracks_are_kept_in_files(tmp_path):
     assert ldls.read_result(tmp_path / "a.npz").instances == result.instances
     ldls.save(result, tmp_path / "a.label")
     assert set(np.fromfile(tmp_path / "a.label", "<u4") >> 16) == {77}
+    many = replace(result, instances=(replace(result.instances[0], track=65_536),))
+    with pytest.raises(ldls.LimitError, match="16 bits for the number of an instance, got 65536"):
+        ldls.save(many, tmp_path / "b.label")
+    assert not (tmp_path / "b.label").exists()
 
 
 def test_misuse_is_named():

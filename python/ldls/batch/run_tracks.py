@@ -28,6 +28,7 @@ from ldls.batch.known_files import is_written, written
 from ldls.errors import LimitError, UnsafePathError
 from ldls.io import read_result, save
 from ldls.io.files import LARGE_BYTES, check_folder, open_file, refuse_link, sweep, whole_file
+from ldls.io.labels.semantic_kitti import MOST_INSTANCES as MOST_TRACKS
 from ldls.io.objects import DECIMALS
 from ldls.io.results import map_writer
 from ldls.segmentation import Segmentation
@@ -40,8 +41,6 @@ COLUMNS = (
     "velocity_x_m_s", "velocity_y_m_s",
 )  # fmt: skip
 """Columns of the table: those of tables of objects, and the mean of the points and their velocity in the world."""
-MOST_TRACKS = (1 << 16) - 1
-"""A `.label` has 16 bits for them."""
 
 
 class RunTracks:

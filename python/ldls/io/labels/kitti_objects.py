@@ -34,6 +34,8 @@ N_FIELDS = 15
 DECIMALS = 4
 UNKNOWN_TRUNCATION = -1
 UNKNOWN_OCCLUSION = 3
+NO_BOX = (-1.0, -1.0, -1.0, -1.0)
+"""Of an object that only images of other sweeps show."""
 IMAGE_SIZE = (375, 1242)
 """Height and width of most of KITTI's images, where that of the frame is not known."""
 
@@ -183,14 +185,17 @@ def write(path: Path, result: Segmentation) -> None:
 def _from_result(result: Segmentation, label: int) -> KittiObject:
     instance = result.instances[label - 1]
     shown = first_seen(instance.sources, result.views)
-    top, left, rows, columns = (0, 0, 0, 0) if shown is None else shown[1].bounding_box
+    bbox = NO_BOX
+    if shown is not None:
+        top, left, rows, columns = shown[1].bounding_box
+        bbox = (left, top, left + columns - 1, top + rows - 1)
     box = _upright_box(in_camera_frame(result.points[result.labels == label], result.views[0].view.camera))
     x, _, z = box.location
     return replace(
         box,
         type=TYPES.get(instance.name.lower(), "_".join(instance.name.split()) or "Misc"),
         alpha=_wrapped(box.rotation_y - math.atan2(x, z)),
-        bbox=(left, top, left + columns - 1, top + rows - 1),
+        bbox=bbox,
         score=float(instance.score),
     )
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ldls.errors import CorruptFileError, InputError, TruncatedFileError
+from ldls.errors import CorruptFileError, InputError, LimitError, TruncatedFileError
 from ldls.io.files import open_file, whole_file
 from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
@@ -27,6 +27,7 @@ CLASSES = {1: 30, 2: 11, 3: 10, 4: 15, 6: 13, 7: 16, 8: 18, 13: 81, 64: 70}
 """SemanticKITTI class of a COCO category: person, bicycle, car, motorcycle, bus, on-rails, truck, traffic sign and
 vegetation; anything else is `OTHER_OBJECT`. Background and points out of view are 0, unlabeled."""
 LABEL_BYTES = 4
+MOST_INSTANCES = (1 << 16) - 1
 
 
 def read_semantic_kitti(path: str | PathLike[str]) -> Labeling:
@@ -48,9 +49,18 @@ def read_semantic_kitti(path: str | PathLike[str]) -> Labeling:
 
 
 def write(path: Path, result: Segmentation) -> None:
-    """Write the labels of `result`, one a point in the order of the cloud; a tracked instance has its track."""
+    """Write the labels of `result`, one a point in the order of the cloud; a tracked instance has its track.
+
+    Raises:
+        LimitError: An instance has a number beyond 16 bits.
+    """
     classes = [CLASSES.get(instance.category, OTHER_OBJECT) for instance in result.instances]
     numbers = [instance.track or instance.label for instance in result.instances]
+    if max(numbers, default=0) > MOST_INSTANCES:
+        raise LimitError(
+            f"{path}: a .label has 16 bits for the number of an instance, got {max(numbers)}; expected at most "
+            f"{MOST_INSTANCES:,}; .npz keeps any"
+        )
     codes = np.array([0, *classes], np.uint32) | np.array([0, *numbers], np.uint32) << 16
     with whole_file(path) as file:
         file.write(result.per_point(codes).astype("<u4").tobytes())
