@@ -30,6 +30,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=every_core, help="threads of all sides (default: all cores)")
     parser.add_argument("--most", type=int, default=1_000_000, help="points of the largest cloud (default: 1000000)")
     parser.add_argument("--frames", type=int, default=20, help="frames of the suite, of 200 (default: 20)")
+    parser.add_argument("--drives", type=int, default=2, help="simulated drives of each lidar (default: 2)")
     parser.add_argument("sections", nargs="*", choices=[[], *SECTIONS], help="what to measure (default: all)")
     options = parser.parse_args()
     # read when the peers are first imported; threads that spin when their work is done would slow the next one's
@@ -354,6 +355,25 @@ def ground(_measured: Frame, options: argparse.Namespace) -> Table:
     return table
 
 
+def drives(measured: Frame, options: argparse.Namespace) -> Table:
+    """Errors, tracks and times of windows of sweeps against those of each sweep alone, on simulated drives."""
+    from benches import drives as simulated
+
+    table = _table(
+        f"drives of 20 sweeps, {options.drives} of each lidar",
+        ["lidar", "sweeps together", "error car", "error person", "S_assoc", "switches a hundred", "ms a sweep"],
+        f"error: 100 less the IoU of all points in view, in %; {options.threads} threads",
+    )
+    for lidar in ("vlp-16", "hdl-64e"):
+        of_lidar = list(simulated.drives(lidar, options.drives))
+        for size in (1, 5):
+            found, tracks, seconds = simulated.scores(of_lidar, size, options.threads)
+            errors = [f"{100 - 100 * (found.semantic[name].iou or 0.0):.1f}" for name in simulated.CLASSES]
+            association = (f"{tracks.s_assoc or 0.0:.2f}", f"{tracks.switches_per_100 or 0.0:.2f}")
+            table.add_row(lidar, str(size), *errors, *association, f"{seconds * 1e3:.1f}")
+    return table
+
+
 SECTIONS = {
     "scipy": against_scipy,
     "suite": suite,
@@ -367,6 +387,7 @@ SECTIONS = {
     "masks": masks,
     "cameras": cameras,
     "ground": ground,
+    "drives": drives,
 }
 
 

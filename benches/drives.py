@@ -1,0 +1,77 @@
+"""Simulated drives: labels of windows of sweeps against those of each sweep alone, with the errors of the suite."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.progress import track
+
+import ldls
+from ldls.datasets import open_source
+from ldls.evaluation import ClassSet, Evaluation, Pair, TrackingScores, evaluate
+from ldls.labeling import Labeling
+from ldls.simulation import Drive, drive_folder, suite_folder, write_drive
+from ldls.simulation.production import SUITE_SEGMENTER, SUITE_SENSORS
+
+FIRST_SEED = 4000
+KINDS = ("street", "campus")
+CLASSES = ("Car", "Pedestrian")
+
+Window = Sequence[tuple[ldls.Sweep, Labeling]]
+
+
+def drives(lidar: str, count: int, n_frames: int = 20) -> Iterator[list[tuple[ldls.Sweep, Labeling]]]:
+    """The sweeps of `count` drives and their truth, from files, which are made first where they are not there yet."""
+    folder = suite_folder().parent / "drives"
+    for seed in track(range(FIRST_SEED, FIRST_SEED + count), description=f"drives of {lidar}"):
+        errors = {"segmenter": SUITE_SEGMENTER, "sensors": SUITE_SENSORS}
+        drive = Drive(n_frames=n_frames, seed=seed, kind=KINDS[seed % 2], lidar=lidar, **errors)  # type: ignore[arg-type]
+        for _ in write_drive(folder / lidar, drive, processes=2):
+            pass
+        yield list(_sweeps(drive_folder(folder / lidar, drive)))
+
+
+def _sweeps(folder: Path) -> Iterator[tuple[ldls.Sweep, Labeling]]:
+    for frame in open_source(folder):
+        (image,) = frame.images
+        masks = ldls.read_masks(folder / "masks_02" / f"{frame.name}.json")
+        view = ldls.View(masks, image.camera)
+        seen, _ = ldls.stages.project(frame.points, image.camera, image_size=masks.image_size)
+        if frame.pose is None or frame.stamp is None or frame.truth is None:
+            raise RuntimeError(f"{folder}: frame {frame.name} has no pose, stamp or truth")
+        in_view = np.isin(np.arange(len(frame.points)), seen)
+        yield ldls.Sweep(frame.points, [view], frame.pose, frame.stamp), frame.truth.restricted(in_view)
+
+
+def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evaluation, TrackingScores, float]:
+    """Scores of windows of so many sweeps, those of tracks over all drives, and seconds a sweep."""
+    params, seconds, n_sweeps, pairs = ldls.Params(threads=threads), 0.0, 0, []
+    classes = ClassSet.kitti(CLASSES)
+    tracking = TrackingScores(CLASSES)
+    for number, drive in enumerate(of_drives):
+        tracker, own = ldls.Tracker(), []
+        for first in range(0, len(drive), size):
+            window = drive[first : first + size]
+            sweeps = [sweep for sweep, _ in window]
+            start = time.perf_counter()
+            results = ldls.segment_sweeps(sweeps, params=params)
+            seconds += time.perf_counter() - start
+            for at, (result, (_, truth)) in enumerate(zip(tracker.track(sweeps, results), window, strict=True)):
+                own.append(Pair(f"{number} {first + at}", _labeling(result), truth))
+        n_sweeps += len(drive)
+        pairs += own
+        of_drive = evaluate(own, classes=classes, track=True).tracking
+        assert of_drive is not None
+        tracking.merge(of_drive)
+    return evaluate(pairs, classes=classes), tracking, seconds / n_sweeps
+
+
+def _labeling(result: ldls.Segmentation) -> Labeling:
+    """Labels with tracks for instances; truth says which points count."""
+    labels = np.maximum(result.labels, 0)
+    named = Labeling.from_instance_labels(labels, [instance.name for instance in result.instances])
+    tracks = np.array([0, *(instance.track for instance in result.instances)], np.int32)
+    return Labeling(named.classes, tracks[labels], named.ignored, named.names)
