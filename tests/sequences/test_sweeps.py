@@ -174,6 +174,20 @@ def test_a_sweep_without_images_is_labelled_by_those_of_others():
     assert results[1].views == ()
 
 
+def test_what_was_labelled_with_other_sweeps_is_not_explained_by_itself_alone(tmp_path):
+    sweeps = sweeps_of(7)
+    (alone,) = ldls.segment_sweeps(sweeps[:1])
+    assert alone.report.n_sweeps == 1
+    point = int(alone.in_view[0])
+    assert ldls.explain(alone, point).label == alone.labels[point]
+    result, _ = ldls.segment_sweeps(sweeps[:2])
+    ldls.save(result, tmp_path / "result.npz")
+    for each in (result, ldls.read_result(tmp_path / "result.npz")):
+        assert each.report.n_sweeps == 2
+        with pytest.raises(ldls.InputError, match="its graph has 2 sweeps, of which it holds one"):
+            ldls.explain(each, int(each.in_view[0]))
+
+
 def test_missing_returns_stay_missing():
     sweeps = sweeps_of(5, world_from_lidar=poses(5))
     points = sweeps[0].points.copy()

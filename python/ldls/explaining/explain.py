@@ -34,7 +34,8 @@ def explain(result: Segmentation, point: int) -> Explanation:
 
     Raises:
         ParameterError: `point` is no row of the cloud.
-        InputError: The result is not of these points: its labels are of another number.
+        InputError: The result is not of these points: its labels are of another number; or it was labelled together
+            with other sweeps, whose points it does not hold.
         ImportError: The extra `eval` is not installed.
     """
     point = _checked_row(point, len(result.points))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import ldls.stages as stages
 from ldls._optional import require
+from ldls.errors import InputError
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView
@@ -53,8 +54,14 @@ def rebuild(result: Segmentation) -> Rebuilt:
     """The graph and the linear system z <- A z + b that gave `result` (steps 2 to 4).
 
     Raises:
+        InputError: It was labelled together with other sweeps, whose points it does not hold.
         ImportError: The extra `eval` is not installed.
     """
+    if result.report.n_sweeps > 1:
+        raise InputError(
+            f"result: its graph has {result.report.n_sweeps} sweeps, of which it holds one; segment the sweep alone "
+            "(ldls.segment, or ldls run without --sweeps)"
+        )
     points, params = result.points[result.in_view], result.params
     heights = _heights(result)
     depths = tuple(depth_groups_of(result, seen, heights) for seen in result.views)

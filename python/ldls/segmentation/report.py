@@ -24,6 +24,7 @@ class Report:
             iterations was given.
         converged: Whether that change is at most 1e-5; False where the number of iterations was given.
         empty_masks: Labels of instances whose mask has no pixel.
+        n_sweeps: Sweeps that were labelled together; counts other than the first two are of all of them.
     """
 
     n_points: int
@@ -39,3 +40,4 @@ class Report:
     residual: float | None
     converged: bool
     empty_masks: tuple[int, ...]
+    n_sweeps: int = 1

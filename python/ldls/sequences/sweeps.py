@@ -1,9 +1,9 @@
 """Several sweeps of a drive in one graph: lines that one sweep lacks, and an object with one label in all of them.
 
-Points are brought together by where the lidar stood. Each takes the pixels of images of its own moment alone, for what
-moves is elsewhere in those of others; edges join points of all moments. Two instances of two moments are one object if
-the points that both images see fall on both: of what stands still nearly all of them do, and of what moves enough from
-one sweep to the next.
+Points are brought together by where the lidar stood. Each takes the pixels of images of its own moment, for what moves
+is elsewhere in those of others, but where these overlook an object, of the nearest that shows it; edges join points of
+all moments. Two instances of two moments are one object if the points that both images see fall on both: of what stands
+still nearly all of them do, and of what moves enough from one sweep to the next.
 """
 
 from __future__ import annotations
@@ -122,7 +122,8 @@ def segment_sweeps(
         of_sweep = range(firsts[number], firsts[number + 1])
         result = result_of(arrays, views, sweep.points, params, rows=own, own=of_sweep)
         given = zip(result.views, sweep.views, strict=True)
-        results.append(replace(result, views=tuple(replace(seen, view=view) for seen, view in given)))
+        seen = tuple(replace(seen, view=view) for seen, view in given)
+        results.append(replace(result, views=seen, report=replace(result.report, n_sweeps=len(sweeps))))
     return tuple(results)
 
 

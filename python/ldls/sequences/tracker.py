@@ -29,9 +29,9 @@ MEMORY_S = 2.0
 SLOWEST_M_S = 0.5
 """What is slower stands still: the middle of what is visible of it moves."""
 MOST_POINTS = 256
-"""Points that stand for an object; of more, some."""
+"""Floats that stand for an object; of more, some."""
 
-Points = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 
 @dataclass(eq=False)
@@ -40,29 +40,29 @@ class _Track:
 
     number: int
     category: int
-    points: Points
-    middles: list[tuple[float, Points]] = field(default_factory=list)
+    points: Floats
+    middles: list[tuple[float, Floats]] = field(default_factory=list)
 
     @property
     def stamp(self) -> float:
         return self.middles[-1][0]
 
-    def advance(self, stamp: float, points: Points) -> None:
+    def advance(self, stamp: float, points: Floats) -> None:
         self.points = points
         self.middles = [(then, middle) for then, middle in self.middles if stamp - then <= MEMORY_S]
         self.middles.append((stamp, np.median(points, axis=0)))
 
-    def velocity(self) -> Points:
+    def velocity(self) -> Floats:
         """Metres a second: the slope of a line through its places."""
         stamps = np.array([stamp for stamp, _ in self.middles])
         since = stamps - stamps.mean()
         spread = float(since @ since)
         if spread == 0:
             return np.zeros(2)
-        slope: Points = since @ np.array([middle for _, middle in self.middles]) / spread
+        slope: Floats = since @ np.array([middle for _, middle in self.middles]) / spread
         return slope if np.linalg.norm(slope) >= SLOWEST_M_S else np.zeros(2)
 
-    def at(self, stamp: float) -> Points:
+    def at(self, stamp: float) -> Floats:
         return self.points + self.velocity() * (stamp - self.stamp)
 
 
@@ -146,7 +146,7 @@ class Tracker:
             if track not in self._tracks:
                 self._tracks.append(track)
 
-    def _apart(self, one: Points, other: Points) -> float:
+    def _apart(self, one: Floats, other: Floats) -> float:
         """How far apart objects are in metres, infinite beyond `NEAR_M`.
 
         It is the mean of two distances: of the points of the smaller to the nearest of the other, and of the middles.
@@ -162,7 +162,7 @@ class Tracker:
         return float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
 
 
-def _objects(sweep: Sweep, result: Segmentation) -> dict[int, Points]:
+def _objects(sweep: Sweep, result: Segmentation) -> dict[int, Floats]:
     """The points of each label that has some, in the world, seen from above."""
     labelled = np.flatnonzero(result.labels > 0)
     labelled = labelled[np.argsort(result.labels[labelled], kind="stable")]

@@ -30,7 +30,7 @@ pub struct Segmentation {
     pub confidence: Vec<f32>,
     /// Rows of the points in view, ascending.
     pub in_view: Vec<u32>,
-    /// The points in view that each image sees.
+    /// The points in view that each image sees of its own moment.
     pub sightings: Vec<Sighting>,
     /// The objects that labels stand for; those of a single image are its instances.
     pub objects: Objects,
@@ -40,7 +40,7 @@ pub struct Segmentation {
     pub timings: Timings,
 }
 
-/// Segments `cloud` by the instance masks of the images that one camera or several took at one moment.
+/// Segments `cloud` by the instance masks of the images that one camera or several took, at one moment or at several.
 ///
 /// Instances of two images become one object if, of the points that both see and that fall on one of the two masks, at
 /// least the share `same_object` falls on both. Points at exactly (0, 0, 0) are taken for missing returns unless

@@ -16,7 +16,7 @@ const UNSEEN: u32 = u32::MAX;
 /// Fewest points for a task of the thread pool.
 const POINTS_A_TASK: usize = 4096;
 
-/// The images of one moment, the points in view that each of them sees and the objects that they show.
+/// The images of one moment or of several, the points in view that each of them sees and the objects that they show.
 pub(crate) struct Images<'a> {
     views: &'a [View<'a>],
     /// The points that take their pixels from each image.

@@ -34,8 +34,9 @@ impl Moments<'_> {
     /// The points that take their pixels from each image; `own` are the positions of those of its own moment.
     pub(super) fn sightings(&self, own: &[[usize; 2]]) -> Result<Vec<Sighting>> {
         let mut taken: Vec<Vec<(u32, u32)>> = vec![Vec::new(); self.views.len()];
+        let moments = self.numbers();
         for (image, &[start, end]) in own.iter().enumerate() {
-            let (lenders, objects) = self.lenders(image);
+            let (lenders, objects) = self.lenders(moments[image], &moments);
             for (slot, &point) in (0..).zip(&self.sightings[image].seen) {
                 if !(start..end).contains(&(point as usize)) {
                     continue;
@@ -70,16 +71,16 @@ impl Moments<'_> {
         Ok(self.sightings.iter().zip(taken).map(sighting).collect())
     }
 
-    /// The images of other moments, the nearest first and of these the earlier, and by label the objects that those of the
-    /// moment of `image` overlook; none where they overlook none.
-    fn lenders(&self, image: usize) -> (Vec<usize>, Vec<bool>) {
-        let moment = |image: usize| {
-            let starts = self.views.iter().map(|view| view.rows[0]);
-            let earlier = starts.filter(|&start| start < self.views[image].rows[0]);
-            earlier.collect::<BTreeSet<_>>().len()
-        };
-        let moments: Vec<usize> = (0..self.views.len()).map(moment).collect();
-        let own = moments[image];
+    /// Number of the moment of each image, from 0 in the order of their rows.
+    fn numbers(&self) -> Vec<usize> {
+        let starts = self.views.iter().map(|view| view.rows[0]);
+        let sorted: BTreeSet<usize> = starts.clone().collect();
+        starts.map(|start| sorted.range(..start).count()).collect()
+    }
+
+    /// The images of other moments than `own`, the nearest first and of these the earlier, and by label the objects that
+    /// those of `own` overlook; no images where they overlook none.
+    fn lenders(&self, own: usize, moments: &[usize]) -> (Vec<usize>, Vec<bool>) {
         let overlooked = |masks: &Vec<(usize, u32)>| {
             let shown = || masks.iter().map(|&(image, _)| moments[image]);
             let near = shown().any(|moment| moment.abs_diff(own) == 1);
