@@ -1,5 +1,7 @@
 """Chains of transforms."""
 
+import time
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import numpy as np
@@ -51,6 +53,19 @@ def test_moving_frames_are_read_only_where_they_are_needed():
     assert not read
     heights = [tree.lookup("lidar", "camera", ns)[0, 3] for ns in (0, 1_600_000_000, 3_500_000_000, 9_000_000_000)]
     assert heights == [1, 2, 4, 4] and read == [True]
+
+
+def test_who_asks_while_moving_frames_are_read_waits_for_them():
+    with ThreadPoolExecutor(1) as threads:
+        others = []
+
+        def moving():
+            others.append(threads.submit(tree.lookup, "camera", "lidar", 0))
+            time.sleep(0.05)
+            return [edge("base", "camera", (0, 0, 3))]
+
+        tree = TransformTree([edge("base", "lidar")], moving)
+        np.testing.assert_array_equal(tree.lookup("camera", "lidar", 0), others[0].result())
 
 
 def test_poses_lie_between_the_times_there_are():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -66,12 +67,13 @@ class TransformTree:
         """A tree of the messages of /tf_static, and a function that reads those of /tf."""
         self._edges: dict[str, _Edge] = {}
         self._moving = moving
+        self._lock = threading.Lock()
         self._add(static)
 
     def _add(self, messages: Iterable[Message]) -> None:
         for message in messages:
             for one in message.transforms:
-                child, parent = _plain(one.child_frame_id), _plain(one.header.frame_id)
+                child, parent = plain(one.child_frame_id), plain(one.header.frame_id)
                 edge = self._edges.get(child)
                 if edge is None or edge.parent != parent:
                     edge = self._edges[child] = _Edge(parent, f"transforms from {parent} to {child}")
@@ -84,8 +86,8 @@ class TransformTree:
         Raises:
             CalibrationError: Nothing connects the frames; the message lists those there are.
         """
-        target, source = _plain(target), _plain(source)
-        if not self._can_connect(target, source):
+        target, source = plain(target), plain(source)
+        if not self.connects(target, source):
             raise CalibrationError(
                 f"transforms: nothing connects the lidar's frame {source!r} and the camera's {target!r}; found "
                 f"{self._chains() or 'none'}; pass T_camera_lidar"
@@ -99,8 +101,8 @@ class TransformTree:
         Raises:
             PoseError: Nothing connects the frames, or a transform on the way has a gap then, or jumps at any time.
         """
-        world, source = _plain(world), _plain(source)
-        if not self._can_connect(world, source):
+        world, source = plain(world), plain(source)
+        if not self.connects(world, source):
             raise PoseError(
                 f"transforms: nothing connects the lidar's frame {source!r} and the world {world!r}; found "
                 f"{self._chains() or 'none'}; choose another world"
@@ -108,12 +110,14 @@ class TransformTree:
         up_source, up_world = (self._to_root(frame, lambda edge: edge.between(stamp_ns)) for frame in (source, world))
         return inverse(up_world) @ up_source
 
-    def _can_connect(self, one: str, other: str) -> bool:
+    def connects(self, one: str, other: str) -> bool:
         """True for connected frames; moving transforms are read where static ones do not connect them."""
-        if not self._connected(one, other) and self._moving is not None:
-            moving, self._moving = self._moving, None
-            self._add(moving())
-        return self._connected(one, other)
+        one, other = plain(one), plain(other)
+        with self._lock:  # until all are there, for whoever else asks
+            if not self._connected(one, other) and self._moving is not None:
+                moving, self._moving = self._moving, None
+                self._add(moving())
+            return self._connected(one, other)
 
     def _ancestors(self, frame: str) -> list[str]:
         chain = [frame]
@@ -137,7 +141,7 @@ class TransformTree:
         return "; ".join(chains)
 
 
-def _plain(frame_id: str) -> str:
+def plain(frame_id: str) -> str:
     """The name without the slash that ROS 1 once put before it."""
     return frame_id.removeprefix("/")
 

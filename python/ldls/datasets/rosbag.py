@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from ldls.camera import Camera
 from ldls.camera.camera_info import MESSAGE_FIELDS
 from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.ros_odometry import Odometry, odometry_topics, read_odometry
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
 from ldls.datasets.ros_topics import choose_topics
 from ldls.datasets.ros_transforms import TransformTree, given_transforms
-from ldls.errors import CalibrationError, ParameterError, within
+from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
 from ldls.io.ros.images import decode_compressed, decode_image
@@ -25,6 +26,7 @@ from ldls.io.ros.messages import (
     COMPRESSED_IMAGE,
     IMAGE,
     NANOSECONDS,
+    ODOMETRY,
     OLD_TRANSFORMS,
     TRANSFORMS,
     Header,
@@ -35,6 +37,8 @@ from ldls.io.ros.messages import (
 from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud, decode as decode_points
 
 STATIC_TRANSFORMS, MOVING_TRANSFORMS = "/tf_static", "/tf"
+UNPICKLED = ("_bag", "_tree", "_odometry")
+"""Attributes that another process makes itself."""
 
 
 class RosBag:
@@ -56,7 +60,7 @@ class RosBag:
         max_offset_s: The tolerance.
         unpaired: Number of sweeps with no image within the tolerance.
         recover: True if the whole messages of a truncated bag are read.
-        world: Frame in which frames have their pose; None if they have none.
+        world: Frame in which frames have their pose, or topic of Odometry; None if they have none.
     """
 
     kind = "rosbag"
@@ -87,8 +91,9 @@ class RosBag:
             T_camera_lidar: (4, 4) from lidar to camera coordinates, or a file of it, as `ldls.read_camera` takes them,
                 instead of the bag's transforms; a mapping from image topic to either for several cameras.
             fields: The clouds' own names of x, y, z and intensity, where they differ.
-            world: Frame of /tf in which frames have their pose, as "odom" or "map"; without it they have none, and /tf
-                is not read for them.
+            world: Frame in which frames have their pose, as "odom" or "map": by /tf, or where that does not connect it
+                with the cloud's frame by messages of nav_msgs/Odometry; a topic of these, as "/odometry", has them come
+                from it. Without a world there are none, and neither is read for them.
             recover: If true, a truncated bag yields its whole messages and a warning instead of an error.
 
         Raises:
@@ -171,8 +176,9 @@ class RosBag:
         return "rosbag2" if any(file.suffix == ".db3" for file in storage_files(self.path)) else "mcap"
 
     def companions(self) -> tuple[str, ...]:
-        """The topics that play beside the clouds: images, their calibrations, and transforms."""
-        moves = [topic.name for topic in self._bag.topics.values() if topic.type in (TRANSFORMS, OLD_TRANSFORMS)]
+        """The topics that play beside the clouds: images, their calibrations, transforms and odometry."""
+        kinds = (TRANSFORMS, OLD_TRANSFORMS, ODOMETRY)
+        moves = [topic.name for topic in self._bag.topics.values() if topic.type in kinds]
         return tuple(dict.fromkeys([*self.topics.images, *self.topics.infos, *moves]))
 
     def cloud(self, index: int) -> PointCloud:
@@ -205,7 +211,8 @@ class RosBag:
             IndexError: There is no such frame.
             FileFormatError: The cloud cannot be read.
             CalibrationError: A camera is not calibrated, or nothing connects its frame and the cloud's.
-            PoseError: Nothing connects the world and the cloud's frame, or transforms have a gap then, or jump.
+            PoseError: Nothing connects the world and the cloud's frame, or transforms or poses of Odometry have a gap
+                then, or jump, or several topics have such poses.
         """
         if not -len(self) <= index < len(self):
             raise IndexError(f"frame {index}: there are {len(self)}")
@@ -217,7 +224,20 @@ class RosBag:
         return Frame(name=self.names[index], points=points, stamp=stamp, pose=pose, images=images)
 
     def _pose(self, sweep: Header) -> NDArray[np.float64] | None:
-        return None if self.world is None else self._tree.pose(self.world, sweep.frame_id, sweep.stamp_ns)
+        if self.world is None:
+            return None
+        by_topic = self.world in odometry_topics(self._bag)
+        odometry = self._odometry if by_topic or not self._tree.connects(self.world, sweep.frame_id) else None
+        if odometry is None:
+            return self._tree.pose(self.world, sweep.frame_id, sweep.stamp_ns)
+        if not self._tree.connects(odometry.robot, sweep.frame_id):
+            raise PoseError(
+                f"{odometry.topic} has poses of {odometry.robot!r}, which no transforms connect with the lidar's frame "
+                f"{sweep.frame_id!r}; choose another world, or give poses of a file"
+            )
+        T_robot_lidar = self._tree.pose(odometry.robot, sweep.frame_id, sweep.stamp_ns)
+        with within(odometry.topic):
+            return odometry.way.at(sweep.stamp_ns / NANOSECONDS) @ T_robot_lidar
 
     def _image(self, image: StampedMessage, sweep: Header) -> CameraImage:
         info = nearest(self._infos[image.topic], image.header.stamp_ns)
@@ -239,6 +259,10 @@ class RosBag:
     @cached_property
     def _tree(self) -> TransformTree:
         return TransformTree(self._transforms(STATIC_TRANSFORMS), partial(self._transforms, MOVING_TRANSFORMS))
+
+    @cached_property
+    def _odometry(self) -> Odometry | None:
+        return None if self.world is None else read_odometry(self._bag, self.world)
 
     def _transforms(self, name: str) -> Iterator[Message]:
         """The messages of a topic of transforms, under any robot's prefix."""
@@ -272,7 +296,7 @@ class RosBag:
         self.close()
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_bag", "_tree")}
+        return {name: value for name, value in self.__dict__.items() if name not in UNPICKLED}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)

@@ -1,0 +1,112 @@
+"""Poses of a robot from messages of nav_msgs/Odometry.
+
+Source: https://docs.ros.org/en/noetic/api/nav_msgs/html/msg/Odometry.html: the pose is that of `child_frame_id` in
+`header.frame_id`.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ldls.camera.rigid import from_parts, from_quaternion
+from ldls.datasets.ros_transforms import plain
+from ldls.errors import CalibrationError, PoseError, within
+from ldls.io.ros.bags import Bag
+from ldls.io.ros.messages import NANOSECONDS, ODOMETRY, Message, nanoseconds, read_header, seconds
+from ldls.sequences import Trajectory
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """The way of a robot, as a topic has it.
+
+    Attributes:
+        topic: The topic.
+        robot: The frame whose poses they are.
+        way: Its poses.
+    """
+
+    topic: str
+    robot: str
+    way: Trajectory
+
+
+def odometry_topics(bag: Bag) -> list[str]:
+    """The topics of nav_msgs/Odometry."""
+    return [topic.name for topic in bag.topics.values() if topic.type == ODOMETRY]
+
+
+def read_odometry(bag: Bag, world: str) -> Odometry | None:
+    """The way of the robot in the frame `world`, or as the topic `world` has it; None without any message of this type.
+
+    Raises:
+        PoseError: No topic, or more than one, has poses in that frame; or they are of several robots or of none, or
+            are no way of a robot. The message has the topic, and the stamp where there is one.
+        CorruptFileError: A message cannot be read.
+    """
+    topics = odometry_topics(bag)
+    messages: dict[str, dict[str, list[bytes]]] = {topic: defaultdict(list) for topic in topics}
+    for message in bag.read_all(topics):
+        header = read_header(message.raw, ros2=bag.ros2)
+        messages[message.topic][plain(header.frame_id)].append(message.raw)
+    topic, raw = _of_topic(world, messages[world]) if world in messages else _in_frame(world, messages)
+    if topic is None:
+        return None
+    with within(topic):
+        return _way(topic, [bag.decode(topic, one) for one in raw])
+
+
+def _of_topic(topic: str, by_world: Mapping[str, list[bytes]]) -> tuple[str, list[bytes]]:
+    """The topic and its messages."""
+    if len(by_world) != 1:
+        found = f"poses in {_listed(by_world)}" if by_world else "no messages"
+        raise PoseError(f"world: {topic} has {found}, expected poses in one frame; choose that frame, or another topic")
+    return topic, next(iter(by_world.values()))
+
+
+def _in_frame(world: str, messages: Mapping[str, Mapping[str, list[bytes]]]) -> tuple[str | None, list[bytes]]:
+    """The topic that has poses in a frame, and these messages; None where no topic has any message."""
+    topics = [topic for topic, by_world in messages.items() if plain(world) in by_world]
+    if len(topics) == 1:
+        return topics[0], messages[topics[0]][plain(world)]
+    if topics:
+        raise PoseError(f"world: {', '.join(topics)} have poses in {world!r}; choose one of them, as world={topics[0]}")
+    found = [f"{topic} has poses in {_listed(by_world)}" for topic, by_world in messages.items() if by_world]
+    if found:
+        raise PoseError(
+            f"world: neither transforms nor nav_msgs/Odometry have poses in {world!r}; {'; '.join(found)}; "
+            "choose another world"
+        )
+    return None, []
+
+
+def _way(topic: str, messages: Sequence[Message]) -> Odometry:
+    robots = sorted({plain(message.child_frame_id) for message in messages})
+    if len(robots) != 1 or not robots[0]:
+        raise PoseError(
+            f"child_frame_id is {_listed(robots)}, expected the name of one frame that moves with the lidar; choose "
+            "another world, or give poses of a file"
+        )
+    poses = np.array([_pose(message) for message in messages])
+    stamps_ns = np.array([nanoseconds(message.header.stamp) for message in messages], np.int64)
+    # messages may come late, and twice
+    stamps_ns, first = np.unique(stamps_ns, return_index=True)
+    return Odometry(topic, robots[0], Trajectory(stamps_ns / NANOSECONDS, poses[first]))
+
+
+def _pose(message: Message) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """(4, 4) from coordinates of the robot to those of the world."""
+    q, t = message.pose.pose.orientation, message.pose.pose.position
+    try:
+        rotation = from_quaternion("orientation", np.array([q.w, q.x, q.y, q.z], np.float64))
+    except CalibrationError as error:
+        raise PoseError(f"pose at {seconds(nanoseconds(message.header.stamp))} s: {error}") from None
+    return from_parts(rotation, np.array([t.x, t.y, t.z], np.float64))
+
+
+def _listed(names: Mapping[str, object] | Sequence[str]) -> str:
+    return " and ".join(repr(name) for name in sorted(names))
