@@ -62,6 +62,13 @@ def test_no_colour_of_a_known_category_is_dark_or_grey() -> None:
     assert np.hypot(lab[:, 1], lab[:, 2]).min() > 0.1
 
 
+def test_tracks_keep_their_colour_whatever_else_is_there() -> None:
+    first, second = instance_colours([3, 1, 3], [5, 6, 7]), instance_colours([3, 3, 1], [7, 5, 6])
+    np.testing.assert_array_equal(first, second[[1, 2, 0]])
+    assert not np.array_equal(first[0], first[2])
+    np.testing.assert_array_equal(instance_colours([3, 3], [1, 2]), instance_colours([3, 3], [0, 0]))
+
+
 def test_no_instances_have_no_colours() -> None:
     assert instance_colours([]).shape == (0, 3)
     assert instance_colours(np.array([3], np.int32)).dtype == np.uint8

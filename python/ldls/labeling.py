@@ -86,25 +86,37 @@ class Labeling:
     @classmethod
     @checked
     def from_segmentation(cls, result: Segmentation) -> Self:
-        """Labels of a segmentation, its instances by their masks; points out of view are ignored."""
-        return cls.from_instance_labels(result.labels, [instance.name for instance in result.instances])
+        """Labels of a segmentation, its instances by label or track; points out of view are ignored."""
+        names = [instance.name for instance in result.instances]
+        return cls.from_instance_labels(result.labels, names, instance_ids=result.instance_ids[1:])
 
     @classmethod
     @checked
-    def from_instance_labels(cls, labels: NDArray[np.signedinteger], class_names: Iterable[str]) -> Self:
+    def from_instance_labels(
+        cls,
+        labels: NDArray[np.signedinteger],
+        class_names: Iterable[str],
+        *,
+        instance_ids: ArrayLike | None = None,
+    ) -> Self:
         """Labels of points by instance, (N,): -1 ignored, 0 background, m of class `class_names[m - 1]`.
+
+        Its instance is m, or `instance_ids[m - 1]`, as the number of a track.
 
         Raises:
             InputError: A label has no name.
+            ShapeError: There is not one number a name.
         """
         objects = [str(name) for name in class_names]
         labels = numbers("labels", labels, np.int32, ("N",))
         if labels.size and not (labels.min() >= -1 and labels.max() <= len(objects)):
             raise InputError(f"labels: got {labels.min()} to {labels.max()}, expected -1 to {len(objects)}")
         names = tuple(dict.fromkeys([BACKGROUND, *objects]))
-        instances = np.maximum(labels, 0)
+        known = np.maximum(labels, 0)
         by_label = np.array([0, *(names.index(name) for name in objects)], np.int32)
-        return cls(by_label[instances], instances, labels < 0, names)
+        ids = np.arange(1, len(objects) + 1) if instance_ids is None else instance_ids
+        numbered = np.concatenate([[0], numbers("instance_ids", ids, np.int64, (len(objects),))])
+        return cls(by_label[known], numbered[known], labels < 0, names)
 
     def __len__(self) -> int:
         return len(self.classes)

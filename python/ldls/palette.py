@@ -1,4 +1,4 @@
-"""Colours of instances: the hue says the category, the shade tells instances of it apart.
+"""Colours of instances: the hue says the category, the shade tells instances of it apart, in a drive by their tracks.
 
 Hues are the same in every picture. They were chosen one after the other, each as far as can be from those before it and
 from grey, to eyes with all three kinds of cones and to eyes that lack one. No more than eight or so can be kept well
@@ -8,7 +8,9 @@ apart for all of them, so pictures also write names. Coordinates are OKLCh (http
 from collections import Counter
 from collections.abc import Iterable
 from functools import cache
+from itertools import zip_longest
 from math import cos, radians, sin
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,29 +51,43 @@ CONE_ROOTS = np.array([[1, 0.39634, 0.21580], [1, -0.10556, -0.06385], [1, -0.08
 LINEAR_RGB = np.array([[4.07674, -3.30771, 0.23097], [-1.26844, 2.60976, -0.34132], [-0.00420, -0.70342, 1.70761]])
 
 
+class Instance(Protocol):
+    """What has a colour."""
+
+    @property
+    def category(self) -> int:
+        """Category id."""
+
+    @property
+    def track(self) -> int:
+        """Number in the drive, from 1; 0 without."""
+
+
 def category_colour(category: int) -> Colour:
     """Red, green and blue, 0 to 255, of a category: the first shade of its hue, the same in every picture."""
     return _shade(_hue_of(category), 0)
 
 
-def instance_colours(categories: Iterable[int]) -> NDArray[np.uint8]:
+def instance_colours(categories: Iterable[int], tracks: Iterable[int] = ()) -> NDArray[np.uint8]:
     """(M, 3) uint8 red, green and blue of M instances from the category id of each.
 
     The k-th instance of a category has the k-th shade of its hue, whatever other categories there are. After fourteen
-    the shades begin again.
+    the shades begin again. With the number of each in its drive, `tracks` (M,), number k has the k-th shade, so that it
+    keeps its colour in all sweeps.
     """
     met: Counter[int] = Counter()
     colours = []
-    for category in categories:
-        hue = _hue_of(int(category))
-        colours.append(_shade(hue, met[category]))
+    for category, track in zip_longest(map(int, categories), map(int, tracks), fillvalue=0):
+        colours.append(_shade(_hue_of(category), track - 1 if track else met[category]))
         met[category] += 1
     return np.array(colours, np.uint8).reshape(-1, 3)
 
 
-def label_colours(categories: Iterable[int]) -> NDArray[np.uint8]:
-    """(M + 1, 3) uint8 by label: the background, and the M instances."""
-    return np.vstack([[BACKGROUND], instance_colours(categories)]).astype(np.uint8)
+def label_colours(instances: Iterable[Instance]) -> NDArray[np.uint8]:
+    """(M + 1, 3) uint8 by label: the background, and the M instances, those of a drive by their tracks."""
+    pairs = [(each.category, each.track) for each in instances]
+    of_instances = instance_colours((category for category, _ in pairs), (track for _, track in pairs))
+    return np.vstack([[BACKGROUND], of_instances]).astype(np.uint8)
 
 
 def as_tuples(colours: NDArray[np.uint8]) -> list[Colour]:

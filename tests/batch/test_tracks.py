@@ -1,17 +1,20 @@
 """The tracks of a run: what the tracker says of the stored results, whole or not there, and done again when need be."""
 
 import csv
+import json
 import re
 import signal
 import sys
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import ldls
 from batch import drives, runs
 from ldls import batch
 from ldls.batch import run_tracks
+from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import (
     LeftOutWarning,
@@ -21,7 +24,7 @@ from ldls.errors import (
     UnsafePathError,
     UnsupportedFormatError,
 )
-from ldls.io.labels import read_labeling
+from ldls.io.labels import read_labeling, write_labeling
 
 
 def run(drive, out, **settings):
@@ -79,6 +82,7 @@ def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, s
             ldls.save(result, tmp_path / "one.label")
             path = out / f"tracks/{source.names[index]}.label"
             assert path.read_bytes() == (tmp_path / "one.label").read_bytes()
+            assert ldls.read_result(path.with_suffix(".npz")).instances == result.instances
             numbers = {instance.label: instance.track for instance in result.instances}
             read = read_labeling(path).instances
             np.testing.assert_array_equal(read, [numbers.get(label, 0) for label in result.labels.tolist()])
@@ -98,6 +102,55 @@ def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, s
     assert next(found, None) is None
     by_frame = [{row["track"] for row in rows(out) if row["frame"] == name} for name in source.names]
     assert len(set.intersection(*by_frame)) >= 3, "objects go on as themselves over all windows"
+
+
+def test_results_with_tracks_are_in_the_formats_that_name_instances(drive, tmp_path):
+    out, formats = tmp_path / "out", ("panoptic", "lidarseg", "png")
+    run(drive, out, formats=formats, frames=slice(3))
+    both = {f"tracks/{k:06d}{ending}" for k in range(3) for ending in (".label", "_panoptic.npz")}
+    assert {*tracks(out)} == {*both, "tracks.csv", "tracks/tracks.json"}
+    run(drive, out, formats=("csv",), frames=slice(3))
+    assert {*tracks(out)} - {*both} == {f"tracks/{k:06d}.csv" for k in range(3)} | {"tracks.csv", "tracks/tracks.json"}
+    assert {*both} < {*tracks(out)}, "files that are there stay"
+
+
+def test_files_of_every_format_score_the_same(simulated, tmp_path):
+    run(simulated, tmp_path / "out", masks=str(simulated / "masks_02"), formats=("npz", "panoptic"))
+    (tmp_path / "truth").mkdir()
+    for frame in open_source(simulated):
+        write_labeling(tmp_path / f"truth/{frame.name}.npz", frame.truth)
+    tracked = tmp_path / "out/tracks"
+    words = [
+        f"npz:{tracked}",
+        tmp_path / "truth",
+        *(f"--beside={word}={word}:{tracked}" for word in ("label", "panoptic")),
+    ]
+    outcome = CliRunner().invoke(
+        app, ["evaluate", *map(str, words), "--name", "npz", "--track", "--out", str(tmp_path / "t")]
+    )
+    assert outcome.exit_code == 0, outcome.output
+    found = {word: {} for word in ("npz", "label", "panoptic")}
+    for row in json.loads((tmp_path / "t/tracking.json").read_text())["rows"]:
+        found[row.pop("method")][row["class"]] = row
+    assert found["npz"] == found["label"] == found["panoptic"]
+    assert found["npz"]["Car"]["S_assoc"] > 60
+
+
+@pytest.mark.parametrize("frames", [slice(None), slice(2, 6)])
+def test_the_table_of_objects_has_tracks(drive, tmp_path, frames):
+    (drive / "velodyne/000004.bin").write_bytes(b"x")
+    out, path = tmp_path / "out", tmp_path / "objects.csv"
+    run(drive, out)
+    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, track=True, formats=("npz",))
+    batch.run(drive, out, settings, objects=path, frames=frames)
+    names = ("frame", "track", "label", "velocity_x_m_s", "velocity_y_m_s")
+    with path.open(newline="") as file:
+        found = [tuple(row[name] for name in names) for row in csv.DictReader(file)]
+    chosen = {f"{k:06d}" for k in range(8)[frames]}
+    assert len(found) > 5 and found == [
+        tuple(row[name] for name in names) for row in rows(out) if row["frame"] in chosen
+    ]
+    assert all(track != "0" for _, track, *_ in found)
 
 
 def test_a_map_holds_what_the_tracked_results_leave_standing(drive, tmp_path):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,11 +46,22 @@ def test_tables_without_objects_have_their_heads(small_scene, tmp_path):
     points, masks, camera = small_scene
     empty = ldls.segment(points[:0], masks, camera)
     ldls.save_objects({"a": empty}, tmp_path / "a.csv")
-    assert (tmp_path / "a.csv").read_text().startswith("frame,label,category,name,")
+    assert (tmp_path / "a.csv").read_text().startswith("frame,label,track,category,name,")
     assert read_rows(tmp_path / "a.csv") == []
     ldls.save_objects({"a": empty}, tmp_path / "a.json")
     content = json.loads((tmp_path / "a.json").read_text())
     assert (content["annotations"], content["categories"], len(content["images"])) == ([], [], 1)
+
+
+def test_tracked_objects_have_their_track_and_velocity(result, tmp_path):
+    instances = tuple(replace(i, track=40 + i.label, velocity=(1.25, -i.label)) for i in result.instances)
+    ldls.save_objects(replace(result, instances=instances), tmp_path / "a.csv")
+    names = ("label", "track", "velocity_x_m_s", "velocity_y_m_s")
+    rows = [tuple(float(row[name]) for name in names) for row in read_rows(tmp_path / "a.csv")]
+    assert rows == [(1, 41, 1.25, -1), (2, 42, 1.25, -2)]
+    ldls.save_objects(replace(result, instances=instances), tmp_path / "a.json")
+    found = json.loads((tmp_path / "a.json").read_text())["annotations"]
+    assert [(each["track"], each["velocity"]) for each in found] == [(41, [1.25, -1]), (42, [1.25, -2])]
 
 
 def test_names_with_commas_and_quotes_survive(small_scene, tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.palette import category_colour
+from ldls.palette import instance_colours
 
 
 def segmented(scene, dtype=np.float32, shift=(0, 0, 0), **changes):
@@ -232,8 +232,8 @@ def test_maps_are_clouds(places, tmp_path):
         np.testing.assert_array_equal(tracks, places.tracks)
         np.testing.assert_array_equal(confidence, places.confidence)
         for track, category in ((0, None), (7, 1), (5, 3)):
-            expected = (128, 128, 128) if category is None else category_colour(category)
-            assert {tuple(each) for each in colours[places.tracks == track].tolist()} == {expected}
+            expected = [128] * 3 if category is None else instance_colours([category], [track])[0].tolist()
+            assert {tuple(each) for each in colours[places.tracks == track].tolist()} == {tuple(expected)}
 
 
 def decoded(pypcd4, cloud):

@@ -1,5 +1,7 @@
 """Segmentations come back from their files as they were, and files that are not whole are refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,15 @@ def test_a_ring_whose_instances_merge(scene, tmp_path):
     result = ldls.segment(points, [ldls.View(masks, camera, "left"), ldls.View(second, camera, "right")])
     assert len(result.instances) == 2
     same(through_file(result, tmp_path / "a.npz"), result)
+
+
+def test_tracks_and_velocities(scene, tmp_path):
+    result = ldls.segment(*scene)
+    instances = tuple(replace(i, track=70000 - i.label, velocity=(0.1 * i.label, -3.0)) for i in result.instances)
+    found = through_file(replace(result, instances=instances), tmp_path / "a.npz")
+    same(found, replace(result, instances=instances))
+    assert [(each.track, each.velocity) for each in found.objects] == [(69999, (0.1, -3.0)), (69998, (0.2, -3.0))]
+    assert found.instance_ids.tolist() == [0, 69999, 69998]
 
 
 def test_no_points_and_no_masks(scene, tmp_path):

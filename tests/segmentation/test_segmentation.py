@@ -67,14 +67,15 @@ def test_objects_are_rows_of_plain_values(small_scene):
     )
     person, car = result.to_table()
     assert list(person) == list(car) == [
-        "label", "category", "name", "score", "n_points", "distance_m", "centroid_x_m", "centroid_y_m", "centroid_z_m",
-        "box_x_m", "box_y_m", "box_z_m", "length_m", "width_m", "height_m", "yaw_rad",
+        "label", "track", "category", "name", "score", "n_points", "distance_m",
+        "centroid_x_m", "centroid_y_m", "centroid_z_m", "box_x_m", "box_y_m", "box_z_m", "length_m", "width_m",
+        "height_m", "yaw_rad", "velocity_x_m_s", "velocity_y_m_s",
         "camera", "mask_left_px", "mask_top_px", "mask_width_px", "mask_height_px",
     ]  # fmt: skip
     found = result.objects[2]
     assert list(car.values()) == [
-        3, 3, "car", 1.0, found.n_points, found.distance_m, *found.centroid, *found.box.center, *found.box.size,
-        found.box.yaw, "camera 0", 51, 23, 12, 15,
+        3, 0, 3, "car", 1.0, found.n_points, found.distance_m, *found.centroid, *found.box.center, *found.box.size,
+        found.box.yaw, 0.0, 0.0, "camera 0", 51, 23, 12, 15,
     ]  # fmt: skip
     assert {type(value) for value in car.values()} == {int, str, float}
     assert json.loads(json.dumps([person, car])) == [person, car]

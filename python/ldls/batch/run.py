@@ -147,14 +147,15 @@ def run(
         journal.finish(opened.names)
         failures = failures_of(journal.records(names))
         write_failures(folder, failures_of(journal.records(opened.names)))
-        if write_objects is not None:
-            write_objects(objects_of(journal.records(names)))
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
         if bag is not None:
             stored = [record["frame"] for record in _stored(journal, opened.names, folder)]
             bag.write(stored, anew=n_finished - n_failed > n_earlier)
         unplaced = [] if tracks is None else tracks.write(lambda: _stored(journal, opened.names, folder))
+        if write_objects is not None:
+            objects_found = objects_of(journal.records(names))
+            write_objects(objects_found if tracks is None else tracks.numbered(objects_found, opened.names))
     if unplaced:
         message = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
         warnings.warn(message, LeftOutWarning, stacklevel=2)
@@ -179,7 +180,7 @@ def _tracks(
 ) -> RunTracks | None:
     """The tracks of a run, and its map, where they are asked for."""
     if settings.track:
-        return RunTracks(folder, names, None if map_file is None else Path(map_file))
+        return RunTracks(folder, names, settings.formats, None if map_file is None else Path(map_file))
     if map_file is not None:
         raise ParameterError(f"map: {map_file} is without what moves, which tracks tell; add --track")
     return None

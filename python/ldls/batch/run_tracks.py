@@ -2,7 +2,8 @@
 
 The folder of the run then has
 
-- `tracks/FRAME.label`: labels after SemanticKITTI, with the track in the upper 16 bits;
+- `tracks/FRAME.ENDING`: the results of the run again, with their tracks: `.label` after SemanticKITTI, where they are
+  the upper 16 bits, and of the formats of the run those that name instances;
 - `tracks.csv`: a row for each object with points of each frame;
 - `tracks/tracks.json`: a digest of what they were made of, and size and digest of each of these files.
 
@@ -15,7 +16,8 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -29,13 +31,16 @@ from ldls.errors import LimitError, UnsafePathError
 from ldls.io import read_result, save
 from ldls.io.files import LARGE_BYTES, check_folder, open_file, refuse_link, sweep, whole_file
 from ldls.io.labels.semantic_kitti import MOST_INSTANCES as MOST_TRACKS
-from ldls.io.objects import DECIMALS
+from ldls.io.objects import DECIMALS, FrameObjects
 from ldls.io.results import map_writer
 from ldls.segmentation import Segmentation
+from ldls.segmentation.object_rows import Row
 from ldls.sequences import LabelledMap, Sweep, Tracker
 from ldls.viewing.formats import RESULT, file_name
 
 FOLDER, TABLE, STATE = "tracks", "tracks.csv", "tracks.json"
+FORMATS = ("npz", "label", "panoptic", "ply", "pcd", "las", "laz", "parquet", "csv")
+"""Formats of results that name instances."""
 COLUMNS = (
     "frame", "track", "label", "category", "name", "score", "n_points", "world_x_m", "world_y_m", "world_z_m",
     "velocity_x_m_s", "velocity_y_m_s",
@@ -46,8 +51,10 @@ COLUMNS = (
 class RunTracks:
     """The tracks in the folder of a run."""
 
-    def __init__(self, folder: Path, names: Iterable[str], map_file: Path | None = None) -> None:
-        """Tracks in `folder`, of frames of these names, and a file for the map.
+    def __init__(
+        self, folder: Path, names: Iterable[str], formats: Iterable[str] = (), map_file: Path | None = None
+    ) -> None:
+        """Tracks in `folder`, of frames of these names, in these formats as far as they name instances, and a map.
 
         Raises:
             ImportError: `ldls[eval]` is not installed.
@@ -61,6 +68,7 @@ class RunTracks:
             map_writer(map_file)
             check_folder(map_file)
         self._folder, self._place, self._map = folder, folder / FOLDER, map_file
+        self._formats = {"label", *formats}
 
     def write(self, records: Callable[[], Iterable[Record]]) -> list[str]:
         """Number the objects of all frames that are done, if that was not done; the frames left out, without a pose.
@@ -71,7 +79,7 @@ class RunTracks:
             records: Gives the journal's records of the frames that have a stored result, in the order of the source.
 
         Raises:
-            LimitError: There are more objects than a `.label` has numbers for, or the map has too many voxels.
+            LimitError: There are more objects than a file has numbers for, or the map has too many voxels.
             FileFormatError: A stored result is broken.
             UnsafePathError: The folder of the tracks is a link.
             OSError: A file cannot be written, as on a full disk; give the same command again.
@@ -80,8 +88,14 @@ class RunTracks:
         unplaced = [record["frame"] for record in records() if not _is_placed(record)]
         made_of, before = _digest(records()), self._before()
         files: dict[str, list[int | str]] = before["files"]
-        current = before["made_of"] == made_of and all(is_written(self._folder / name, files[name]) for name in files)
-        if current and self._map is None:
+        frames = [record["frame"] for record in records() if _is_placed(record)]
+        # those of earlier runs stay
+        formats = [
+            word for word in FORMATS if word in self._formats or any(_place(frame, word) in files for frame in frames)
+        ]
+        expected = {TABLE, *(_place(frame, word) for frame in frames for word in formats)}
+        current = before["made_of"] == made_of and expected == files.keys()
+        if current and self._map is None and all(is_written(self._folder / name, files[name]) for name in files):
             return unplaced
         places = LabelledMap()
         self._place.mkdir(exist_ok=True)
@@ -92,9 +106,10 @@ class RunTracks:
             table = csv.writer(text, lineterminator="\n")
             table.writerow(COLUMNS)
             for frame, placed, result in self._tracked(filter(_is_placed, records())):
-                path = self._place / file_name(frame, "label")
-                save(result, path)
-                now[f"{FOLDER}/{path.name}"] = written(path)
+                for word in formats:
+                    path = self._folder / _place(frame, word)
+                    save(result, path)
+                    now[_place(frame, word)] = written(path)
                 table.writerows(_rows(frame, placed, result))
                 if self._map is not None:
                     places.add(placed, result)
@@ -108,6 +123,24 @@ class RunTracks:
         if self._map is not None:
             save(places, self._map)
         return unplaced
+
+    def numbered(self, objects: Iterable[FrameObjects], names: Sequence[str]) -> Iterator[FrameObjects]:
+        """Yield the objects of frames with the tracks that were written.
+
+        Args:
+            objects: The objects, in the order of their frames.
+            names: Names of all frames of the source, in their order.
+        """
+        order = {name: number for number, name in enumerate(names)}
+        with open_file(self._folder / TABLE, "table of tracks", limit=LARGE_BYTES) as file:
+            rows = csv.DictReader(io.TextIOWrapper(file, encoding="utf-8", newline=""))
+            of_frames = groupby(rows, key=lambda row: row["frame"])
+            frame, tracked = next(of_frames, (None, iter(())))
+            for each in objects:
+                while frame is not None and order[frame] < order[each.frame]:
+                    frame, tracked = next(of_frames, (None, iter(())))
+                known = {int(row["label"]): row for row in tracked} if frame == each.frame else {}
+                yield replace(each, rows=[_numbered(row, known.get(row["label"])) for row in each.rows])
 
     def _tracked(self, records: Iterable[Record]) -> Iterator[tuple[str, Sweep, Segmentation]]:
         """Name, sweep and tracked result of each frame, window by window."""
@@ -144,9 +177,23 @@ def _is_placed(record: Record) -> bool:
     return record["pose"] is not None and record["stamp"] is not None
 
 
+def _place(frame: str, word: str) -> str:
+    """Where a file of a frame is in the folder of the run."""
+    return f"{FOLDER}/{file_name(frame, word)}"
+
+
 def _is_ours(name: str) -> bool:
     """True for the name of a file that tracks have; nothing else is removed."""
-    return name == TABLE or (name.startswith(f"{FOLDER}/") and name.endswith(".label") and len(Path(name).parts) == 2)
+    endings = tuple(file_name("", word) for word in FORMATS)
+    return name == TABLE or (name.startswith(f"{FOLDER}/") and name.endswith(endings) and len(Path(name).parts) == 2)
+
+
+def _numbered(row: Row, known: Mapping[str, str] | None) -> Row:
+    """The row of an object with what the row of the tracks says of it."""
+    if known is None:
+        return row
+    velocity = {name: float(known[name]) for name in ("velocity_x_m_s", "velocity_y_m_s")}
+    return row | {"track": int(known["track"])} | velocity
 
 
 def _digest(records: Iterable[Record]) -> str:

@@ -40,7 +40,7 @@ class RunSettings:
         poses: File of poses in TUM's or KITTI's format, instead of those that the source has, if it has any; "kiss-icp"
             for those that the sweeps tell, which the folder of the run keeps in poses.txt.
         track: Number the objects over the drive when its frames are done, which is made of their npz, so that these
-            are written too; run_tracks.py.
+            are written too; those of `formats` that name instances are there with tracks besides; run_tracks.py.
 
     Raises:
         ParameterError: Both `masks` and `segmenter` are given, there is no format, or an unknown one, or `sweeps` is

@@ -97,7 +97,7 @@ def object_table(objects: Sequence[SegmentedObject]) -> Table:
     for heading in HEADINGS:
         table.add_column(heading, justify="left" if heading == "object" else "right")
     for each in nearest_first(objects):
-        table.add_row(*cells_of(each))
+        table.add_row(*cells_of(each, each.label))
     return table
 
 

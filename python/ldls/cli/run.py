@@ -60,7 +60,7 @@ def run(
     track: Annotated[
         bool,
         typer.Option(
-            "--track", help="Number objects over the drive: OUT/tracks/FRAME.label and OUT/tracks.csv. Extra eval."
+            "--track", help="Number objects over the drive: results in OUT/tracks, and OUT/tracks.csv. Extra eval."
         ),
     ] = False,
     map_file: Annotated[

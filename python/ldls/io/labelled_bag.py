@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import LimitError, UnsupportedFormatError
-from ldls.io.labelled_points import colors
+from ldls.io.labelled_points import colors, instances
 from ldls.io.ros.bags import open_bag
 from ldls.io.ros.messages import POINTS, Header, Topic
 from ldls.io.ros.point_cloud2 import encode
@@ -130,7 +130,7 @@ def labelled_columns(result: Segmentation) -> dict[str, NDArray[Any]]:
     }
     columns.setdefault("intensity", np.zeros(len(categories), np.float32))
     return columns | {
-        "instance_id": np.maximum(result.labels, 0).astype(np.uint32),
+        "instance_id": instances(result),
         "class_id": categories.astype(np.uint8),
         "probability": result.confidence,
         "rgb": packed.astype(np.uint32).view(np.float32),

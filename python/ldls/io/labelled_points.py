@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.palette import label_colours
+from ldls.palette import BACKGROUND, instance_colours, label_colours
 from ldls.segmentation import Segmentation
 from ldls.sequences import LabelledMap
 
@@ -21,17 +21,18 @@ def positions(result: Labelled) -> dict[str, NDArray[np.floating]]:
 
 
 def instances(result: Labelled) -> NDArray[np.uint32]:
-    """(N,) uint32: label of each point, of a map its track; 0 for background and out of view."""
+    """(N,) uint32: label of each point, or its track where it is tracked; 0 for background and out of view."""
     if isinstance(result, LabelledMap):
         return result.tracks.astype(np.uint32)
-    return np.maximum(result.labels, 0).astype(np.uint32)
+    ids: NDArray[np.uint32] = result.per_point(result.instance_ids.astype(np.uint32))
+    return ids
 
 
 def colors(result: Labelled) -> NDArray[np.uint8]:
     """(N, 3) uint8: red, green and blue of each point, grey for background and out of view."""
     if isinstance(result, LabelledMap):
         return _map_colors(result)
-    colours: NDArray[np.uint8] = result.per_point(label_colours(instance.category for instance in result.instances))
+    colours: NDArray[np.uint8] = result.per_point(label_colours(result.instances))
     return colours
 
 
@@ -41,10 +42,10 @@ def names(result: Segmentation) -> list[str | None]:
 
 
 def _map_colors(places: LabelledMap) -> NDArray[np.uint8]:
-    """As of a result whose instances are the tracks of the map, ascending."""
+    """As of a result whose instances are the tracks of the map."""
     pairs = np.stack([places.tracks, places.categories], axis=1)
     found, numbers = np.unique(pairs, axis=0, return_inverse=True)
-    is_object = found[:, 1] > 0
-    labels = np.where(is_object, np.cumsum(is_object), 0)
-    colours: NDArray[np.uint8] = label_colours(found[is_object, 1].tolist())[labels[numbers.reshape(-1)]]
+    of_pairs = instance_colours(found[:, 1].tolist(), found[:, 0].tolist())
+    of_pairs[found[:, 1] == 0] = BACKGROUND
+    colours: NDArray[np.uint8] = of_pairs[numbers.reshape(-1)]
     return colours

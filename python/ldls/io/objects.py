@@ -142,6 +142,8 @@ def _annotation(number: int, image: int, row: Row) -> dict[str, Any]:
         "iscrowd": 0,
         "score": row["score"],
         "label": row["label"],
+        "track": row["track"],
+        "velocity": [row["velocity_x_m_s"], row["velocity_y_m_s"]],
         "n_points": row["n_points"],
         "distance_m": row["distance_m"],
         "centroid": [row["centroid_x_m"], row["centroid_y_m"], row["centroid_z_m"]],

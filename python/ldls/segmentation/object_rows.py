@@ -13,9 +13,10 @@ Row = dict[str, Any]
 """An object: a value for each of `COLUMNS`."""
 
 COLUMNS = (
-    "label", "category", "name", "score", "n_points", "distance_m",
+    "label", "track", "category", "name", "score", "n_points", "distance_m",
     "centroid_x_m", "centroid_y_m", "centroid_z_m",
     "box_x_m", "box_y_m", "box_z_m", "length_m", "width_m", "height_m", "yaw_rad",
+    "velocity_x_m_s", "velocity_y_m_s",
     "camera", "mask_left_px", "mask_top_px", "mask_width_px", "mask_height_px",
 )  # fmt: skip
 """Columns of a table of objects, in their order."""
@@ -45,9 +46,10 @@ def _rows(
         camera, box = ("", (None,) * 4) if shown is None else (cameras[shown[0]], shown[1].bounding_box)
         top, left, height, width = box
         values = (
-            each.label, each.category, each.name, float(each.score), each.n_points, each.distance_m,
+            each.label, each.track, each.category, each.name, float(each.score), each.n_points, each.distance_m,
             *each.centroid.tolist(),
             *each.box.center.tolist(), *each.box.size.tolist(), float(each.box.yaw),
+            *each.velocity,
             camera, left, top, width, height,
         )  # fmt: skip
         yield dict(zip(COLUMNS, values, strict=True))

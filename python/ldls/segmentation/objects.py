@@ -19,6 +19,8 @@ class SegmentedObject:
         category: Category id.
         name: Category name.
         score: Score of the 2D segmenter.
+        track: Its number in the drive, from 1; 0 where nobody tracked it.
+        velocity: Metres a second along x and y of the world of the sweeps' poses; 0 where nobody tracked it.
         n_points: Points that carry its label.
         centroid: (3,) mean of these points in metres; None without points.
         box: The upright box that holds them, its sides along the sides seen; None without points.
@@ -28,6 +30,8 @@ class SegmentedObject:
     category: int
     name: str
     score: float
+    track: int = 0
+    velocity: tuple[float, float] = (0.0, 0.0)
     n_points: int
     centroid: NDArray[np.float64] | None
     box: OrientedBox | None

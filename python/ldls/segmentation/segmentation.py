@@ -101,6 +101,15 @@ class Segmentation:
             raise InputError(f"{name}: there are {len(self.views)} cameras; take result.views[i].{instead}")
         return self.views[0]
 
+    @cached_property
+    def instance_ids(self) -> NDArray[np.int64]:
+        """(M + 1,) int64: number of the instance of each label 0, 1, ..., by which files name it; 0 for 0.
+
+        It is the label, or where the result is tracked the track, which is 0 of what has no points.
+        """
+        tracks = [instance.track for instance in self.instances]
+        return np.array([0, *(tracks if any(tracks) else range(1, len(tracks) + 1))], np.int64)
+
     @property
     def sources(self) -> tuple[tuple[tuple[int, int], ...], ...]:
         """For each label 1, 2, ...: the views that show it, and its mask in each, both from 0."""
@@ -172,9 +181,10 @@ class Segmentation:
 
         A row is a dict of plain values; its columns, in this order:
 
-        - `label`, `category`, `name`, `score`, `n_points` and `distance_m`, as of `objects`;
+        - `label`, `track`, `category`, `name`, `score`, `n_points` and `distance_m`, as of `objects`;
         - `centroid_x_m`, `centroid_y_m`, `centroid_z_m`: mean of its points in the lidar frame;
         - `box_x_m`, `box_y_m`, `box_z_m`, `length_m`, `width_m`, `height_m`, `yaw_rad`: its box in the lidar frame;
+        - `velocity_x_m_s`, `velocity_y_m_s`: its velocity in the world of the poses;
         - `camera`: name of the first camera that shows it, and `mask_left_px`, `mask_top_px`, `mask_width_px`,
           `mask_height_px`: the smallest box around its mask there.
         """
@@ -187,6 +197,8 @@ class Segmentation:
             category=instance.category,
             name=instance.name,
             score=instance.score,
+            track=instance.track,
+            velocity=instance.velocity,
             n_points=len(rows),
             centroid=xyz.mean(axis=0) if len(rows) else None,
             box=fit_upright_box(xyz) if len(rows) else None,

@@ -8,7 +8,7 @@ from html import escape
 
 from PIL import Image
 
-from ldls.palette import instance_colours
+from ldls.palette import label_colours
 from ldls.segmentation import Segmentation
 from ldls.viewing.birds_eye import birds_eye_of, surroundings
 from ldls.viewing.ground import ground_of
@@ -40,11 +40,12 @@ def _img(picture: Image.Image, caption: str) -> str:
 
 
 def _table(result: Segmentation) -> str:
-    colours = instance_colours(instance.category for instance in result.instances).tolist()
+    colours = label_colours(result.instances).tolist()
+    numbers = result.instance_ids.tolist()
     head = "".join(f"<th>{heading}</th>" for heading in ("", *HEADINGS))
     rows = []
     for each in nearest_first(result.objects):
-        red, green, blue = colours[each.label - 1]
-        cells = "".join(f"<td>{escape(cell)}</td>" for cell in cells_of(each))
+        red, green, blue = colours[each.label]
+        cells = "".join(f"<td>{escape(cell)}</td>" for cell in cells_of(each, numbers[each.label]))
         rows.append(f'<tr><td style="background: rgb({red}, {green}, {blue})">&emsp;</td>{cells}</tr>')
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"

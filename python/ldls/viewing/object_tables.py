@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from ldls.segmentation import Segmentation, SegmentedObject
 
-HEADINGS = ("label", "object", "score", "points", "distance", "length x width x height")
+HEADINGS = ("number", "object", "score", "points", "distance", "length x width x height")
 """Headings of the cells of a row."""
 
 
@@ -21,21 +21,22 @@ def nearest_first(objects: Iterable[SegmentedObject]) -> list[SegmentedObject]:
     return sorted(objects, key=lambda each: (each.distance_m is None, each.distance_m))
 
 
-def cells_of(each: SegmentedObject) -> tuple[str, ...]:
-    """Label, name, score, points, distance and size of an object as text; "-" for distance and size without points."""
+def cells_of(each: SegmentedObject, number: int) -> tuple[str, ...]:
+    """Number, name, score, points, distance and size of an object as text; "-" for what it has not."""
     distance, size = "-", "-"
     if each.box is not None:
         distance = f"{each.distance_m:.1f} m"
         size = " x ".join(f"{side:.1f}" for side in each.box.size) + " m"
-    return str(each.label), each.name, f"{each.score:.2f}", f"{each.n_points:,}", distance, size
+    return str(number or "-"), each.name, f"{each.score:.2f}", f"{each.n_points:,}", distance, size
 
 
 def markdown(result: Segmentation, *, title: str = "") -> str:
     """Tables of the objects, the nearest first and those without points last, and of the report, in Markdown."""
+    numbers = result.instance_ids.tolist()
     parts = [f"# {title}"] if title else []
     parts.append(objects_found(result.objects))
     if result.objects:
-        parts.append(_table(HEADINGS, [cells_of(each) for each in nearest_first(result.objects)]))
+        parts.append(_table(HEADINGS, [cells_of(each, numbers[each.label]) for each in nearest_first(result.objects)]))
     report = {name: value for name, value in asdict(result.report).items() if value is not None}
     parts.append(_table(("report", ""), [(name.replace("_", " "), _text(value)) for name, value in report.items()]))
     return "\n\n".join(parts) + "\n"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import InputError, ParameterError
-from ldls.palette import Colour, as_tuples, instance_colours
+from ldls.palette import Colour, as_tuples, label_colours
 from ldls.segmentation import Segmentation
 
 Stage = Literal["direct", "diffused", "final"]
@@ -30,7 +30,7 @@ class Shown:
         result: The result.
         labels: (N,) int32 label of each point at the stage shown.
         colours: Colour of each of the M instances.
-        names: Name of each instance, with its label: "car 3".
+        names: Name of each instance, with its number: "car 3".
         marked: (N,) True for points with a white rim.
     """
 
@@ -52,14 +52,20 @@ class Shown:
         return cls(
             result=result,
             labels=getattr(result, STAGES[stage]),
-            colours=as_tuples(instance_colours(instance.category for instance in result.instances)),
-            names=[f"{instance.name} {instance.label}" for instance in result.instances],
+            colours=as_tuples(label_colours(result.instances)[1:]),
+            names=names_of(result),
             marked=np.zeros(len(result.labels), bool) if marked is None else marked,
         )
 
     def colours_of(self, labels: NDArray[np.int32]) -> NDArray[np.uint8]:
         """(n, 3) colours of the instances `labels` (n,), each 1 or more."""
         return np.array(self.colours, np.uint8).reshape(-1, 3)[labels - 1]
+
+
+def names_of(result: Segmentation) -> list[str]:
+    """Name of each instance, with its label, or where the result is tracked its track: "car 3"."""
+    numbers = result.instance_ids[1:].tolist()
+    return [f"{each.name} {n}" if n else each.name for each, n in zip(result.instances, numbers, strict=True)]
 
 
 def images_of(result: Segmentation, images: Images) -> list[NDArray[np.uint8]]:

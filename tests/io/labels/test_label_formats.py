@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -6,6 +8,7 @@ from evaluation.samples import labeling
 from ldls.errors import (
     CorruptFileError,
     InputError,
+    LimitError,
     ParameterError,
     TruncatedFileError,
     UnsafeFileError,
@@ -156,6 +159,36 @@ def test_segmentations_are_read_as_they_were_written(small_scene, tmp_path):
         np.testing.assert_array_equal(getattr(direct, name), getattr(found, name))
 
 
+def tracked(result, *tracks):
+    """The result with these tracks, one an instance."""
+    moving = zip(result.instances, tracks, strict=True)
+    return replace(result, instances=tuple(replace(i, track=t, velocity=(t / 4, -0.5)) for i, t in moving))
+
+
+@pytest.mark.parametrize("tracks", [(7, 300), (9, 9), (0, 2)], ids=["each its own", "one of both", "one without"])
+def test_instances_of_tracked_results_are_their_tracks_in_every_format(small_scene, tmp_path, tracks):
+    result = tracked(ldls.segment(*small_scene), *tracks)
+    expected = np.array([0, *tracks])[np.maximum(result.labels, 0)]
+    for name in ("a.npz", "a.label", "b_panoptic.npz"):
+        ldls.save(result, tmp_path / name)
+    np.testing.assert_array_equal(Labeling.from_segmentation(result).instances, expected)
+    np.testing.assert_array_equal(read_labeling(tmp_path / "a.npz").instances, expected)
+    np.testing.assert_array_equal(read_labeling(tmp_path / "a.label").instances, expected)
+    panoptic = read_labeling(tmp_path / "b_panoptic.npz")
+    np.testing.assert_array_equal(panoptic.instances % 1000, expected)
+    classes = {0: "noise", 1: "human.pedestrian.adult", 3: "vehicle.car"}
+    assert class_names(panoptic) == [classes[c] for c in result.categories.tolist()]
+
+
+def test_tracks_that_a_file_cannot_number_are_refused(small_scene, tmp_path):
+    result = tracked(ldls.segment(*small_scene), 1000, 1)
+    with pytest.raises(LimitError, match=r"a_panoptic.npz: track 1000, expected at most 999; track each scene alone"):
+        ldls.save(result, tmp_path / "a_panoptic.npz")
+    with pytest.raises(LimitError, match=r"a.label: a .label has 16 bits .*, got 65536"):
+        ldls.save(tracked(result, 65536, 1), tmp_path / "a.label")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_two_masks_of_a_class_are_two_instances():
     found = Labeling.from_instance_labels(np.array([-1, 0, 1, 2, 3]), ["car", "person", "car"])
     assert class_names(found) == ["background", "background", "car", "person", "car"]
@@ -180,6 +213,18 @@ def test_arrays_make_the_round_trip(tmp_path):
     [
         pytest.param({"x": [1]}, UnsupportedFormatError, "found arrays \\['x'\\]", id="neither kind"),
         pytest.param({"labels": [2], "object_name": ["car"]}, CorruptFileError, "expected -1 to 1", id="no object"),
+        pytest.param(
+            {"labels": [1], "object_name": ["car"], "object_track": [1, 2]},
+            CorruptFileError,
+            "a.npz: instance_ids: expected",
+            id="tracks of others",
+        ),
+        pytest.param(
+            {"labels": [1], "object_name": ["car"], "object_track": [-1]},
+            CorruptFileError,
+            "a.npz: instances: got -1",
+            id="negative track",
+        ),
         pytest.param({"labels": [0.5], "object_name": ["car"]}, CorruptFileError, "a.npz", id="float labels"),
         pytest.param({"classes": [2], "names": ["background"]}, CorruptFileError, "expected 0 to 0", id="class"),
         pytest.param({"classes": [0], "names": ["Car"]}, CorruptFileError, "'background' first", id="names"),

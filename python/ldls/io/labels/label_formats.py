@@ -201,8 +201,10 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
         return {_frame_name(path, endings) or path.stem: LabelFile(path, format or guess_format(path))}
     files: dict[str, LabelFile] = {}
     entries = [entry for entry in sorted(path.iterdir()) if entry.is_file() and not entry.name.startswith(".")]
+    # of a_panoptic.npz the frame is a, in whatever format labels are wanted
+    known = list(dict.fromkeys(each.ending for each in FORMATS.values()))
     for ending in endings:
-        names = {entry: _frame_name(entry, endings) for entry in entries}
+        names = {entry: _frame_name(entry, known) for entry in entries}
         new = {name: entry for entry, name in names.items() if name and entry.name == name + ending}
         if not new.keys() - files.keys():
             continue

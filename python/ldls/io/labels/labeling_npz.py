@@ -17,7 +17,8 @@ from ldls.labeling import Labeling
 def read_labeling_npz(path: str | PathLike[str]) -> Labeling:
     """Labels of an `.npz` file.
 
-    It holds a segmentation's arrays, or `classes`, `names` and, if there are any, `instances` and `ignored`.
+    It holds a segmentation's arrays, whose instances are its labels, or its tracks where it is tracked; or `classes`,
+    `names` and, if there are any, `instances` and `ignored`.
 
     Raises:
         UnsupportedFormatError: The arrays are of neither kind.
@@ -27,7 +28,9 @@ def read_labeling_npz(path: str | PathLike[str]) -> Labeling:
     with open_npz(path) as arrays:
         try:
             if {"labels", "object_name"} <= arrays.keys():
-                return Labeling.from_instance_labels(arrays["labels"], arrays["object_name"].tolist())
+                return Labeling.from_instance_labels(
+                    arrays["labels"], arrays["object_name"].tolist(), instance_ids=arrays.get("object_track")
+                )
             if {"classes", "names"} <= arrays.keys():
                 return _by_array(arrays)
         except InputError as error:

@@ -85,14 +85,24 @@ def write_lidarseg(path: Path, result: Segmentation) -> None:
 
 
 def write_panoptic(path: Path, result: Segmentation) -> None:
-    """Write class * 1000 + instance of each point in the order of the cloud; instances count from 1 in each class.
+    """Write class * 1000 + instance of each point in the order of the cloud; a tracked instance has its track.
+
+    Other instances count from 1 in each class.
 
     Raises:
-        LimitError: A class has more than 999 instances.
+        LimitError: A class has more than 999 instances, or a track is beyond 999.
     """
     classes = _classes(result)
-    counters = {one: count(1) for one in classes.tolist()}
-    numbers = np.array([0, *(next(counters[one]) for one in classes[1:].tolist())], np.int64)
+    if any(instance.track for instance in result.instances):
+        numbers = result.instance_ids
+        if numbers.max() >= INSTANCES_A_CLASS:
+            raise LimitError(
+                f"{path}: track {numbers.max()}, expected at most {INSTANCES_A_CLASS - 1}; track each scene "
+                "alone, or save .npz or .label instead"
+            )
+    else:
+        counters = {one: count(1) for one in classes.tolist()}
+        numbers = np.array([0, *(next(counters[one]) for one in classes[1:].tolist())], np.int64)
     if numbers.max() >= INSTANCES_A_CLASS:
         crowded = CLASS_NAMES[classes[numbers.argmax()]]
         raise LimitError(

@@ -55,12 +55,12 @@ def write(path: Path, result: Segmentation) -> None:
         LimitError: An instance has a number beyond 16 bits.
     """
     classes = [CLASSES.get(instance.category, OTHER_OBJECT) for instance in result.instances]
-    numbers = [instance.track or instance.label for instance in result.instances]
-    if max(numbers, default=0) > MOST_INSTANCES:
+    numbers = result.instance_ids
+    if numbers.max() > MOST_INSTANCES:
         raise LimitError(
-            f"{path}: a .label has 16 bits for the number of an instance, got {max(numbers)}; expected at most "
+            f"{path}: a .label has 16 bits for the number of an instance, got {numbers.max()}; expected at most "
             f"{MOST_INSTANCES:,}; .npz keeps any"
         )
-    codes = np.array([0, *classes], np.uint32) | np.array([0, *numbers], np.uint32) << 16
+    codes = np.array([0, *classes], np.uint32) | numbers.astype(np.uint32) << 16
     with whole_file(path) as file:
         file.write(result.per_point(codes).astype("<u4").tobytes())

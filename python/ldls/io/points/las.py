@@ -158,7 +158,8 @@ def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z to 0.1 mm, intensity, colour, and `instance`, `category` and `confidence` of their own.
 
     `.laz` is packed. Intensities of 0 to 1 are spread over the 16 bits that LAS has; larger ones are rounded.
-    Of a map, `instance` is the track. Points out of view have instance and category 0, as the background has.
+    Of a map or a tracked result, `instance` is the track. Points out of view have instance and category 0, as the
+    background has.
 
     Raises:
         NonFiniteError: A point is not finite, which LAS cannot say.

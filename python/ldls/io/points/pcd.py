@@ -241,8 +241,8 @@ def _field(name: str, kind: str, size: str, count: str) -> Field:
 def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z (and intensity), `label` (category id), `instance`, `confidence` and `rgb`.
 
-    Of a map, `instance` is the track. Points out of view have label and instance 0, as the background has. The colour
-    is packed as the Point Cloud Library has it: the bits of 0x00RRGGBB as a float.
+    Of a map or a tracked result, `instance` is the track. Points out of view have label and instance 0, as the
+    background has. The colour is packed as the Point Cloud Library has it: the bits of 0x00RRGGBB as a float.
 
     Raises:
         ImportError: The extra `pcd` is not installed.

@@ -145,7 +145,8 @@ def _add_property(place: str, element: Element, words: list[str]) -> None:
 def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z (and intensity), colour, `label` (category id), `instance` and `confidence`.
 
-    Of a map, `instance` is the track. Points out of view have label and instance 0, as the background has.
+    Of a map or a tracked result, `instance` is the track. Points out of view have label and instance 0, as the
+    background has.
     """
     position = positions(result)
     columns: dict[str, NDArray[np.number]] = {

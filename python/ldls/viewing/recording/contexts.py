@@ -1,7 +1,7 @@
 """Numbers of a recording, and the names and colours that annotation contexts give them.
 
-Of files the viewer reads only contexts that hold for all times, while labels mean other objects in every frame. So a
-recording remembers what it has named, new names are added to it, and numbers keep their meaning.
+Of files the viewer reads only contexts that hold for all times, while labels mean other objects in every frame that
+is not tracked. So a recording remembers what it has named, new names are added to it, and numbers keep their meaning.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import ldls.palette as palette
 from ldls.categories import category_ids
 from ldls.errors import LimitError
 from ldls.labeling import Labeling
-from ldls.palette import BACKGROUND, Colour, category_colour
+from ldls.palette import BACKGROUND, Colour, as_tuples, category_colour, label_colours
 from ldls.segmentation import Segmentation
 from ldls.viewing.recording.stream import Entity, rerun
 
@@ -29,7 +28,7 @@ CLEAR = (0, 0, 0, 0)
 
 
 class Names:
-    """Instances that a recording has named below an entity: one for each category, label and shade."""
+    """Instances that a recording has named below an entity: one for each category, label or track, and shade."""
 
     def __init__(self) -> None:
         """No names yet."""
@@ -41,10 +40,10 @@ class Names:
         """Name the categories and instances of a result.
 
         Raises:
-            LimitError: A category or a label is beyond Rerun's ids, or there are more instances than ids.
+            LimitError: A category, a label or a track is beyond Rerun's ids, or there are more instances than ids.
         """
-        for instance in result.instances:
-            for kind, number in (("category", instance.category), ("label", instance.label)):
+        for instance, own in zip(result.instances, result.instance_ids[1:].tolist(), strict=True):
+            for kind, number in (("category", instance.category), ("track" if instance.track else "label", own)):
                 if not 0 <= number <= GREATEST_ID:
                     raise LimitError(
                         f"{kind} {number}: recordings hold 0 to {GREATEST_ID}; number the categories anew, or leave "
@@ -52,8 +51,8 @@ class Names:
                     )
         for key, instance in zip(_keys(result), result.instances, strict=True):
             if key not in self._named:
-                taken = {number for number, _ in self._named.values()}
-                number = instance.label if instance.label not in taken else max(taken) + 1
+                taken = {0, *(number for number, _ in self._named.values())}
+                number = max(taken) + 1 if key[1] in taken else key[1]
                 if number > GREATEST_ID:
                     raise LimitError(f"masks: one recording names at most {GREATEST_ID} instances; begin another")
                 self._named[key] = number, instance.name
@@ -61,7 +60,7 @@ class Names:
     def mask_ids(self, result: Segmentation) -> NDArray[np.uint16]:
         """(M + 1,) class id of the masks of each label of a result that was added, 0 for 0.
 
-        It is the label, unless an earlier frame used that number for another object.
+        It is the label or the track, unless that number was used for another object before.
         """
         return np.array([0, *(self._named[key][0] for key in _keys(result))], np.uint16)
 
@@ -82,7 +81,7 @@ class Names:
         instances: dict[int, dict[int, Any]] = {}
         for (category, label, colour), (_, name) in self._named.items():
             names.setdefault(category, name)
-            info = rr.AnnotationInfo(label, f"{name} {label}", colour)
+            info = rr.AnnotationInfo(label, _numbered(name, label), colour)
             instances.setdefault(category, {}).setdefault(label, info)
         for category, own in instances.items():
             info = rr.AnnotationInfo(category, names[category], category_colour(category))
@@ -93,7 +92,7 @@ class Names:
         """The context of mask images: instances as classes; 0 is clear, so that the image shows."""
         rr = rerun()
         named = self._named.items()
-        infos = [rr.AnnotationInfo(n, f"{name} {label}", colour) for (_, label, colour), (n, name) in named]
+        infos = [rr.AnnotationInfo(n, _numbered(name, label), colour) for (_, label, colour), (n, name) in named]
         return rr.AnnotationContext([rr.AnnotationInfo(0, "background", CLEAR), *infos])
 
 
@@ -107,26 +106,26 @@ def log_truth_context(entity: Entity, truth: Labeling) -> NDArray[np.uint8]:
     return np.array(colours, np.uint8)
 
 
-def label_colours(result: Segmentation) -> NDArray[np.uint8]:
-    """(M + 1, 3) colours by label."""
-    return palette.label_colours(instance.category for instance in result.instances)
-
-
 def fields_of_points(result: Segmentation, labels: NDArray[np.int32]) -> dict[str, NDArray[Any]]:
     """Colour, class id and keypoint id of points with `labels` (n,), as the archetypes of points take them.
 
-    Class ids are categories, keypoint ids labels, save that of points out of view.
+    Class ids are categories, keypoint ids labels or tracks, save that of points out of view.
     """
     out_of_view, inside = labels < 0, np.maximum(labels, 0)
-    colours = label_colours(result)[inside]
+    colours = label_colours(result.instances)[inside]
     colours[out_of_view] = OUT_OF_VIEW_COLOUR
     return {
         "colors": colours,
         "class_ids": np.array([0, *(instance.category for instance in result.instances)], np.uint16)[inside],
-        "keypoint_ids": np.where(out_of_view, OUT_OF_VIEW_ID, labels).astype(np.uint16),
+        "keypoint_ids": np.where(out_of_view, OUT_OF_VIEW_ID, result.instance_ids[inside]).astype(np.uint16),
     }
 
 
 def _keys(result: Segmentation) -> list[tuple[int, int, Colour]]:
-    colours = palette.as_tuples(palette.instance_colours(each.category for each in result.instances))
-    return [(each.category, each.label, colour) for each, colour in zip(result.instances, colours, strict=True)]
+    categories = [each.category for each in result.instances]
+    colours = as_tuples(label_colours(result.instances)[1:])
+    return list(zip(categories, result.instance_ids[1:].tolist(), colours, strict=True))
+
+
+def _numbered(name: str, number: int) -> str:
+    return f"{name} {number}" if number else name

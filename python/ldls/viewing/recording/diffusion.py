@@ -11,9 +11,9 @@ import ldls.stages as stages
 from ldls._optional import require
 from ldls.errors import ParameterError
 from ldls.explaining import rebuild
-from ldls.palette import BACKGROUND
+from ldls.palette import BACKGROUND, label_colours
 from ldls.segmentation import Segmentation
-from ldls.viewing.recording.contexts import Names, fields_of_points, label_colours
+from ldls.viewing.recording.contexts import Names, fields_of_points
 from ldls.viewing.recording.entities import log_points
 from ldls.viewing.recording.stream import Entity, rerun
 
@@ -39,7 +39,7 @@ def log_diffusion(root: Entity, names: Names, result: Segmentation, every: int) 
     for iteration, z in _steps(result, every):
         stream.set_time(TIMELINE, sequence=iteration)
         fields = fields_of_points(result, z.argmax(axis=1).astype(np.int32))
-        points.log(rr.Points3D.from_fields(**fields | {"colors": _blended(z, label_colours(result))}))
+        points.log(rr.Points3D.from_fields(**fields | {"colors": _blended(z, label_colours(result.instances))}))
     stream.disable_timeline(TIMELINE)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -13,15 +14,16 @@ from ldls.cloud import Points, finite_rows
 from ldls.datasets import Frame
 from ldls.errors import InputError
 from ldls.labeling import Labeling
-from ldls.palette import category_colour
-from ldls.segmentation import OrientedBox, Segmentation, fit_upright_box
+from ldls.palette import category_colour, label_colours
+from ldls.segmentation import OrientedBox, Segmentation, SegmentedObject, fit_upright_box
 from ldls.stages import project
 from ldls.view import camera_names
 from ldls.viewing.depth import depth_colours, depths_m
 from ldls.viewing.object_tables import markdown
 from ldls.viewing.recording.cameras import log_camera, log_image, log_masks, log_pixels
-from ldls.viewing.recording.contexts import Names, fields_of_points, label_colours, log_truth_context
+from ldls.viewing.recording.contexts import Names, fields_of_points, log_truth_context
 from ldls.viewing.recording.stream import Entity, rerun
+from ldls.viewing.shown import names_of
 
 POINT_PX = 1.5
 BACKGROUND_POINT_PX = 0.5
@@ -118,14 +120,20 @@ def _log_truth(entity: Entity, points: Points, truth: Labeling) -> None:
 
 
 def _log_object_boxes(entity: Entity, result: Segmentation) -> None:
+    names = names_of(result)
     boxed = [(each, each.box) for each in result.objects if each.box is not None]
     _log_boxes(
         entity,
         [box for _, box in boxed],
-        labels=[f"{each.name} {each.label}" for each, _ in boxed],
-        colors=label_colours(result)[np.array([each.label for each, _ in boxed], np.int32)],
+        labels=[names[each.label - 1] + _speed(each) for each, _ in boxed],
+        colors=label_colours(result.instances)[np.array([each.label for each, _ in boxed], np.int32)],
         class_ids=np.array([each.category for each, _ in boxed], np.uint16),
     )
+
+
+def _speed(each: SegmentedObject) -> str:
+    """Speed of an object that moves, to stand after its name."""
+    return f", {hypot(*each.velocity):.1f} m/s" if any(each.velocity) else ""
 
 
 def _log_boxes(entity: Entity, boxes: Sequence[OrientedBox], **fields: Any) -> None:  # noqa: ANN401
