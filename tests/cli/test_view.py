@@ -1,7 +1,9 @@
 """`ldls view`, and --rerun of other commands, from the outside."""
 
+import csv
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -121,6 +123,20 @@ def test_results_of_a_run_are_shown_and_nothing_is_segmented(drive, monkeypatch)
     row = Recorded("a.rrd").each("world/points", "Points3D:class_ids")[1].values
     with np.load(f"results/{name}.npz") as stored:
         np.testing.assert_array_equal(row["Points3D:class_ids"].to_numpy(), stored["categories"])
+
+
+def test_objects_of_a_drive_keep_their_numbers(drive):
+    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track"]
+    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    done = run(drive, "--results", "out/tracks", "--rerun", "a.rrd")
+    assert done.exit_code == 0, done.output
+    with Path("out/tracks.csv").open(newline="") as file:
+        expected = {(row["frame"], f"{row['name']} {row['track']}") for row in csv.DictReader(file)}
+    names = ldls.datasets.open_source(drive).names
+    rows = Recorded("a.rrd").each("world/boxes")
+    shown = [[label.partition(",")[0] for label in row.values["Boxes3D:labels"].to_pylist()] for row in rows]
+    assert {(frame, label) for frame, own in zip(names, shown, strict=True) for label in own} == expected
+    assert len(set.intersection(*map(set, shown))) > 3
 
 
 def test_frames_that_fail_are_named_and_passed_over(tmp_path):

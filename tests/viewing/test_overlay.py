@@ -1,16 +1,17 @@
 """Overlays put colours and names where they belong."""
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import ldls
 from ldls.palette import BACKGROUND, instance_colours
-from ldls.viewing import comparison, masks_overlay, overlay
+from ldls.viewing import birds_eye_view, comparison, masks_overlay, overlay
 from ldls.viewing.drawing import MARK
 from ldls.viewing.overlay import overlays_of
-from ldls.viewing.shown import Shown, images_of
+from ldls.viewing.shown import Shown, images_of, names_of
 from ldls.viewing.tags import place_tags
 
 
@@ -192,3 +193,19 @@ def test_a_tag_gives_way_to_what_is_drawn() -> None:
 
 def test_a_tag_without_room_is_left_out() -> None:
     assert place_tags([(0, 0, 9, 9)], [(80, 16)], np.zeros((20, 40), bool), (40, 20)) == [None]
+
+
+def test_tracked_objects_look_the_same_in_every_sweep(two_sweeps):
+    for picture_of in (overlay, birds_eye_view):
+        one, other = (np.asarray(picture_of(each)) for each in two_sweeps)
+        np.testing.assert_array_equal(one, other)
+    one, other = (sorted(zip(names_of(each), Shown.of(each, "final").colours, strict=True)) for each in two_sweeps)
+    assert one == other and [name for name, _ in one] == ["car 300", "person 31"]
+    tables = [each._repr_html_().rpartition("<table>")[2] for each in two_sweeps]
+    assert tables[0] == tables[1] and "<td>300</td><td>car</td>" in tables[0]
+
+
+def test_what_has_no_points_has_no_number_where_others_are_tracked(two_sweeps):
+    sweep = two_sweeps[0]
+    unseen = replace(sweep, instances=(replace(sweep.instances[0], track=0), sweep.instances[1]))
+    assert names_of(unseen) == ["person", "car 300"]

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,36 @@ def test_names_and_colours_are_those_of_categories_and_instances(tmp_path, resul
     masks = rrd.names(r"world/camera/camera\ 0/image/masks")
     assert {of: info for (of, _), info in masks.items() if of} == {1: ("person 1", person), 2: ("car 2", car)}
     assert all(row.times == {} for row in rrd.each("world", "AnnotationContext:context")), "others are not shown"
+
+
+def test_tracked_objects_keep_number_name_and_colour(tmp_path, two_sweeps):
+    with open_recording(tmp_path / "a.rrd") as made:
+        for number, each in enumerate(two_sweeps):
+            made.add(each, images={"camera 0": IMAGE}, stamp=0.1 * number)
+    rrd = Recorded(tmp_path / "a.rrd")
+    assert rrd.timelines == {"frame", "time"}
+    one, other = rrd.each("world/points")
+    for field in ("positions", "colors", "class_ids", "keypoint_ids"):
+        assert one.values[f"Points3D:{field}"].equals(other.values[f"Points3D:{field}"]), field
+    assert {*numbers(one.values["Points3D:keypoint_ids"]).tolist()} == {0, 31, 300}
+    boxes = [sorted(row.values["Boxes3D:labels"].to_pylist()) for row in rrd.each("world/boxes")]
+    assert boxes == [["car 300, 5.0 m/s", "person 31"]] * 2
+    masks = rrd.each(r"world/camera/camera\ 0/image/masks", "SegmentationImage:buffer")
+    pixels = [row.values["SegmentationImage:buffer"][0].values.to_numpy().view(np.uint16) for row in masks]
+    np.testing.assert_array_equal(*pixels)
+    person, car = (tuple(colour) for colour in instance_colours([1, 3], [31, 300]).tolist())
+    expected = {31: ("person 31", person), 300: ("car 300", car)}
+    names = rrd.names(r"world/camera/camera\ 0/image/masks")
+    assert {of: info for (of, _), info in names.items() if of} == expected
+    assert {of: info for (_, of), info in rrd.names("world").items() if of in expected} == expected
+    tables = [row.values["TextDocument:text"][0].as_py() for row in rrd.each("world/objects")]
+    assert all("| 300 | car |" in table and "| 31 | person |" in table for table in tables)
+
+
+def test_tracks_beyond_ids_are_refused(tmp_path, result):
+    tracked = replace(result, instances=tuple(replace(each, track=65534 + each.label) for each in result.instances))
+    with pytest.raises(ldls.LimitError, match="track 65535: recordings hold 0 to 65534"):
+        recorded(tmp_path / "a.rrd", tracked)
 
 
 def test_numbers_keep_their_meaning_from_frame_to_frame(tmp_path, small_scene):

@@ -50,7 +50,8 @@ def view(
     results: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of an earlier `ldls run --formats npz`: its results are shown, nothing is segmented.",
+            help="Folder of an earlier `ldls run --formats npz`, or tracks in it: its results are shown, nothing is "
+            "segmented.",
             metavar="FOLDER",
             exists=True,
             file_okay=False,

@@ -12,8 +12,9 @@ entity                         content
 world                          view coordinates (right-handed, z up) and the annotation context: categories as
                                classes, instances as their keypoints
 world/points                   all finite points: instance colour, class id = category, keypoint id = label
+                               or, where the result is tracked, track
 world/points/direct            points in view, labelled by direct projection
-world/boxes                    upright box of each object, with its name and label
+world/boxes                    upright box of each object, with its name, number and speed
 world/truth                    points by their true class, where the frame has truth
 world/truth/boxes              upright box of each true instance
 world/camera/NAME              pinhole and pose of each camera
