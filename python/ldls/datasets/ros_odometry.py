@@ -7,7 +7,7 @@ Source: https://docs.ros.org/en/noetic/api/nav_msgs/html/msg/Odometry.html: the 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,7 +57,8 @@ def read_odometry(bag: Bag, world: str) -> Odometry | None:
     if topic is None:
         return None
     with within(topic):
-        return _way(topic, [bag.decode(topic, one) for one in raw])
+        # one at a time: messages are larger than their poses
+        return _way(topic, (bag.decode(topic, one) for one in raw))
 
 
 def _of_topic(topic: str, by_world: Mapping[str, list[bytes]]) -> tuple[str, list[bytes]]:
@@ -84,18 +85,21 @@ def _in_frame(world: str, messages: Mapping[str, Mapping[str, list[bytes]]]) -> 
     return None, []
 
 
-def _way(topic: str, messages: Sequence[Message]) -> Odometry:
-    robots = sorted({plain(message.child_frame_id) for message in messages})
-    if len(robots) != 1 or not robots[0]:
+def _way(topic: str, messages: Iterable[Message]) -> Odometry:
+    robots, stamps, poses = set(), [], []
+    for message in messages:
+        robots.add(plain(message.child_frame_id))
+        stamps.append(nanoseconds(message.header.stamp))
+        poses.append(_pose(message))
+    robot = next(iter(robots))
+    if len(robots) != 1 or not robot:
         raise PoseError(
             f"child_frame_id is {_listed(robots)}, expected the name of one frame that moves with the lidar; choose "
             "another world, or give poses of a file"
         )
-    poses = np.array([_pose(message) for message in messages])
-    stamps_ns = np.array([nanoseconds(message.header.stamp) for message in messages], np.int64)
     # messages may come late, and twice
-    stamps_ns, first = np.unique(stamps_ns, return_index=True)
-    return Odometry(topic, robots[0], Trajectory(stamps_ns / NANOSECONDS, poses[first]))
+    stamps_ns, first = np.unique(np.array(stamps, np.int64), return_index=True)
+    return Odometry(topic, robot, Trajectory(stamps_ns / NANOSECONDS, np.array(poses)[first]))
 
 
 def _pose(message: Message) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
@@ -108,5 +112,5 @@ def _pose(message: Message) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]
     return from_parts(rotation, np.array([t.x, t.y, t.z], np.float64))
 
 
-def _listed(names: Mapping[str, object] | Sequence[str]) -> str:
+def _listed(names: Iterable[str]) -> str:
     return " and ".join(repr(name) for name in sorted(names))
