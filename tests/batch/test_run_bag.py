@@ -33,9 +33,9 @@ class Ahead(Recording):
         return {"x": ahead[:, 0], "y": ahead[:, 1], "z": ahead[:, 2], "intensity": ahead[:, 0] / 12}
 
 
-def recorded(folder, kind, sweeps=4):
+def recorded(folder, kind, sweeps=4, **contents):
     """A bag with masks beside it."""
-    bag = Ahead(kind=kind, sweeps=sweeps).write(folder / KINDS[kind][0])
+    bag = Ahead(kind=kind, sweeps=sweeps, **contents).write(folder / KINDS[kind][0])
     for number in range(sweeps):
         path = folder / f"masks/{START_NS + number * STEP_NS}.json"
         layouts.write_text(path, json.dumps(layouts.coco(20 + number)))
@@ -164,3 +164,27 @@ def test_a_single_frame_has_no_bag():
 
     with pytest.raises(ParameterError, match="bag is of a whole run; label the ROS bag with `ldls run`"):
         check_formats(["npz", "bag"])
+
+
+def test_with_tracks_instances_are_those_of_the_drive(tmp_path):
+    bag, out = recorded(tmp_path, "rosbag2", moving=(("odom", "base"),)), tmp_path / "out"
+    turned = tmp_path / f"masks/{START_NS + STEP_NS}.json"
+    masks = json.loads(turned.read_text())
+    turned.write_text(json.dumps(masks | {"annotations": masks["annotations"][::-1]}))
+    assert command(bag, out, "--option", "world=odom", "--formats", "bag").exit_code == 0
+    before = instance_ids(out / "labelled")
+    track = ("--option", "world=odom", "--formats", "bag", "--track")
+    outcome = command(bag, out, *track)
+    assert outcome.exit_code == 0, outcome.output
+    tracked = [ldls.read_result(path) for path in sorted((out / "tracks").glob("*.npz"))]
+    expected = [each.instance_ids[np.maximum(each.labels, 0)] for each in tracked]
+    for found, wanted in zip(instance_ids(out / "labelled"), expected, strict=True):
+        np.testing.assert_array_equal(found, wanted)
+    assert [np.array_equal(*each) for each in zip(before, expected, strict=True)] == [True, False, True, True]
+    inode = (out / "labelled/metadata.yaml").stat().st_ino
+    assert command(bag, out, *track).exit_code == 0
+    assert (out / "labelled/metadata.yaml").stat().st_ino == inode, "what is whole stays"
+
+
+def instance_ids(path):
+    return [decode(cloud).fields["instance_id"] for _, _, cloud in messages(path, "/points_labelled")]

@@ -100,8 +100,9 @@ def run(
     check_names(names, settings.frame_formats)
     write_objects = None if objects is None else objects_writer(objects)
     folder = Path(out)
-    bag = RunBag(opened, folder) if BAG in settings.formats else None
     tracks = _tracks(settings, folder, names, map_file)
+    with_tracks = None if tracks is None else tracks.folder
+    bag = RunBag(opened, folder, with_tracks) if BAG in settings.formats else None
     settings = with_odometry(opened, settings, folder)
     poses = Poses(opened, settings)
     poses.check(chosen)
@@ -149,10 +150,8 @@ def run(
         write_failures(folder, failures_of(journal.records(opened.names)))
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
-        if bag is not None:
-            stored = [record["frame"] for record in _stored(journal, opened.names, folder)]
-            bag.write(stored, anew=n_finished - n_failed > n_earlier)
-        unplaced = [] if tracks is None else tracks.write(lambda: _stored(journal, opened.names, folder))
+        anew = n_finished - n_failed > n_earlier
+        unplaced = _write_of_all(tracks, bag, lambda: _stored(journal, opened.names, folder), anew=anew)
         if write_objects is not None:
             objects_found = objects_of(journal.records(names))
             write_objects(objects_found if tracks is None else tracks.numbered(objects_found, opened.names))
@@ -180,10 +179,24 @@ def _tracks(
 ) -> RunTracks | None:
     """The tracks of a run, and its map, where they are asked for."""
     if settings.track:
-        return RunTracks(folder, names, settings.formats, None if map_file is None else Path(map_file))
+        formats = (*settings.formats, RESULT) if BAG in settings.formats else settings.formats
+        return RunTracks(folder, names, formats, None if map_file is None else Path(map_file))
     if map_file is not None:
         raise ParameterError(f"map: {map_file} is without what moves, which tracks tell; add --track")
     return None
+
+
+def _write_of_all(
+    tracks: RunTracks | None, bag: RunBag | None, stored: Callable[[], Iterator[Record]], *, anew: bool
+) -> list[str]:
+    """Write the tracks, and the bag, which has them, of all frames that are `stored`; the frames without tracks."""
+    unplaced: list[str] = []
+    if tracks is not None:
+        # a bag of other tracks must not outlive a run that is killed
+        unplaced = tracks.write(stored, (lambda: None) if bag is None else bag.remove)
+    if bag is not None:
+        bag.write([record["frame"] for record in stored()], anew=anew)
+    return unplaced
 
 
 def _stored(journal: Journal, names: Sequence[str], folder: Path) -> Iterator[Record]:

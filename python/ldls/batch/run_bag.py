@@ -30,8 +30,8 @@ class RunBag:
         path: A folder, or a file for ROS 1.
     """
 
-    def __init__(self, source: Source, folder: Path) -> None:
-        """The bag of the frames of `source` in `folder`.
+    def __init__(self, source: Source, folder: Path, tracks: Path | None = None) -> None:
+        """The bag of the frames of `source` in `folder`, of their results with tracks where there are some in `tracks`.
 
         Raises:
             ParameterError: The source is no ROS bag.
@@ -41,7 +41,8 @@ class RunBag:
                 f"formats: bag is a ROS bag with labels, made of one without; {source.path} is of kind {source.kind}; "
                 "leave it out, and write npz, pcd or ply"
             )
-        self._source, self._folder = source, folder
+        self._source, self._folders = source, [folder] if tracks is None else [tracks, folder]
+        self._folder = folder
         self.path = folder / (NAME if source.storage != "rosbag1" else f"{NAME}.bag")
 
     def check_place(self) -> None:
@@ -71,9 +72,7 @@ class RunBag:
         """
         if not anew and self._n_clouds() == len(frames):
             return
-        if self.path.is_dir():
-            shutil.rmtree(self.path)
-        self.path.unlink(missing_ok=True)
+        self.remove()
         if not frames:
             return
         done = set(frames)
@@ -87,8 +86,16 @@ class RunBag:
                 span_ns=(min(received) - MARGIN_NS, max(received) + MARGIN_NS),
             )
             for index, received_ns in zip(chosen, received, strict=True):
-                result = read_result(self._folder / file_name(self._source.names[index], RESULT))
-                bag.write(result, self._source.header(index), received_ns=received_ns)
+                name = file_name(self._source.names[index], RESULT)
+                # frames without a pose have no tracks
+                path = next(folder / name for folder in self._folders if (folder / name).is_file())
+                bag.write(read_result(path), self._source.header(index), received_ns=received_ns)
+
+    def remove(self) -> None:
+        """Remove the bag."""
+        if self.path.is_dir():
+            shutil.rmtree(self.path)
+        self.path.unlink(missing_ok=True)
 
     def _n_clouds(self) -> int | None:
         """Number of labelled clouds in the bag that is there; None without any."""

@@ -49,7 +49,11 @@ COLUMNS = (
 
 
 class RunTracks:
-    """The tracks in the folder of a run."""
+    """The tracks in the folder of a run.
+
+    Attributes:
+        folder: Where the results with tracks are.
+    """
 
     def __init__(
         self, folder: Path, names: Iterable[str], formats: Iterable[str] = (), map_file: Path | None = None
@@ -67,16 +71,17 @@ class RunTracks:
         if map_file is not None:
             map_writer(map_file)
             check_folder(map_file)
-        self._folder, self._place, self._map = folder, folder / FOLDER, map_file
+        self._folder, self.folder, self._map = folder, folder / FOLDER, map_file
         self._formats = {"label", *formats}
 
-    def write(self, records: Callable[[], Iterable[Record]]) -> list[str]:
+    def write(self, records: Callable[[], Iterable[Record]], before: Callable[[], None] = lambda: None) -> list[str]:
         """Number the objects of all frames that are done, if that was not done; the frames left out, without a pose.
 
         One window at a time is in memory.
 
         Args:
             records: Gives the journal's records of the frames that have a stored result, in the order of the source.
+            before: Called before tracks become others than they were.
 
         Raises:
             LimitError: There are more objects than a file has numbers for, or the map has too many voxels.
@@ -84,22 +89,25 @@ class RunTracks:
             UnsafePathError: The folder of the tracks is a link.
             OSError: A file cannot be written, as on a full disk; give the same command again.
         """
-        refuse_link(self._place)
+        refuse_link(self.folder)
         unplaced = [record["frame"] for record in records() if not _is_placed(record)]
-        made_of, before = _digest(records()), self._before()
-        files: dict[str, list[int | str]] = before["files"]
+        made_of, noted = _digest(records()), self._before()
+        files: dict[str, list[int | str]] = noted["files"]
         frames = [record["frame"] for record in records() if _is_placed(record)]
         # those of earlier runs stay
         formats = [
             word for word in FORMATS if word in self._formats or any(_place(frame, word) in files for frame in frames)
         ]
         expected = {TABLE, *(_place(frame, word) for frame in frames for word in formats)}
-        current = before["made_of"] == made_of and expected == files.keys()
-        if current and self._map is None and all(is_written(self._folder / name, files[name]) for name in files):
+        current = noted["made_of"] == made_of and expected == files.keys()
+        current = current and all(is_written(self._folder / name, files[name]) for name in files)
+        if current and self._map is None:
             return unplaced
+        if not current:
+            before()
         places = LabelledMap()
-        self._place.mkdir(exist_ok=True)
-        sweep(self._place)
+        self.folder.mkdir(exist_ok=True)
+        sweep(self.folder)
         now: dict[str, list[int | str]] = {}
         with whole_file(self._folder / TABLE) as file:
             text = io.TextIOWrapper(file, encoding="utf-8", newline="")
@@ -118,7 +126,7 @@ class RunTracks:
         now[TABLE] = written(self._folder / TABLE)
         for name in files.keys() - now.keys():
             (self._folder / name).unlink(missing_ok=True)
-        with whole_file(self._place / STATE) as file:
+        with whole_file(self.folder / STATE) as file:
             file.write(json.dumps({"files": now, "made_of": made_of}, indent=0).encode())
         if self._map is not None:
             save(places, self._map)
@@ -164,7 +172,7 @@ class RunTracks:
     def _before(self) -> dict[str, Any]:
         """What an earlier run noted of its tracks."""
         try:
-            with open_file(self._place / STATE, "note of tracks", limit=LARGE_BYTES) as file:
+            with open_file(self.folder / STATE, "note of tracks", limit=LARGE_BYTES) as file:
                 match json.loads(file.text()):
                     case {"files": dict() as files, "made_of": str() as made_of}:
                         return {"files": {name: files[name] for name in files if _is_ours(name)}, "made_of": made_of}
