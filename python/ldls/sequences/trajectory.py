@@ -7,14 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import from_parts, from_quaternion, rigid, to_quaternion
+from ldls.camera.rigid import from_parts, from_quaternion, inverse, rigid, to_quaternion
 from ldls.checks import checked, numbers
-from ldls.errors import PoseError
+from ldls.cloud import Points, as_points
+from ldls.errors import PoseError, ShapeError
 
 LONGEST_GAP_S = 1.0
 """Between poses farther apart in time, nothing is interpolated."""
 FASTEST_M_S = 100.0
 """Poses that need more than this speed jump."""
+TURN_S = 0.1
+"""Time in which a lidar turns once; so much farther out than `at`, and a period at least, a motion goes on."""
+LONGEST_S = 1.0
+"""Farther from the stamp of its sweep no point is measured and no image taken: the unit or the clock is another."""
 
 
 @checked
@@ -75,33 +80,171 @@ class Trajectory:
         Raises:
             PoseError: It lies farther out, or between two poses that are more than `LONGEST_GAP_S` apart.
         """
+        return self._at(stamp, self.margin_s)
+
+    @checked
+    def motion(self, start: float, end: float) -> NDArray[np.float64]:
+        """(4, 4) from coordinates of the lidar at one moment to its coordinates at another.
+
+        Of the moments one may lie farther out than `at` answers, by a period, and by 0.1 s where periods are shorter.
+
+        Args:
+            start: The one moment, in seconds, of the clock of `stamps`.
+            end: The other, at most a second away.
+
+        Raises:
+            PoseError: They are farther from each other, lie farther out, or in a gap of the poses.
+        """
+        if not abs(start - end) <= LONGEST_S:
+            raise PoseError(
+                f"start: {start - end:+.6g} s from the other moment, expected at most {LONGEST_S:g} s; give seconds of "
+                "the same clock"
+            )
+        return inverse(self._at(end, self._reach_s)) @ self._at(start, self._reach_s)
+
+    @checked
+    def deskew(self, points: Points, times: NDArray[np.float64], stamp: float) -> Points:
+        """Return the points of a sweep as if all had been measured at one moment, from where the lidar then was.
+
+        Each is moved by `motion`, to whose reach at the ends of the drive the same goes. Missing returns (0, 0, 0) and
+        points that are not finite stay what they are, whatever their time.
+
+        Args:
+            points: (N, >= 3) x y z first, in metres, each in the lidar frame at its own time.
+            times: (N,) when each was measured, in seconds after `stamp`; negative before it.
+            stamp: The moment, in seconds, of the clock of `stamps`.
+
+        Returns:
+            A new array of the same type; columns beyond the third are those of `points`.
+
+        Raises:
+            ShapeError: There is not one time a point.
+            DtypeError: Points are no real numbers, or times no numbers.
+            PoseError: A time is not finite or over a second, or poses do not say how the lidar moved then.
+        """
+        points = as_points(points)
+        times = numbers("times", times, np.float64, ("N",))
+        if len(times) != len(points):
+            raise ShapeError(f"times: there are {len(times)} for {len(points)} points, expected one a point")
+        moved = points.copy()
+        xyz = points[:, :3]
+        rows = np.flatnonzero(np.isfinite(xyz).all(axis=1) & (xyz != 0).any(axis=1))
+        own = times[rows]
+        _check_times(own)
+        if not own.any():
+            return moved
+        here = inverse(self._at(stamp, self._reach_s))
+        lowest, highest = stamp + float(own.min()), stamp + float(own.max())
+        for end in (lowest, highest):
+            self._check_reach(end, self._reach_s)
+        if len(self) > 1:
+            with np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
+                moved[rows, :3] = self._moved(xyz[rows].astype(np.float64), own, stamp, here)
+        return moved
+
+    def _moved(
+        self, xyz: NDArray[np.float64], times: NDArray[np.float64], stamp: float, here: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(n, 3) points of times after `stamp`, by `here` from the world to where the lidar was at the stamp."""
+        # after the stamp, for sums since 1970 have few digits left
+        stamps = self.stamps - stamp
+        starts = np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(self) - 2)
+        moved = np.empty_like(xyz)
+        for start in np.unique(starts).tolist():
+            some = starts == start
+            self._check_gap(start, stamp + float(times[some][0]))
+            shares = (times[some] - stamps[start]) / (stamps[start + 1] - stamps[start])
+            moved[some] = _Step.of(here @ self.poses[start], here @ self.poses[start + 1]).moved(xyz[some], shares)
+        return moved
+
+    @property
+    def _reach_s(self) -> float:
+        """Time beyond either end up to which motion goes on."""
+        return self.margin_s + max(2 * self.margin_s, TURN_S if len(self) > 1 else 0.0)
+
+    def _at(self, stamp: float, reach_s: float) -> NDArray[np.float64]:
+        """The pose at a moment up to `reach_s` beyond either end."""
         after = int(np.searchsorted(self.stamps, stamp))
         if after < len(self) and self.stamps[after] == stamp:
             return np.array(self.poses[after])
-        first, last, margin_s = float(self.stamps[0]), float(self.stamps[-1]), self.margin_s
-        if not first - margin_s <= stamp <= last + margin_s:
+        self._check_reach(stamp, reach_s)
+        start = self._before(stamp)
+        self._check_gap(start, stamp)
+        begin, end = float(self.stamps[start]), float(self.stamps[start + 1])
+        return _Step.of(self.poses[start], self.poses[start + 1]).at((stamp - begin) / (end - begin))
+
+    def _before(self, stamp: float) -> int:
+        """Number of the pose from which motion to the next one tells of this moment."""
+        return min(max(int(np.searchsorted(self.stamps, stamp)) - 1, 0), len(self) - 2)
+
+    def _check_reach(self, stamp: float, reach_s: float) -> None:
+        first, last = float(self.stamps[0]), float(self.stamps[-1])
+        if not first - reach_s <= stamp <= last + reach_s:
             raise PoseError(
                 f"stamp: no pose at {stamp:.6f} s, poses are from {first:.6f} to {last:.6f} s; take poses of the whole "
                 "drive and of the same clock, or leave this moment out"
             )
-        start = min(max(after - 1, 0), len(self) - 2)
+
+    def _check_gap(self, start: int, stamp: float) -> None:
         begin, end = float(self.stamps[start]), float(self.stamps[start + 1])
         if end - begin > LONGEST_GAP_S:
             raise PoseError(
                 f"stamp: no pose at {stamp:.6f} s, for poses have a gap of {end - begin:.3f} s from {begin:.6f} to "
                 f"{end:.6f} s, expected at most {LONGEST_GAP_S} s; add poses there, or leave this moment out"
             )
-        return _between(self.poses[start], self.poses[start + 1], (stamp - begin) / (end - begin))
 
 
-def _between(one: NDArray[np.float64], other: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """The pose at this share of the way from one to the other."""
-    w, *vector = to_quaternion(one[:3, :3].T @ other[:3, :3]).tolist()
-    sine = float(np.linalg.norm(vector))
-    half_turn = share * np.arctan2(sine, w)
-    axis = np.array(vector) / sine if sine > 0 else np.zeros(3)
-    turn = from_quaternion("turn", np.array([np.cos(half_turn), *(np.sin(half_turn) * axis)]))
-    return from_parts(one[:3, :3] @ turn, one[:3, 3] + share * (other[:3, 3] - one[:3, 3]))
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """The motion from one pose to the next.
+
+    Attributes:
+        pose: (4, 4) the one.
+        shift: (3,) from its place to that of the next.
+        axis: (3,) of the turn, in coordinates of the one; zeros for none.
+        half_turn: Half of its angle, in radians.
+    """
+
+    pose: NDArray[np.float64]
+    shift: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    half_turn: float
+
+    @classmethod
+    def of(cls, one: NDArray[np.float64], other: NDArray[np.float64]) -> _Step:
+        """The shortest turn, and the shift."""
+        w, *vector = to_quaternion(one[:3, :3].T @ other[:3, :3]).tolist()
+        sine = float(np.linalg.norm(vector))
+        axis = np.array(vector) / sine if sine > 0 else np.zeros(3)
+        return cls(one, other[:3, 3] - one[:3, 3], axis, float(np.arctan2(sine, w)))
+
+    def at(self, share: float) -> NDArray[np.float64]:
+        """The pose at this share of the way."""
+        half_turn = share * self.half_turn
+        turn = from_quaternion("turn", np.array([np.cos(half_turn), *(np.sin(half_turn) * self.axis)]))
+        return from_parts(self.pose[:3, :3] @ turn, self.pose[:3, 3] + share * self.shift)
+
+    def moved(self, xyz: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) points, each by the pose at its own share of the way: `at` for many, by Rodrigues' formula."""
+        angles = 2 * self.half_turn * shares[:, None]
+        x, y, z = self.axis
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        turn = self.pose[:3, :3]
+        moved: NDArray[np.float64] = xyz @ turn.T + (self.pose[:3, 3] + shares[:, None] * self.shift)
+        moved += np.sin(angles) * (xyz @ (turn @ cross).T)
+        moved += (1 - np.cos(angles)) * (xyz @ (turn @ cross @ cross).T)
+        return moved
+
+
+def _check_times(times: NDArray[np.float64]) -> None:
+    """Of points that are there."""
+    near = np.abs(times) <= LONGEST_S
+    if not near.all():
+        at = int(np.argmin(near))
+        raise PoseError(
+            f"times: a point has {times[at]:.6g} s, expected at most {LONGEST_S:g} s from the stamp of its sweep; give "
+            "seconds after that stamp"
+        )
 
 
 def _check_stamps(stamps: NDArray[np.float64]) -> None:
