@@ -110,7 +110,7 @@ class Frames(list):
 
 def frames(stamps):
     return Frames(
-        SimpleNamespace(name=str(k), stamp=stamp, points=street(k) - np.array([0.3 * k, 0, 0]))
+        SimpleNamespace(name=str(k), stamp=stamp, times=None, points=street(k) - np.array([0.3 * k, 0, 0]))
         for k, stamp in enumerate(stamps)
     )
 

@@ -196,6 +196,7 @@ class FrameWork:
             seen = {path: look(path) for path in self._source.files(work.index)}
             work.frame = self._source[work.index]
             work.stamp, work.pose = self._poses.stamps[work.index], self._poses.of(work.index, work.frame)
+            work.frame = self._poses.deskewed(work.frame)
             unread = set() if self._reads_images else {image.path for image in work.frame.images}
             for path, known in seen.items():
                 work.inputs[str(path.absolute())] = self._known_files.state(path, known, read=path not in unread)

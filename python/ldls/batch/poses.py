@@ -87,6 +87,17 @@ class Poses:
             raise PoseError(f"the frame has no {what}, without which it cannot be joined with others; leave it out")
         return pose
 
+    def deskewed(self, frame: Frame) -> Frame:
+        """The frame as it was at its stamp, by the file of poses or by its source; see `Frame.deskewed`.
+
+        Raises:
+            PoseError: The poses do not say how the lidar moved during the sweep.
+        """
+        if self._trajectory is None:
+            return frame.deskewed()
+        with within(str(self._settings.poses)):
+            return frame.deskewed(self._trajectory)
+
     def check(self, chosen: Frames) -> None:
         """Refuse, before any work, frames without poses where they are needed, or in another order than their stamps.
 

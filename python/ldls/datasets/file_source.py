@@ -87,8 +87,19 @@ class FileSource:
         images = tuple(self._image(camera, index) for camera in self.camera_names)
         truth = self._read_truth(name, points, images[0].camera) if self._truth else None
         return Frame(
-            name=name, points=points, stamp=self.stamps[index], pose=self._pose(index), images=images, truth=truth
+            name=name,
+            points=points,
+            times=self._times(index, points),
+            stamp=self.stamps[index],
+            pose=self._pose(index),
+            trajectory=self._trajectory,
+            images=images,
+            truth=truth,
         )
+
+    def _times(self, index: int, points: Points) -> NDArray[np.float64] | None:
+        """When each point of a frame was measured, in seconds after its stamp; None where nobody knows."""
+        return None
 
     def _pose(self, index: int) -> NDArray[np.float64] | None:
         """T_world_lidar of a frame, where its stamp and the way of the lidar are known.
@@ -183,10 +194,17 @@ def choose(path: Path, what: str, there: Sequence[str], wanted: str | None) -> s
 
 
 def image_from_file(
-    name: str, path: Path, camera: Camera, *, stamp: float | None = None, masks: InstanceMasks | None = None
+    name: str,
+    path: Path,
+    camera: Camera,
+    *,
+    stamp: float | None = None,
+    masks: InstanceMasks | None = None,
+    moved: bool = False,
 ) -> CameraImage:
     """An image of a frame whose pixels are those of a file."""
-    return CameraImage(name=name, camera=camera, read=partial(read_image, path), stamp=stamp, path=path, masks=masks)
+    read = partial(read_image, path)
+    return CameraImage(name=name, camera=camera, read=read, stamp=stamp, path=path, masks=masks, moved=moved)
 
 
 def check_truth(truth: Labeling, points: Points, path: Path) -> Labeling:

@@ -1,7 +1,8 @@
 """A drive of KITTI's raw data, synchronised and rectified.
 
 DATE/calib_cam_to_cam.txt, DATE/calib_velo_to_cam.txt and DATE/DATE_drive_NNNN_sync/{velodyne_points,image_02}/ with
-data/NNNNNNNNNN.{bin,png} and timestamps.txt. For poses, oxts/ beside them and DATE/calib_imu_to_velo.txt. For truth,
+data/NNNNNNNNNN.{bin,png} and timestamps.txt. For the times of points, velodyne_points/timestamps_start.txt and
+timestamps_end.txt. For poses, oxts/ beside them and DATE/calib_imu_to_velo.txt. For truth,
 annotations/NNNNNNNNNN.txt in the drive: a class a point.
 """
 
@@ -12,7 +13,9 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ldls.cloud import Points
 from ldls.datasets.file_source import (
     FileSource,
     check_folders,
@@ -24,20 +27,28 @@ from ldls.datasets.file_source import (
 )
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
-from ldls.errors import SourceError
+from ldls.errors import CorruptFileError, SourceError
 from ldls.io import read_camera, read_poses
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
 from ldls.io.poses.kitti_raw import CALIBRATION, STAMPS
 from ldls.sequences import Trajectory
 
 LIDAR, OXTS = "velodyne_points", "oxts"
+START, END = "timestamps_start.txt", "timestamps_end.txt"
+"""Times at which the lidar looks back and a sweep begins and ends; at that of `STAMPS` it looks ahead."""
+LONGEST_TURN_S = 1.0
 
 
 class KittiRawSource(FileSource):
     """The frames of a drive.
 
-    A frame has a sweep and an image of every camera; KITTI's drives lack some. Sweeps are KITTI's, undone of the
-    car's motion to the moment at which the lidar looks ahead, when the cameras fire.
+    A frame has a sweep and an image of every camera; KITTI's drives lack some. Sweeps have the motion of the car in
+    them: each point is measured when the lidar looks at it, and its stamp is the moment at which it looks ahead and
+    fires the cameras, whatever the stamps of their images. The times of the points follow from their azimuth, where the drive has the times at which sweeps
+    begin and end. Seen from above the lidar turns clockwise, from the left over ahead to the right. (The readme of
+    KITTI's development kit has it the other way round, its data do not: what comes nearer behind the car is nearer on
+    the right of where a sweep ends than on the left, where it begins.) Each laser looks some degrees to the side, so
+    times are wrong by a millisecond or two, and straight behind the car, some degrees to both sides, by a turn.
 
     Attributes:
         kind: "kitti-raw".
@@ -85,6 +96,7 @@ class KittiRawSource(FileSource):
         self._trajectory = _trajectory(path)
         self._measured = _measured(path) if self._trajectory is not None else ()
         self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}
+        self._turns = _turns(path / LIDAR, self.names)
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
@@ -93,21 +105,43 @@ class KittiRawSource(FileSource):
 
     def _image(self, camera: str, index: int) -> CameraImage:
         path = self._parts[camera][self.names[index]]
-        return image_from_file(camera, path, self._cameras[camera], stamp=self._image_stamps[camera][index])
+        stamp = self._image_stamps[camera][index]
+        # the lidar fires the cameras at its stamp; theirs is when images had come to the computer
+        return image_from_file(camera, path, self._cameras[camera], stamp=stamp, moved=True)
 
     def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from; of the poses those beside its stamp, and what all of them share."""
-        own, clock = super().files(index), self.path / LIDAR / STAMPS
-        if clock.exists():
-            own += (clock,)
-        stamp = self.stamps[index]
-        if self._trajectory is None or stamp is None:
+        """The files that a frame is read from; of the poses those around its times, and what all of them share."""
+        clocks = [self.path / LIDAR / name for name in (STAMPS, START, END)]
+        own = (*super().files(index), *(clock for clock in clocks if clock.exists()))
+        moments = self._moments(index)
+        if self._trajectory is None or not moments:
             return own
-        after = int(np.searchsorted(self._trajectory.stamps, stamp))
-        beside = self._measured[max(min(after, len(self._measured) - 1) - 1, 0) :][:2]
+        last = len(self._measured) - 1
+        before, after = np.searchsorted(self._trajectory.stamps, [min(moments), max(moments)]).tolist()
+        # two at least, for beyond the ends the motion there goes on
+        beside = self._measured[max(min(before, last) - 1, 0) : max(after, 1) + 1]
         shared = (self.path.parent / CALIBRATION, self.path / OXTS / STAMPS)
         # the world begins at the first
         return (*own, *shared, *dict.fromkeys((self._measured[0], *beside)))
+
+    def _moments(self, index: int) -> list[float]:
+        """The stamp of a frame, and when its sweep begins and ends."""
+        stamp = self.stamps[index]
+        return [] if stamp is None else [stamp, *(self._turns[index] or ())]
+
+    def _times(self, index: int, points: Points) -> NDArray[np.float64] | None:
+        stamp, turn = self.stamps[index], self._turns[index]
+        if stamp is None or turn is None:
+            return None
+        start, end = turn
+        if not (start <= stamp <= end <= start + LONGEST_TURN_S):
+            raise CorruptFileError(
+                f"{self.path / LIDAR}: frame {self.names[index]} begins {start - stamp:+.6f} s and ends "
+                f"{end - stamp:+.6f} s from its stamp, expected one before and one after, at most {LONGEST_TURN_S:g} s "
+                f"apart; mend {START} and {END}, or remove them if points are all of their stamps"
+            )
+        left = np.arctan2(points[:, 1], points[:, 0]).astype(np.float64) / np.pi
+        return np.where(left > 0, (start - stamp) * left, (stamp - end) * left)
 
     def _truth_files(self, name: str) -> Iterable[tuple[Path, str]]:
         return [(self.path / "annotations" / f"{name}.txt", "annotations")]
@@ -137,6 +171,13 @@ def _measured(path: Path) -> tuple[Path, ...]:
     files = find_files(path / OXTS / "data", (".txt",))
     stamps = _stamps(path / OXTS, tuple(files))
     return tuple(file for file, stamp in zip(files.values(), stamps, strict=True) if stamp is not None)
+
+
+def _turns(folder: Path, names: Sequence[str]) -> tuple[tuple[float, float] | None, ...]:
+    """When each sweep begins and ends; None where that is not known."""
+    starts, ends = (read_stamps(folder / name, names, clock_seconds, example=CLOCK_EXAMPLE) for name in (START, END))
+    pairs = zip(starts, ends, strict=True)
+    return tuple(None if start is None or end is None else (start, end) for start, end in pairs)
 
 
 def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:

@@ -143,7 +143,7 @@ class NuScenesSource:
             image_size=taken.size,
             distortion=sensor.distortion,
         )
-        return image_from_file(channel, self._file(taken.filename), camera, stamp=taken.stamp_us / 1e6)
+        return image_from_file(channel, self._file(taken.filename), camera, stamp=taken.stamp_us / 1e6, moved=True)
 
     def _read_truth(self, sweep: str, points: Points) -> Labeling | None:
         for name, read in TRUTHS.items():

@@ -115,7 +115,7 @@ class NuScenesFrameSource:
             T_camera_lidar=each["lidar_to_camera"],
             image_size=read_image_size(path),
         )
-        return image_from_file(name, path, camera, stamp=float(each["timestamp"]))
+        return image_from_file(name, path, camera, stamp=float(each["timestamp"]), moved=True)
 
     def _path(self, name: str) -> Path:
         return below(self.path, name, place=str(self._file))

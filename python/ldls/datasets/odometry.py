@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ldls.checks import checked
 from ldls.cloud import Points
 from ldls.datasets.frame import Source
@@ -19,6 +22,7 @@ def odometry_of(source: Source) -> Trajectory:
     """Return the poses of the lidar at the frames of a drive, from its sweeps alone, by `ldls.odometry`.
 
     `poses[k]` is that of frame k. Its stamp is the frame's; where frames have none, frame k is taken at k x 0.1 s.
+    Where frames have the times of their points, `ldls.odometry` takes the motion out of its sweeps.
     Frames are read one after the other, and none is kept.
 
     Args:
@@ -35,7 +39,7 @@ def odometry_of(source: Source) -> Trajectory:
         return odometry(_sweeps(source))
 
 
-def _sweeps(source: Source) -> Iterator[tuple[float, Points]]:
+def _sweeps(source: Source) -> Iterator[tuple[float, Points] | tuple[float, Points, NDArray[np.float64]]]:
     stamped = None
     for number, frame in enumerate(source):
         if stamped is None:
@@ -45,4 +49,5 @@ def _sweeps(source: Source) -> Iterator[tuple[float, Points]]:
             raise SourceError(
                 f"frame {frame.name} has {lacks}, unlike those before it; expected stamps of all frames or of none"
             )
-        yield number * PERIOD_S if frame.stamp is None else frame.stamp, frame.points
+        stamp = number * PERIOD_S if frame.stamp is None else frame.stamp
+        yield (stamp, frame.points) if frame.times is None else (stamp, frame.points, frame.times)

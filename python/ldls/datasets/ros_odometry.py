@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ldls.camera.rigid import from_parts, from_quaternion
-from ldls.datasets.ros_transforms import plain
+from ldls.datasets.ros_transforms import Matrix, plain
 from ldls.errors import CalibrationError, PoseError, within
 from ldls.io.ros.bags import Bag
 from ldls.io.ros.messages import NANOSECONDS, ODOMETRY, Message, nanoseconds, read_header, seconds
@@ -33,6 +33,12 @@ class Odometry:
     topic: str
     robot: str
     way: Trajectory
+
+    def way_of(self, T_robot_lidar: Matrix, start: float, end: float) -> Trajectory:
+        """The way of the lidar from one moment, in seconds, to another, and the poses beside."""
+        first = max(int(np.searchsorted(self.way.stamps, start, side="right")) - 2, 0)
+        last = int(np.searchsorted(self.way.stamps, end)) + 2
+        return Trajectory(self.way.stamps[first:last], self.way.poses[first:last] @ T_robot_lidar)
 
 
 def odometry_topics(bag: Bag) -> list[str]:

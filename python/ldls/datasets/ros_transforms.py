@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -47,6 +48,14 @@ class _Edge:
         """
         with within(self.name):
             return self.transforms[0] if self._motion is None else self._motion.at(stamp_ns / NANOSECONDS)
+
+    def stamps_between(self, from_ns: int, to_ns: int) -> set[int]:
+        """Times of transforms between two moments, and the one before and after; none of those that never change."""
+        if self._motion is None:
+            return set()
+        stamps_ns = np.unique(np.array(self.stamps_ns, np.int64))
+        first, last = np.searchsorted(stamps_ns, [from_ns, to_ns + 1]).tolist()
+        return set(stamps_ns[max(first - 1, 0) : last + 1].tolist())
 
     @cached_property
     def _motion(self) -> Trajectory | None:
@@ -109,6 +118,23 @@ class TransformTree:
             )
         up_source, up_world = (self._to_root(frame, lambda edge: edge.between(stamp_ns)) for frame in (source, world))
         return inverse(up_world) @ up_source
+
+    def way(self, world: str, source: str, from_ns: int, to_ns: int) -> Trajectory | None:
+        """The poses of the frame `source` in `world` between two moments, and the ones beside; None if it stays.
+
+        They are of the times of all transforms on the way. Only what `pose` can tell is in it.
+
+        Raises:
+            PoseError: The poses jump.
+        """
+        edges = [self._edges[name] for frame in (plain(source), plain(world)) for name in self._ancestors(frame)[:-1]]
+        moments = [edge.stamps_between(from_ns, to_ns) for edge in edges]
+        stamps, poses = [], []
+        for stamp_ns in sorted(set().union(*moments)):
+            with suppress(PoseError):
+                poses.append(self.pose(world, source, stamp_ns))
+                stamps.append(stamp_ns / NANOSECONDS)
+        return Trajectory(np.array(stamps), np.array(poses)) if poses else None
 
     def connects(self, one: str, other: str) -> bool:
         """True for connected frames; moving transforms are read where static ones do not connect them."""

@@ -35,7 +35,11 @@ from ldls.io.ros.messages import (
     seconds,
 )
 from ldls.io.ros.point_cloud2 import READ_FIELDS, PointCloud, decode as decode_points
+from ldls.sequences import Trajectory
+from ldls.sequences.trajectory import LONGEST_S
 
+TIME = "time"
+"""What `fields` calls the field of times."""
 STATIC_TRANSFORMS, MOVING_TRANSFORMS = "/tf_static", "/tf"
 UNPICKLED = ("_bag", "_tree", "_odometry")
 """Attributes that another process makes itself."""
@@ -50,7 +54,9 @@ class RosBag:
 
     Coordinates are those of the cloud's frame, cameras those of the image's, which is optical in ROS (x right, y down,
     z forward). Transforms between the two come from /tf_static, or where that does not connect them from /tf at the
-    time nearest to the image; a robot's motion between sweep and image is not made up for.
+    time nearest to the image. Points have the times of the field `time`, `t`, `offset_time`, `time_offset` or
+    `timestamp` of their cloud. How the robot moves during a sweep, and between it and the images, is left in;
+    `Frame.deskewed` takes it out.
 
     Attributes:
         kind: "rosbag".
@@ -90,10 +96,11 @@ class RosBag:
             max_offset_s: Longest time between the stamps of sweep and image, in seconds.
             T_camera_lidar: (4, 4) from lidar to camera coordinates, or a file of it, as `ldls.read_camera` takes them,
                 instead of the bag's transforms; a mapping from image topic to either for several cameras.
-            fields: The clouds' own names of x, y, z and intensity, where they differ.
-            world: Frame in which frames have their pose, as "odom" or "map": by /tf, or where that does not connect it
-                with the cloud's frame by messages of nav_msgs/Odometry; a topic of these, as "/odometry", has them come
-                from it. Without a world there are none, and neither is read for them.
+            fields: The clouds' own names of x, y, z, intensity and time, where they differ; with "" for the time points
+                have none.
+            world: Frame in which frames have their pose and trajectory, as "odom" or "map": by /tf, or where that does
+                not connect it with the cloud's frame by messages of nav_msgs/Odometry; a topic of these, as
+                "/odometry", has them come from it. Without a world there are none, and neither is read for them.
             recover: If true, a truncated bag yields its whole messages and a warning instead of an error.
 
         Raises:
@@ -106,9 +113,9 @@ class RosBag:
         """
         if not max_offset_s >= 0:
             raise ParameterError(f"max_offset_s: got {max_offset_s!r}, expected 0 or more seconds")
-        unknown = sorted(set(fields or {}) - set(READ_FIELDS))
+        unknown = sorted(set(fields or {}) - {*READ_FIELDS, TIME})
         if unknown:
-            raise ParameterError(f"fields: got {', '.join(unknown)}, expected {', '.join(READ_FIELDS)}")
+            raise ParameterError(f"fields: got {', '.join(unknown)}, expected {', '.join((*READ_FIELDS, TIME))}")
         self.path, self.max_offset_s = Path(path), max_offset_s
         self.recover, self.world = recover, world
         self._fields = dict(fields or {})
@@ -218,26 +225,54 @@ class RosBag:
             raise IndexError(f"frame {index}: there are {len(self)}")
         sweep, cloud = self._sweeps[index], self.cloud(index)
         with within(self._place(sweep)):
-            points, pose = cloud.points(self._fields), self._pose(sweep.header)
-        images = tuple(self._image(image, sweep.header) for image in self._images[index] if image)
-        stamp = sweep.header.stamp_ns / NANOSECONDS
-        return Frame(name=self.names[index], points=points, stamp=stamp, pose=pose, images=images)
+            points, times = cloud.points(self._fields), cloud.times(self._fields.get(TIME))
+            pose, trajectory = self._pose(sweep.header), self._trajectory(index, times)
+        return Frame(
+            name=self.names[index],
+            points=points,
+            times=times,
+            stamp=sweep.header.stamp_ns / NANOSECONDS,
+            pose=pose,
+            trajectory=trajectory,
+            images=tuple(self._image(image, sweep.header) for image in self._images[index] if image),
+        )
 
     def _pose(self, sweep: Header) -> NDArray[np.float64] | None:
         if self.world is None:
             return None
-        by_topic = self.world in odometry_topics(self._bag)
-        odometry = self._odometry if by_topic or not self._tree.connects(self.world, sweep.frame_id) else None
+        odometry = self._odometry_for(sweep)
         if odometry is None:
             return self._tree.pose(self.world, sweep.frame_id, sweep.stamp_ns)
+        with within(odometry.topic):
+            return odometry.way.at(sweep.stamp_ns / NANOSECONDS) @ self._on_robot(odometry, sweep)
+
+    def _trajectory(self, index: int, times: NDArray[np.float64] | None) -> Trajectory | None:
+        """The way of the lidar during a sweep and its images."""
+        if self.world is None:
+            return None
+        sweep = self._sweeps[index].header
+        own = np.zeros(1) if times is None else times[np.abs(times) <= LONGEST_S]
+        around = [0, *(image.header.stamp_ns - sweep.stamp_ns for image in self._images[index] if image)]
+        around += [int(end * NANOSECONDS) for end in (own.min(initial=0), own.max(initial=0))]
+        from_ns, to_ns = sweep.stamp_ns + min(around), sweep.stamp_ns + max(around)
+        odometry = self._odometry_for(sweep)
+        if odometry is None:
+            return self._tree.way(self.world, sweep.frame_id, from_ns, to_ns)
+        return odometry.way_of(self._on_robot(odometry, sweep), from_ns / NANOSECONDS, to_ns / NANOSECONDS)
+
+    def _odometry_for(self, sweep: Header) -> Odometry | None:
+        """Odometry where it tells the poses of a sweep; None where transforms do."""
+        by_topic = self.world in odometry_topics(self._bag)
+        return self._odometry if by_topic or not self._tree.connects(str(self.world), sweep.frame_id) else None
+
+    def _on_robot(self, odometry: Odometry, sweep: Header) -> NDArray[np.float64]:
+        """(4, 4) T_robot_lidar."""
         if not self._tree.connects(odometry.robot, sweep.frame_id):
             raise PoseError(
                 f"{odometry.topic} has poses of {odometry.robot!r}, which no transforms connect with the lidar's frame "
                 f"{sweep.frame_id!r}; choose another world, or give poses of a file"
             )
-        T_robot_lidar = self._tree.pose(odometry.robot, sweep.frame_id, sweep.stamp_ns)
-        with within(odometry.topic):
-            return odometry.way.at(sweep.stamp_ns / NANOSECONDS) @ T_robot_lidar
+        return self._tree.pose(odometry.robot, sweep.frame_id, sweep.stamp_ns)
 
     def _image(self, image: StampedMessage, sweep: Header) -> CameraImage:
         info = nearest(self._infos[image.topic], image.header.stamp_ns)

@@ -20,8 +20,10 @@ from ldls.cloud import Points, as_points, finite_rows
 from ldls.errors import InputError, PoseError, within
 from ldls.sequences.grid import cell_keys
 from ldls.sequences.ground_level import levelled, split_standing
-from ldls.sequences.trajectory import Trajectory
+from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory
 
+PERIOD_S = 0.1
+"""Time between sweeps, as long as it is not known."""
 FARTHEST_M = 100.0
 """Points farther away are too sparse to be found again."""
 VOXEL_M = 0.5
@@ -34,27 +36,31 @@ LEAST_SHARE = 0.1
 
 
 @checked
-def odometry(sweeps: Iterable[tuple[float, Points]]) -> Trajectory:
+def odometry(sweeps: Iterable[tuple[float, Points] | tuple[float, Points, NDArray[np.float64]]]) -> Trajectory:
     """Return the poses of the lidar at sweeps of a drive, found by laying each on those before it.
 
-    The first pose is the identity, so that the world is the lidar's frame at the first sweep. Points are taken as they
-    are, all of the moment of their sweep: the library's own undoing of motion is off, for points have no times. The
-    same sweeps give the same poses, on one thread. Errors add up along the way.
+    The first pose is the identity, so that the world is the lidar's frame at the first sweep. Points with times are
+    first moved to the stamp of their sweep, by the motion between the two sweeps before it; those of the first two, for
+    which there is none, and points without times are all taken to be of the moment of their stamp. The same sweeps give
+    the same poses, on one thread. Errors add up along the way.
 
     Args:
         sweeps: Stamp in seconds, ascending, and points (N, >= 3) in metres, z up, of each sweep; two or more, and
-            neighbours some tenths of a second apart. They are taken one after the other.
+            neighbours some tenths of a second apart. Third may stand (N,) when each point was measured, in seconds
+            after the stamp. They are taken one after the other.
 
     Raises:
-        PoseError: Stamps do not ascend, or a sweep has nothing in common with the one before it.
+        PoseError: Stamps do not ascend, a sweep has nothing in common with the one before it, or a time is over a
+            second.
+        ShapeError: There is not one time a point.
         InputError: There are fewer than two sweeps, or one has too few finite points that stand on the ground.
         ImportError: `ldls[odometry]` is not installed.
     """
     way = _Way()
     for number, sweep in enumerate(sweeps):
-        stamp, points = _pair(number, sweep)
+        stamp, points, times = _parts(number, sweep)
         with within(f"sweep {number}"):
-            way.go_on(stamp, as_points(points))
+            way.go_on(stamp, as_points(points), times)
     if len(way.stamps) < 2:
         raise InputError(f"sweeps: got {len(way.stamps)}, expected 2 or more")
     return Trajectory(np.array(way.stamps), np.array(way.poses))
@@ -70,10 +76,12 @@ class _Way:
         self._low = np.zeros((0, 3))
         self._places = np.zeros(0, np.int64)
 
-    def go_on(self, stamp: float, points: Points) -> None:
+    def go_on(self, stamp: float, points: Points, times: NDArray[np.float64] | None) -> None:
         """Take the way to the next sweep."""
         if self.stamps and not stamp > self.stamps[-1]:
             raise PoseError(f"its stamp {stamp:.6f} s is not after that before it, {self.stamps[-1]:.6f} s; sort them")
+        if times is not None:
+            points = self._motion(stamp).deskew(points, times, stamp)
         xyz = points[finite_rows(points), :3].astype(np.float64)
         ranges_m = np.linalg.norm(xyz, axis=1)
         standing, low = split_standing(xyz[(ranges_m > 0) & (ranges_m < FARTHEST_M)])
@@ -93,6 +101,13 @@ class _Way:
         self.stamps.append(stamp)
         self.poses.append(pose)
         self._low = low
+
+    def _motion(self, stamp: float) -> Trajectory:
+        """The way around `stamp`, as it was between the last two sweeps; none where there are no such."""
+        step, period_s = np.eye(4), PERIOD_S
+        if len(self.poses) > 1 and self.stamps[-1] - self.stamps[-2] <= LONGEST_GAP_S:
+            step, period_s = inverse(self.poses[-2]) @ self.poses[-1], self.stamps[-1] - self.stamps[-2]
+        return Trajectory(np.array([stamp - period_s, stamp]), np.array([inverse(step), np.eye(4)]))
 
     def _check_common(self, stamp: float, standing: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
         places = np.unique(cell_keys(standing @ pose[:3, :3].T + pose[:3, 3], PLACE_M))
@@ -119,13 +134,15 @@ def _registration() -> Any:  # noqa: ANN401
     return require("kiss_icp.kiss_icp", "odometry").KissICP(config)
 
 
-def _pair(number: int, sweep: object) -> tuple[float, Points]:
-    if not (isinstance(sweep, tuple | list) and len(sweep) == 2):
-        raise InputError(f"sweeps: sweep {number} is {shown(sweep)}, expected a pair (stamp, points)")
+def _parts(number: int, sweep: object) -> tuple[float, Points, NDArray[np.float64] | None]:
+    if not (isinstance(sweep, tuple | list) and len(sweep) in (2, 3)):
+        raise InputError(
+            f"sweeps: sweep {number} is {shown(sweep)}, expected (stamp, points) or (stamp, points, times)"
+        )
     try:
         stamp = float(sweep[0])
     except (TypeError, ValueError, OverflowError):
         stamp = float("nan")
     if isinstance(sweep[0], str | bool) or not np.isfinite(stamp):
         raise InputError(f"sweeps: stamp of sweep {number} is {shown(sweep[0])}, expected seconds")
-    return stamp, sweep[1]
+    return stamp, sweep[1], sweep[2] if len(sweep) == 3 else None

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import from_parts, from_quaternion, inverse, rigid, to_quaternion
+from ldls.camera.rigid import inverse, rigid
 from ldls.checks import checked, numbers
 from ldls.cloud import Points, as_points
 from ldls.errors import PoseError, ShapeError
+from ldls.sequences.step import Step
 
 LONGEST_GAP_S = 1.0
 """Between poses farther apart in time, nothing is interpolated."""
@@ -18,6 +19,8 @@ FASTEST_M_S = 100.0
 """Poses that need more than this speed jump."""
 TURN_S = 0.1
 """Time in which a lidar turns once; so much farther out than `at`, and a period at least, a motion goes on."""
+BLOCK = 16384
+"""Points that are moved at once: so many and what is made of them stay in the cache."""
 LONGEST_S = 1.0
 """Farther from the stamp of its sweep no point is measured and no image taken: the unit or the clock is another."""
 
@@ -126,41 +129,45 @@ class Trajectory:
         times = numbers("times", times, np.float64, ("N",))
         if len(times) != len(points):
             raise ShapeError(f"times: there are {len(times)} for {len(points)} points, expected one a point")
-        moved = points.copy()
-        xyz = points[:, :3]
-        rows = np.flatnonzero(np.isfinite(xyz).all(axis=1) & (xyz != 0).any(axis=1))
+        rows = _there(points)
+        rows = rows[times[rows] != 0]
         own = times[rows]
         _check_times(own)
-        if not own.any():
+        moved = points.copy()
+        if not len(rows):
             return moved
-        here = inverse(self._at(stamp, self._reach_s))
-        lowest, highest = stamp + float(own.min()), stamp + float(own.max())
-        for end in (lowest, highest):
-            self._check_reach(end, self._reach_s)
-        if len(self) > 1:
-            with np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
-                moved[rows, :3] = self._moved(xyz[rows].astype(np.float64), own, stamp, here)
+        for end in (own.min(), own.max()):
+            self._check_reach(stamp + float(end), self._reach_s)
+        if len(self) == 1:  # and times too short to be any after its stamp
+            return moved
+        steps = self._steps(own, stamp)
+        for first in range(0, len(rows), BLOCK):
+            some, after = rows[first : first + BLOCK], own[first : first + BLOCK]
+            starts = self._starts(after, stamp)
+            for start, step in steps.items():
+                part = np.flatnonzero(starts == start)
+                shares = (after[part] - (self.stamps[start] - stamp)) / (self.stamps[start + 1] - self.stamps[start])
+                with np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
+                    moved[some[part], :3] = step.moved(points[some[part], :3].astype(np.float64), shares)
         return moved
 
-    def _moved(
-        self, xyz: NDArray[np.float64], times: NDArray[np.float64], stamp: float, here: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """(n, 3) points of times after `stamp`, by `here` from the world to where the lidar was at the stamp."""
+    def _steps(self, times: NDArray[np.float64], stamp: float) -> dict[int, Step]:
+        """The steps in which there are times after `stamp`, as seen from where the lidar was then."""
+        here = inverse(self._at(stamp, self._reach_s))
+        starts = np.flatnonzero(np.bincount(self._starts(times, stamp))).tolist()
+        for start in starts:
+            self._check_gap(start, stamp)
+        return {start: Step.between(here @ self.poses[start], here @ self.poses[start + 1]) for start in starts}
+
+    def _starts(self, times: NDArray[np.float64], stamp: float) -> NDArray[np.intp]:
+        """Number of the pose with which the step of each time after `stamp` starts."""
         # after the stamp, for sums since 1970 have few digits left
-        stamps = self.stamps - stamp
-        starts = np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(self) - 2)
-        moved = np.empty_like(xyz)
-        for start in np.unique(starts).tolist():
-            some = starts == start
-            self._check_gap(start, stamp + float(times[some][0]))
-            shares = (times[some] - stamps[start]) / (stamps[start + 1] - stamps[start])
-            moved[some] = _Step.of(here @ self.poses[start], here @ self.poses[start + 1]).moved(xyz[some], shares)
-        return moved
+        return np.clip(np.searchsorted(self.stamps - stamp, times, side="right") - 1, 0, len(self) - 2)
 
     @property
     def _reach_s(self) -> float:
         """Time beyond either end up to which motion goes on."""
-        return self.margin_s + max(2 * self.margin_s, TURN_S if len(self) > 1 else 0.0)
+        return self.margin_s + max(2 * self.margin_s, TURN_S) if len(self) > 1 else 0.0
 
     def _at(self, stamp: float, reach_s: float) -> NDArray[np.float64]:
         """The pose at a moment up to `reach_s` beyond either end."""
@@ -168,14 +175,10 @@ class Trajectory:
         if after < len(self) and self.stamps[after] == stamp:
             return np.array(self.poses[after])
         self._check_reach(stamp, reach_s)
-        start = self._before(stamp)
+        start = min(max(after - 1, 0), len(self) - 2)
         self._check_gap(start, stamp)
         begin, end = float(self.stamps[start]), float(self.stamps[start + 1])
-        return _Step.of(self.poses[start], self.poses[start + 1]).at((stamp - begin) / (end - begin))
-
-    def _before(self, stamp: float) -> int:
-        """Number of the pose from which motion to the next one tells of this moment."""
-        return min(max(int(np.searchsorted(self.stamps, stamp)) - 1, 0), len(self) - 2)
+        return Step.between(self.poses[start], self.poses[start + 1]).at((stamp - begin) / (end - begin))
 
     def _check_reach(self, stamp: float, reach_s: float) -> None:
         first, last = float(self.stamps[0]), float(self.stamps[-1])
@@ -194,46 +197,10 @@ class Trajectory:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """The motion from one pose to the next.
-
-    Attributes:
-        pose: (4, 4) the one.
-        shift: (3,) from its place to that of the next.
-        axis: (3,) of the turn, in coordinates of the one; zeros for none.
-        half_turn: Half of its angle, in radians.
-    """
-
-    pose: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    axis: NDArray[np.float64]
-    half_turn: float
-
-    @classmethod
-    def of(cls, one: NDArray[np.float64], other: NDArray[np.float64]) -> _Step:
-        """The shortest turn, and the shift."""
-        w, *vector = to_quaternion(one[:3, :3].T @ other[:3, :3]).tolist()
-        sine = float(np.linalg.norm(vector))
-        axis = np.array(vector) / sine if sine > 0 else np.zeros(3)
-        return cls(one, other[:3, 3] - one[:3, 3], axis, float(np.arctan2(sine, w)))
-
-    def at(self, share: float) -> NDArray[np.float64]:
-        """The pose at this share of the way."""
-        half_turn = share * self.half_turn
-        turn = from_quaternion("turn", np.array([np.cos(half_turn), *(np.sin(half_turn) * self.axis)]))
-        return from_parts(self.pose[:3, :3] @ turn, self.pose[:3, 3] + share * self.shift)
-
-    def moved(self, xyz: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, 3) points, each by the pose at its own share of the way: `at` for many, by Rodrigues' formula."""
-        angles = 2 * self.half_turn * shares[:, None]
-        x, y, z = self.axis
-        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        turn = self.pose[:3, :3]
-        moved: NDArray[np.float64] = xyz @ turn.T + (self.pose[:3, 3] + shares[:, None] * self.shift)
-        moved += np.sin(angles) * (xyz @ (turn @ cross).T)
-        moved += (1 - np.cos(angles)) * (xyz @ (turn @ cross @ cross).T)
-        return moved
+def _there(points: Points) -> NDArray[np.int64]:
+    """Rows of points that are finite and no missing returns, ascending."""
+    x, y, z = points[:, :3].T
+    return np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z) & ((x != 0) | (y != 0) | (z != 0)))
 
 
 def _check_times(times: NDArray[np.float64]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, FileFormatError, InputError, UnsupportedFormatError
-from ldls.io.ros.messages import POINTS, Header, Message, Types, make, make_header, nanoseconds
+from ldls.io.ros.messages import NANOSECONDS, POINTS, Header, Message, Types, make, make_header, nanoseconds
 
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """sensor_msgs/PointField: the number of each type."""
@@ -19,6 +19,12 @@ POSITION = ("x", "y", "z")
 MAX_POINT_BYTES = 1 << 16
 READ_FIELDS = (*POSITION, "intensity")
 """Columns of `PointCloud.points`, in this order."""
+RELATIVE_TIMES = ("time", "t", "offset_time", "time_offset")
+"""Fields with the times of points after the header's stamp: seconds if they are real numbers, else nanoseconds."""
+ABSOLUTE_TIMES = "timestamp"
+"""Field with times by the clock of the header's stamp: seconds since 1970, or nanoseconds, as double precision."""
+LEAST_NANOSECONDS = 1e14
+"""As seconds, this lies three million years ahead; as nanoseconds, it was a day after 1970 began."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +58,36 @@ class PointCloud:
             for column, name in enumerate(chosen):
                 points[:, column] = self.fields[name]
         return points
+
+    def times(self, name: str | None = None) -> NDArray[np.float64] | None:
+        """(N,) when each point was measured, in seconds after the header's stamp, as far as the message says.
+
+        Fields known by their names are `time` (Velodyne: seconds), `t` (Ouster: nanoseconds), `offset_time` and
+        `time_offset` (Livox and others: nanoseconds), all after the header's stamp, and `timestamp` of double precision
+        (Hesai, Robosense: seconds; Livox: nanoseconds), by the same clock as that. None where there is no such field.
+        The values are not looked at.
+
+        Args:
+            name: The message's own name of the field of times after the stamp, or of `timestamp`s, if of float64
+                and so called.
+        """
+        names = (*RELATIVE_TIMES, ABSOLUTE_TIMES) if name is None else (name,)
+        found = next((one for one in names if self._is_number(one) and self._tells_time(one)), None)
+        if found is None:
+            return None
+        values = self.fields[found].astype(np.float64)
+        stamp_ns = self.header.stamp_ns
+        if found != ABSOLUTE_TIMES:
+            return values if self.fields.dtype[found].kind == "f" else values / NANOSECONDS
+        with np.errstate(invalid="ignore", over="ignore"):
+            if np.nanmax(np.abs(values), initial=0) >= LEAST_NANOSECONDS:
+                return (values - stamp_ns) / NANOSECONDS
+            return values - stamp_ns / NANOSECONDS
+
+    def _tells_time(self, name: str) -> bool:
+        """False for numbers too small for times."""
+        kind = self.fields.dtype[name]
+        return bool(kind == np.float64 if name == ABSOLUTE_TIMES else kind.itemsize >= 4)
 
     def _is_number(self, name: str) -> bool:
         return name in (self.fields.dtype.names or ()) and self.fields.dtype[name].shape == ()
