@@ -84,6 +84,29 @@ def test_poses_lie_between_the_times_there_are():
         tree.pose("map", "lidar", 0)
 
 
+def test_the_way_during_a_sweep_has_the_poses_around_it():
+    moving = [edge("odom", "base", (4 * second, 0, 0), QUARTER, seconds=second) for second in (3, 1, 2, 2, 5, 4)]
+    tree = TransformTree([edge("base", "lidar", (1, 0, 0))], lambda: moving)
+    assert tree.pose("odom", "lidar", 2_000_000_000)[0, 3] == pytest.approx(8)
+    way = tree.way("odom", "/lidar", 2_100_000_000, 2_900_000_000)
+    assert way.stamps.tolist() == [2, 3]
+    np.testing.assert_allclose(way.at(2.25) @ [0, 0, 0, 1], [9, 1, 0, 1], atol=1e-9)
+    assert tree.way("odom", "lidar", 2_000_000_000, 3_000_000_000).stamps.tolist() == [1, 2, 3, 4]
+    assert tree.way("odom", "lidar", -(10**9), 900_000_000).stamps.tolist() == [1]
+    assert tree.way("base", "lidar", 0, 10**10) is None, "what is fixed does not move"
+
+
+def test_on_its_way_two_transforms_may_move_each_at_its_own_times():
+    head = [edge("base", "head", (0, 0, second / 2), seconds=second) for second in (2, 3)]
+    moving = [edge("odom", "base", (second, 0, 0), seconds=second) for second in (1, 2, 3, 4)]
+    tree = TransformTree([], lambda: [*head, *moving])
+    np.testing.assert_allclose(tree.pose("odom", "head", 2_500_000_000)[:3, 3], [2.5, 0, 1.25], atol=1e-9)
+    way = tree.way("odom", "head", 2_000_000_000, 3_400_000_000)
+    # what nothing is known of the head at is not on the way
+    assert way.stamps.tolist() == [2, 3]
+    np.testing.assert_allclose(way.at(2.5)[:3, 3], [2.5, 0, 1.25], atol=1e-9)
+
+
 def test_frames_that_nothing_connects_are_listed():
     tree = TransformTree([edge("base", "lidar"), edge("base", "arm"), edge("arm", "hand"), edge("map", "camera")])
     with pytest.raises(CalibrationError, match="map <- camera; base <- arm <- hand; base <- lidar"):

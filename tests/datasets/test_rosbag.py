@@ -2,6 +2,7 @@
 
 import pickle
 import shutil
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from ldls.errors import (
     FileFormatError,
     InputError,
     ParameterError,
+    PoseError,
     RecoveredFileWarning,
     TruncatedFileError,
     UnsupportedFormatError,
@@ -308,3 +310,49 @@ def test_damage_in_the_middle_is_found_when_it_is_read(tmp_path, kind, compressi
     storage(path).write_bytes(content)
     with pytest.raises(FileFormatError, match="packed"):
         list(RosBag(path))
+
+
+@dataclass(kw_only=True)
+class Timed(Recording):
+    """A robot that rises by 10 m/s while its lidar turns, whose points have times, those of missing returns none."""
+
+    columns: tuple = ("x", "y", "z", "intensity", "time")
+    moving: tuple = (("odom", "base"),)
+    edges: tuple = (("base", "lidar"), ("base", "camera"))
+    sweeps: int = 5
+
+    def cloud(self, number):
+        values = super().cloud(number)
+        values["time"] = np.linspace(0, 0.1, 50, dtype=np.float32)
+        values["time"][7] = np.nan
+        return values
+
+
+@pytest.mark.parametrize("number", [0, 2, 4])
+def test_a_robot_that_moves_is_moved_back(tmp_path, number):
+    path = Timed().write(tmp_path / "small.bag")
+    assert RosBag(path)[number].trajectory is None
+    source = pickle.loads(pickle.dumps(RosBag(path, world="odom")))
+    frame = source[number]
+    assert frame.times.dtype == np.float64 and len(frame.times) == len(frame.points)
+    deskewed = frame.deskewed()
+    expected = frame.points.astype(float)
+    expected[:, 2] += 10 * np.nan_to_num(frame.times)
+    np.testing.assert_allclose(deskewed.points, expected, atol=1e-5)
+    # the image is 10 ms later, and so the camera 0.1 m higher; its y axis points down
+    camera = LIDAR_TO_OPTICAL.copy()
+    camera[1, 3] += 0.1
+    np.testing.assert_allclose(deskewed.images[0].camera.T_camera_lidar, camera, atol=1e-6)
+    np.testing.assert_allclose(frame.images[0].camera.T_camera_lidar, LIDAR_TO_OPTICAL, atol=1e-9)
+
+
+def test_times_that_make_no_sense_are_an_error_where_they_are_needed_and_can_be_left_out(tmp_path):
+    path = Recording(columns=("x", "y", "z", "time"), moving=(("odom", "base"),)).write(tmp_path / "small.bag")
+    frame = RosBag(path, world="odom")[1]
+    with pytest.raises(PoseError, match=r"times: a point has [1-9].* s, expected at most 1 s from the stamp"):
+        frame.deskewed()
+    without = RosBag(path, world="odom", fields={"time": ""})[1]
+    assert without.times is None
+    assert np.array_equal(without.deskewed().points, frame.points, equal_nan=True)
+    with pytest.raises(ParameterError, match="fields: got ring, expected x, y, z, intensity, time"):
+        RosBag(path, fields={"ring": "r"})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from ldls import PoseError, ShapeError, Trajectory
+from ldls import DtypeError, PoseError, ShapeError, Trajectory
 from ldls.camera.rigid import to_quaternion
 from ldls.sequences.trajectory import LONGEST_GAP_S
 
@@ -135,3 +135,136 @@ def test_quaternions_of_rotations_are_those_of_scipy(seed):
     rotation = Rotation.random(random_state=seed)
     x, y, z, w = rotation.as_quat(canonical=True)
     np.testing.assert_allclose(to_quaternion(rotation.as_matrix()), [w, x, y, z], atol=1e-12)
+
+
+def by_pose(trajectory, points, times, stamp):
+    """Each point by the poses at its own time and at the stamp, one after the other, in double precision."""
+    back = np.linalg.inv(trajectory.at(stamp))
+    return np.array(
+        [
+            (back @ trajectory.at(stamp + t) @ [*xyz, 1])[:3]
+            for xyz, t in zip(points[:, :3].astype(float), times, strict=True)
+        ]
+    )
+
+
+@pytest.mark.parametrize("period_s", [0.1, 0.013, 0.3])
+@pytest.mark.parametrize("seed", range(3))
+def test_points_are_moved_as_by_the_poses_at_their_times(seed, period_s, monkeypatch):
+    monkeypatch.setattr("ldls.sequences.trajectory.BLOCK", 70)
+    _, poses = drive(40, seed=seed)
+    # from zero, where a float holds moments to a femtosecond
+    trajectory = Trajectory(period_s * np.arange(40), slow(poses))
+    generator = np.random.default_rng(seed)
+    points, times = generator.normal(scale=20, size=(300, 5)), generator.uniform(-0.1, 0.1, 300)
+    times[:3] = 0
+    stamp = 20.4 * period_s
+    moved = trajectory.deskew(points, times, stamp)
+    np.testing.assert_allclose(moved[:, :3], by_pose(trajectory, points, times, stamp), atol=1e-9)
+    assert np.array_equal(moved[:, 3:], points[:, 3:]) and np.array_equal(moved[:3], points[:3])
+    assert np.abs(moved - points).max() > 1
+    single = trajectory.deskew(points.astype(np.float32), times, stamp)
+    assert single.dtype == np.float32
+    np.testing.assert_allclose(single, moved, atol=2e-5)
+
+
+def slow(poses):
+    """The same turns, a hundredth of the way."""
+    way = poses.copy()
+    way[:, :3, 3] *= 0.01
+    return way
+
+
+def scanned(trajectory, stamp, times):
+    """The wall x = 10 of the world, as a lidar that moves and turns sees it."""
+    side = np.linspace(-8, 8, len(times))
+    points = np.empty((len(times), 3))
+    for row, (y, t) in enumerate(zip(side, times, strict=True)):
+        points[row] = (np.linalg.inv(trajectory.at(stamp + t)) @ [10, y, np.sin(5 * y), 1])[:3]
+    return points
+
+
+def out_of_plane(points):
+    """Largest distance of points from their best plane."""
+    centred = points - points.mean(axis=0)
+    return np.abs(centred @ np.linalg.svd(centred)[2][2]).max()
+
+
+def test_a_wall_seen_from_a_lidar_that_moves_and_turns_is_flat_again():
+    trajectory = Trajectory(START_S + 0.1 * np.arange(6), [moved(1.2 * k, 3 * k) for k in range(6)])
+    stamp, times = START_S + 0.2, np.linspace(-0.05, 0.05, 500)
+    seen = scanned(trajectory, stamp, times)
+    assert out_of_plane(seen) > 0.1
+    again = trajectory.deskew(seen, times, stamp)
+    assert out_of_plane(again) < 1e-3
+    world = again @ trajectory.at(stamp)[:3, :3].T + trajectory.at(stamp)[:3, 3]
+    np.testing.assert_allclose(world[:, 0], 10, atol=1e-3)
+
+
+def test_what_is_not_there_stays_what_it_is_whatever_its_time_and_nothing_that_was_given_changes():
+    trajectory = Trajectory([0, 0.1], [moved(0), moved(1)])
+    points = np.ones((6, 4), np.float32)
+    points[1, :3], points[2, 1], points[3, 2] = 0, np.nan, np.inf
+    times = np.array([0.05, np.nan, -1.7e9, 0.05, 0, -0.05])
+    before = points.copy()
+    moved_points = trajectory.deskew(points, times, 0.05)
+    assert np.array_equal(points, before, equal_nan=True)
+    assert np.array_equal(moved_points[1:5], before[1:5], equal_nan=True)
+    np.testing.assert_allclose(moved_points[[0, 5], 0], [1.5, 0.5], atol=1e-6)
+    same = trajectory.deskew(points[:1], [0], 50.0)
+    assert np.array_equal(same, points[:1]) and not np.shares_memory(same, points)
+    assert trajectory.deskew(points[:0], [], 0).shape == (0, 4)
+
+
+@pytest.mark.parametrize(("period_s", "reach_s"), [(0.1, 0.15), (0.01, 0.105), (0.4, 0.6)])
+def test_motion_goes_on_for_a_turn_farther_than_poses_are_told(period_s, reach_s):
+    trajectory = Trajectory(10 + period_s * np.arange(3), [moved(k, 2 * k) for k in np.arange(3) * period_s])
+    last = float(trajectory.stamps[-1])
+    for stamp, t in ((last, reach_s - 1e-6), (10.0, -reach_s + 1e-6)):
+        start, end = moved(stamp - 10, 2 * (stamp - 10)), moved(stamp - 10 + t, 2 * (stamp - 10 + t))
+        expected = (np.linalg.inv(start) @ end @ [1, 2, 3, 1])[:3]
+        np.testing.assert_allclose(trajectory.deskew(np.array([[1.0, 2, 3]]), [t], stamp)[0], expected, atol=1e-9)
+        np.testing.assert_allclose(trajectory.motion(stamp + t, stamp) @ [1, 2, 3, 1], [*expected, 1], atol=1e-9)
+    for stamp, t in ((last, reach_s + 1e-6), (10.0, -reach_s - 1e-6)):
+        with pytest.raises(PoseError, match=rf"no pose at {stamp + t:.6f} s, poses are from 10"):
+            trajectory.deskew(np.ones((1, 3)), [t], stamp)
+        with pytest.raises(PoseError, match="no pose at"):
+            trajectory.motion(stamp + t, stamp)
+
+
+def test_points_of_the_stamp_need_no_motion_and_others_none_of_a_gap():
+    points = np.ones((2, 3))
+    apart = Trajectory([0, 0.1, 5, 5.1], [moved(x) for x in range(4)])
+    np.testing.assert_allclose(apart.deskew(points, [0, -0.05], 0.1)[:, 0], [1, 0.5])
+    np.testing.assert_allclose(apart.deskew(points, [0, 0.05], 5)[:, 0], [1, 1.5])
+    with pytest.raises(PoseError, match=r"a gap of 4\.900 s from 0\.100000 to 5\.000000 s"):
+        apart.deskew(points, [0, 0.05], 0.1)
+    alone = Trajectory([1e9], [moved(3)])
+    assert np.array_equal(alone.deskew(points, [0, 1e-12], 1e9), points)
+    with pytest.raises(PoseError, match="no pose at"):
+        alone.deskew(points, [0, 0.05], 1e9)
+
+
+@pytest.mark.parametrize(
+    ("points", "times", "stamp", "error", "message"),
+    [
+        pytest.param(np.ones((2, 3)), [0.1], 0, ShapeError, "times: there are 1 for 2 points", id="fewer"),
+        pytest.param(np.ones((2, 3)), [[0], [0]], 0, ShapeError, "times: expected shape (N,)", id="a column"),
+        pytest.param(np.ones((2, 3)), ["a", "b"], 0, DtypeError, "times: expected numbers", id="text"),
+        pytest.param(np.ones((2, 3), int), [0, 0], 0, DtypeError, "points: expected float32", id="whole points"),
+        pytest.param(np.ones((2, 3)), [0, np.nan], 0, PoseError, "times: a point has nan s", id="NaN"),
+        pytest.param(np.ones((2, 3)), [0, 5e7], 0, PoseError,
+                     "times: a point has 5e+07 s, expected at most 1 s from the stamp", id="nanoseconds"),
+        pytest.param(np.ones((2, 3)), [0, START_S], START_S, PoseError, "give seconds after that stamp", id="absolute"),
+        pytest.param(np.ones((2, 3)), [0, 0.01], 7, PoseError, "stamp: no pose at 7.010000 s", id="another drive"),
+        pytest.param(np.ones((2, 3)), [0, 0.01], np.nan, PoseError, "no pose at nan", id="no stamp"),
+    ],
+)  # fmt: skip
+def test_times_that_cannot_be_are_refused(points, times, stamp, error, message):
+    with pytest.raises(error, match=re.escape(message)):
+        Trajectory([0, 0.1], [moved(0), moved(1)]).deskew(points, times, stamp)
+
+
+def test_moments_a_second_apart_are_of_two_clocks():
+    with pytest.raises(PoseError, match=r"start: \+1\.5 s from the other moment, expected at most 1 s"):
+        Trajectory([0, 1, 2], [moved(0), moved(1), moved(2)]).motion(1.75, 0.25)

@@ -43,12 +43,14 @@ class KittiRawSource(FileSource):
     """The frames of a drive.
 
     A frame has a sweep and an image of every camera; KITTI's drives lack some. Sweeps have the motion of the car in
-    them: each point is measured when the lidar looks at it, and its stamp is the moment at which it looks ahead and
-    fires the cameras, whatever the stamps of their images. The times of the points follow from their azimuth, where the drive has the times at which sweeps
-    begin and end. Seen from above the lidar turns clockwise, from the left over ahead to the right. (The readme of
-    KITTI's development kit has it the other way round, its data do not: what comes nearer behind the car is nearer on
-    the right of where a sweep ends than on the left, where it begins.) Each laser looks some degrees to the side, so
-    times are wrong by a millisecond or two, and straight behind the car, some degrees to both sides, by a turn.
+    them: each point is measured when the lidar looks at it, and the stamp of the sweep is the moment at which it looks
+    ahead and fires the cameras, whatever the stamps of their images. Times of points follow from their azimuth, where
+    the drive has the times at which its sweeps begin and end.
+
+    Seen from above the lidar turns clockwise, from the left over ahead to the right. (The readme of KITTI's development
+    kit has it the other way round. Its data do not: of a car that comes nearer from behind, what is to the right of the
+    place where sweeps begin and end is nearer, and so measured later.) Each laser looks some degrees to the side of the
+    others, so times are wrong by a millisecond or two, and within these degrees of straight behind by a turn.
 
     Attributes:
         kind: "kitti-raw".

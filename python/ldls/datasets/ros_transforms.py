@@ -53,9 +53,12 @@ class _Edge:
         """Times of transforms between two moments, and the one before and after; none of those that never change."""
         if self._motion is None:
             return set()
-        stamps_ns = np.unique(np.array(self.stamps_ns, np.int64))
-        first, last = np.searchsorted(stamps_ns, [from_ns, to_ns + 1]).tolist()
-        return set(stamps_ns[max(first - 1, 0) : last + 1].tolist())
+        first, last = np.searchsorted(self._sorted_ns, [from_ns, to_ns + 1]).tolist()
+        return set(self._sorted_ns[max(first - 1, 0) : last + 1].tolist())
+
+    @cached_property
+    def _sorted_ns(self) -> NDArray[np.int64]:
+        return np.unique(np.array(self.stamps_ns, np.int64))
 
     @cached_property
     def _motion(self) -> Trajectory | None:
@@ -127,8 +130,9 @@ class TransformTree:
         Raises:
             PoseError: The poses jump.
         """
-        edges = [self._edges[name] for frame in (plain(source), plain(world)) for name in self._ancestors(frame)[:-1]]
-        moments = [edge.stamps_between(from_ns, to_ns) for edge in edges]
+        # those above both of them cancel out
+        names = set(self._ancestors(plain(source))) ^ set(self._ancestors(plain(world)))
+        moments = [self._edges[name].stamps_between(from_ns, to_ns) for name in names if name in self._edges]
         stamps, poses = [], []
         for stamp_ns in sorted(set().union(*moments)):
             with suppress(PoseError):

@@ -56,6 +56,46 @@ def cloud_of(count, columns=XYZ, seed=0):
     return cloud
 
 
+@pytest.mark.parametrize(
+    ("field", "kind", "values", "name", "expected"),
+    [
+        pytest.param("time", "f4", [-0.05, 0.05], None, [-0.05, 0.05], id="Velodyne"),
+        pytest.param("t", "u4", [0, 99_000_000], None, [0, 0.099], id="Ouster"),
+        pytest.param("offset_time", "u4", [0, 99_000_000], None, [0, 0.099], id="Livox"),
+        pytest.param("time_offset", "i4", [-5_000, 0], None, [-5e-6, 0], id="nanoseconds before the stamp"),
+        pytest.param("timestamp", "f8", [5.0, 5.1], None, [-7e-9, 0.1 - 7e-9], id="Hesai, Robosense"),
+        pytest.param("timestamp", "f4", [5.0, 5.1], None, None, id="single precision holds no time since 1970"),
+        pytest.param("time", "u2", [0, 9], None, None, id="too small for times"),
+        pytest.param("stamp", "f4", [0, 9], None, None, id="an unknown name"),
+        pytest.param("stamp", "f4", [0, 0.1], "stamp", [0, 0.1], id="a name that is given"),
+        pytest.param("time", "f4", [0, 0.1], "", None, id="no field that is given"),
+        pytest.param("time", "f4", [0, 0.1], "t", None, id="another name that is given"),
+    ],
+)
+def test_times_of_points_are_seconds_after_the_stamp(field, kind, values, name, expected):
+    cloud = np.zeros(2, [*XYZ, (field, kind)])
+    cloud[field] = values
+    times = decode(message(cloud)).times(name)
+    if expected is None:
+        assert times is None
+    else:
+        assert times.dtype == np.float64
+        np.testing.assert_allclose(times, expected, atol=2e-9)
+
+
+def test_nanoseconds_since_1970_are_told_from_seconds():
+    cloud = np.zeros(2, [*XYZ, ("timestamp", "f8")])
+    # a missing return has none
+    cloud["timestamp"] = [0, 1.7e18 + 50_000_000]
+    since_1970 = message(cloud)
+    since_1970.header.stamp.sec, since_1970.header.stamp.nanosec = 1_700_000_000, 0
+    assert decode(since_1970).times()[1] == pytest.approx(0.05, abs=3e-7)
+    cloud["timestamp"] = [0, 1.7e9 + 0.05]
+    in_seconds = message(cloud)
+    in_seconds.header.stamp.sec, in_seconds.header.stamp.nanosec = 1_700_000_000, 0
+    assert decode(in_seconds).times()[1] == pytest.approx(0.05, abs=3e-7)
+
+
 @settings(max_examples=60)
 @given(
     columns=st.lists(st.sampled_from(sorted(NUMBERS)), max_size=4),
