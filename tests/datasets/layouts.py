@@ -68,6 +68,14 @@ def kitti_raw(folder, n_frames=3):
     return drive
 
 
+def turns(drive, n_frames=3, before_s=0.04, after_s=0.06):
+    """When the sweeps of a drive of `kitti_raw` begin and end."""
+    for name, later_s in (("start", -before_s), ("end", after_s)):
+        lines = [f"2011-09-26 13:02:{25.951199337 + later_s + k:012.9f}\n" for k in range(n_frames)]
+        write_text(drive / f"velodyne_points/timestamps_{name}.txt", "".join(lines))
+    return drive
+
+
 def oxts(drive, way, T_lidar_imu, clock):
     """Poses of the lidar as those of an IMU near Karlsruhe, by a sphere of the earth; returns their folder."""
     for number, pose in enumerate(way @ T_lidar_imu):

@@ -138,6 +138,62 @@ def test_poses_of_a_raw_drive_are_those_at_the_stamps_of_its_sweeps(tmp_path):
     assert open_source(drive)[1].pose is None
 
 
+AHEAD, LEFT, RIGHT, BEHIND_LEFT = [5, 0, 0], [0, 5, 0], [0, -5, 0], [-5, 1e-6, 0]
+
+
+def test_points_of_a_raw_drive_have_times_by_their_azimuth(tmp_path):
+    drive = layouts.kitti_raw(tmp_path)
+    assert open_source(drive)[1].times is None
+    points = np.ones((5, 4), "<f4")
+    points[:4, :3], points[4, 0] = [AHEAD, LEFT, RIGHT, BEHIND_LEFT], np.nan
+    layouts.write_points(drive / "velodyne_points/data/0000000001.bin", points)
+    frame = open_source(layouts.turns(drive))[1]
+    assert frame.times.dtype == np.float64
+    np.testing.assert_allclose(frame.times[:4], [0, -0.02, 0.03, -0.04], atol=1e-6)
+    # the lidar goes 5 m/s ahead, and a point to the left is seen before it has come to where it is at the stamp
+    way = ldls.Trajectory(
+        [frame.stamp - 1, frame.stamp], [np.eye(4), np.eye(4) + 5 * np.eye(4)[[0]].T @ np.eye(4)[[3]]]
+    )
+    moved = frame.deskewed(way).points
+    np.testing.assert_allclose(moved[:3, 0], [5, -0.1, 0.15], atol=1e-5)
+    assert np.array_equal(frame.deskewed(way).images[0].camera.T_camera_lidar, layouts.T), "the lidar fires the camera"
+    for name in ("start", "end"):
+        path = drive / f"velodyne_points/timestamps_{name}.txt"
+        text = path.read_text()
+        path.write_text(text.replace(text.splitlines()[1], ""))
+        source = open_source(drive)
+        assert source[1].times is None and source[2].times is not None, "what was not measured has no time"
+        path.unlink()
+        assert open_source(drive)[2].times is None
+        path.write_text(text)
+
+
+@pytest.mark.parametrize(("before_s", "after_s"), [(-0.01, 0.05), (0.05, -0.01), (0.5, 0.6)])
+def test_a_sweep_that_begins_after_its_stamp_or_never_ends_is_an_error_that_says_so(tmp_path, before_s, after_s):
+    drive = layouts.turns(layouts.kitti_raw(tmp_path), before_s=before_s, after_s=after_s)
+    expected = rf"frame 0000000000 begins \{-before_s:+.3f}\d+ s and ends \{after_s:+.3f}\d+ s from its stamp"
+    with pytest.raises(ldls.CorruptFileError, match=expected):
+        open_source(drive)[0]
+
+
+def test_times_and_the_poses_around_them_are_files_of_a_frame(tmp_path):
+    drive = layouts.kitti_raw(tmp_path, n_frames=5)
+    with_oxts(drive, n=5, later_s=0.0)
+    ahead = lambda: [p.name for p in open_source(drive).files(3) if p.parent.parent.name == "oxts"]  # noqa: E731
+    assert ahead() == ["0000000000.txt", "0000000002.txt", "0000000003.txt"]
+    layouts.turns(drive, n_frames=5)
+    assert ahead() == ["0000000000.txt", "0000000002.txt", "0000000003.txt", "0000000004.txt"]
+    names = [path.name for path in open_source(drive).files(3)]
+    assert {"timestamps_start.txt", "timestamps_end.txt"} <= set(names)
+
+
+def test_cameras_of_nuscenes_are_not_moved_again(tmp_path):
+    frame = open_source(layouts.nuscenes(tmp_path))[0]
+    way = ldls.Trajectory([frame.stamp - 0.5, frame.stamp], [np.eye(4), np.eye(4) + np.eye(4)[[0]].T @ np.eye(4)[[3]]])
+    for was, image in zip(frame.images, frame.deskewed(way).images, strict=True):
+        assert np.array_equal(was.camera.T_camera_lidar, image.camera.T_camera_lidar)
+
+
 def test_a_sweep_beyond_the_poses_of_its_drive_is_an_error_with_its_name(tmp_path):
     drive = layouts.kitti_raw(tmp_path)
     with_oxts(drive, n=2)

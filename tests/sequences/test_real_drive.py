@@ -1,5 +1,7 @@
 """Four real sweeps in a row: a car rolls up to a queue at a traffic light. Masks are boxes set by hand."""
 
+import shutil
+
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
@@ -46,18 +48,66 @@ def across_the_way(first, other):
     return np.abs(np.sum((other - first[near].mean(axis=1)[nearest]) * normals[nearest], axis=1))[fits]
 
 
-def test_what_stands_still_in_real_sweeps_coincides(real_drive, way):
-    """Rear ends of cars that wait, and walls: they show how far the car rolled, 0.74 m; the car ahead rolls too."""
+TURN_S = 0.1035
+
+
+@pytest.fixture(scope="module")
+def timed_drive(real_drive, tmp_path_factory):
+    """The same sweeps with the times at which they begin and end, as KITTI's drives have them."""
+    day = shutil.copytree(real_drive.path.parent, tmp_path_factory.mktemp("timed") / real_drive.path.parent.name)
+    for name, later_s in (("", 0), ("_start", -TURN_S / 2), ("_end", TURN_S / 2)):
+        lines = [f"2011-09-26 13:02:{25.5 + TURN_S * k + later_s:.9f}\n" for k in range(4)]
+        (day / real_drive.path.name / f"velodyne_points/timestamps{name}.txt").write_text("".join(lines))
+    return open_source(day)
+
+
+def placed(way, source):
+    """Points of each sweep that stand near by, in the lidar's frame and in the world."""
     clouds = []
-    for pose, frame in zip(way.poses, real_drive, strict=True):
-        xyz = frame.points[:, :3].astype(float)
+    for pose, frame in zip(way.poses, source, strict=True):
+        xyz = frame.deskewed(way).points[:, :3].astype(float)
         xyz = xyz[(xyz[:, 2] > -0.73) & (np.linalg.norm(xyz, axis=1) < 30)]
         clouds.append((xyz, xyz @ pose[:3, :3].T + pose[:3, 3]))
+    return clouds
+
+
+def test_what_stands_still_in_real_sweeps_coincides(real_drive, way):
+    """Rear ends of cars that wait, and walls: they show how far the car rolled, 0.74 m; the car ahead rolls too."""
+    clouds = placed(way, real_drive)
     distances, _ = KDTree(clouds[0][1]).query(clouds[3][1])
     assert np.median(distances) < 0.05
     apart = across_the_way(clouds[0][1], clouds[3][1])
     assert len(apart) > 500 and np.median(apart) < 0.05
     assert np.median(across_the_way(clouds[0][0], clouds[3][0])) > 0.05, "lines alone would coincide, too"
+
+
+def test_it_does_no_less_where_points_have_times(timed_drive):
+    clouds = placed(odometry_of(timed_drive), timed_drive)
+    distances, _ = KDTree(clouds[0][1]).query(clouds[3][1])
+    assert np.median(distances) < 0.05
+    apart = across_the_way(clouds[0][1], clouds[3][1])
+    assert len(apart) > 500 and np.median(apart) < 0.05
+
+
+CLOSING_M = 0.27
+"""By so much a car behind comes nearer from sweep to sweep."""
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_a_car_that_follows_has_an_even_front_where_a_sweep_begins_and_ends(timed_drive, number):
+    """Its left half, where a sweep begins, is a turn older than its right half: so the lidar turns clockwise."""
+    frame = timed_drive[number]
+    x, y, z = frame.points[:, :3].T
+    front = (x > -16) & (x < -13.8) & (z > -0.97) & (z < -0.78)
+    left, right = front & (y > 0.3) & (y < 0.6), front & (y > -0.86) & (y < -0.56)
+    assert left.sum() > 10 and right.sum() > 10
+    nearer = np.eye(4)
+    nearer[0, 3] = CLOSING_M
+    # as seen from that car, the lidar backs up to it
+    as_seen = ldls.Trajectory([frame.stamp - TURN_S, frame.stamp], [nearer, np.eye(4)])
+    again = as_seen.deskew(frame.points, frame.times, frame.stamp)[:, 0]
+    assert np.median(x[right]) - np.median(x[left]) == pytest.approx(CLOSING_M, abs=0.03)
+    assert np.median(again[right]) - np.median(again[left]) == pytest.approx(0, abs=0.03)
 
 
 def boxes_of(real_drive, way):
