@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 import ldls
 from ldls.datasets import odometry_of
@@ -60,6 +60,34 @@ def test_a_lidar_of_few_lines_does_not_turn_by_itself():
     assert np.degrees(turns.magnitude()).max() < 0.4
 
 
+def skewed(number):
+    """Stamp, points and times of a sweep of the drive, whose lidar turns clockwise while it moves."""
+    true = drive_poses(DRIVE)
+    stamps = 0.1 * np.arange(len(true))
+    points = drive_frame(DRIVE, number).points.astype(float)
+    times = -np.arctan2(points[:, 1], points[:, 0]) / np.pi * 0.05
+    at = stamps[number] + times
+    places = np.stack([np.interp(at, stamps, true[:, axis, 3]) for axis in range(3)], axis=1)
+    world = points[:, :3] @ true[number, :3, :3].T + true[number, :3, 3]
+    points[:, :3] = Slerp(stamps, Rotation.from_matrix(true[:, :3, :3]))(at).inv().apply(world - places)
+    return float(stamps[number]), points, times
+
+
+def test_motion_within_sweeps_whose_points_have_times_is_taken_out():
+    sweeps = [skewed(number) for number in range(1, N_FRAMES + 1)]
+    true = drive_poses(DRIVE)[1 : N_FRAMES + 1]
+    true = np.linalg.inv(true[0]) @ true
+    metres, degrees = {}, {}
+    for times in (True, False):
+        found = ldls.odometry(sweep if times else sweep[:2] for sweep in sweeps).poses
+        metres[times] = np.linalg.norm(found[:, :3, 3] - true[:, :3, 3], axis=1).max()
+        turns = Rotation.from_matrix(true[:, :3, :3].transpose(0, 2, 1) @ found[:, :3, :3])
+        degrees[times] = np.degrees(turns.magnitude()).max()
+    assert metres[True] < 0.03 and degrees[True] < 0.05
+    # what does not undo it finds poses that are off
+    assert metres[False] > 2 * metres[True] and degrees[False] > 1.5 * degrees[True]
+
+
 def street(seed=0):
     """Walls to both sides and across, and poles."""
     generator = np.random.default_rng(seed)
@@ -86,6 +114,11 @@ NO_PLACE = street() * np.array([0.2, 0.2, 1]) - np.array([70, 30, 0])
                      "sweep 1: its stamp 0.000000 s is not after that before it", id="stamps"),
         pytest.param([(0, street()), (0.1, NO_PLACE)], ldls.PoseError, "sweep 1: the way is lost at 0.1", id="lost"),
         pytest.param([street()], ldls.InputError, "sweep 0 is an array of shape (10000, 3), exp", id="without stamps"),
+        pytest.param([(0, street(), [0.0])], ldls.ShapeError, "sweep 0: times: there are 1 for 10000 p", id="few times"),
+        pytest.param([(0, street(), np.full(10000, 5e7))], ldls.PoseError, "sweep 0: times: a point has 5e+07 s",
+                     id="nanoseconds"),
+        pytest.param([(0, street(), [0.0], 1)], ldls.InputError, "expected (stamp, points) or (stamp, points, times)",
+                     id="too many parts"),
         pytest.param([("a", street())], ldls.InputError, "stamp of sweep 0 is 'a', expected seconds", id="text"),
         pytest.param([(np.nan, street())], ldls.InputError, "stamp of sweep 0 is nan", id="NaN stamp"),
         pytest.param([(0, street().astype(int))], ldls.DtypeError, "sweep 0: points: expected float32", id="integers"),

@@ -81,12 +81,12 @@ def test_what_stands_still_in_real_sweeps_coincides(real_drive, way):
     assert np.median(across_the_way(clouds[0][0], clouds[3][0])) > 0.05, "lines alone would coincide, too"
 
 
-def test_it_does_no_less_where_points_have_times(timed_drive):
+def test_it_does_so_where_points_have_times(timed_drive):
+    """At 2.3 m/s a sweep has 12 cm of motion to each side of its stamp, nearly the same in all four."""
     clouds = placed(odometry_of(timed_drive), timed_drive)
     distances, _ = KDTree(clouds[0][1]).query(clouds[3][1])
-    assert np.median(distances) < 0.05
-    apart = across_the_way(clouds[0][1], clouds[3][1])
-    assert len(apart) > 500 and np.median(apart) < 0.05
+    assert np.median(distances) < 0.03
+    assert np.median(across_the_way(clouds[0][1], clouds[3][1])) < 0.06, "0.696 m and 0.685 m of 0.74 m"
 
 
 CLOSING_M = 0.27

@@ -7,7 +7,7 @@ moved. What lies low keeps the way level afterwards (`ground_level`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ from ldls.sequences.grid import cell_keys
 from ldls.sequences.ground_level import levelled, split_standing
 from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory
 
+BEGINNINGS = 2
+"""Times that the first two sweeps are laid on each other again, each time with less of their motion in them."""
 PERIOD_S = 0.1
 """Time between sweeps, as long as it is not known."""
 FARTHEST_M = 100.0
@@ -40,9 +42,9 @@ def odometry(sweeps: Iterable[tuple[float, Points] | tuple[float, Points, NDArra
     """Return the poses of the lidar at sweeps of a drive, found by laying each on those before it.
 
     The first pose is the identity, so that the world is the lidar's frame at the first sweep. Points with times are
-    first moved to the stamp of their sweep, by the motion between the two sweeps before it; those of the first two, for
-    which there is none, and points without times are all taken to be of the moment of their stamp. The same sweeps give
-    the same poses, on one thread. Errors add up along the way.
+    first moved to the stamp of their sweep, by the motion between the two sweeps before it, those of the first two by
+    the motion between these; points without times are all taken to be of that moment. The same sweeps give the same
+    poses, on one thread. Errors add up along the way.
 
     Args:
         sweeps: Stamp in seconds, ascending, and points (N, >= 3) in metres, z up, of each sweep; two or more, and
@@ -56,11 +58,15 @@ def odometry(sweeps: Iterable[tuple[float, Points] | tuple[float, Points, NDArra
         InputError: There are fewer than two sweeps, or one has too few finite points that stand on the ground.
         ImportError: `ldls[odometry]` is not installed.
     """
-    way = _Way()
+    way, first = _Way(), []
     for number, sweep in enumerate(sweeps):
-        stamp, points, times = _parts(number, sweep)
+        parts = _parts(number, sweep)
         with within(f"sweep {number}"):
-            way.go_on(stamp, as_points(points), times)
+            way.go_on(*parts)
+        if number < 2:
+            first.append(parts)
+        if number == 1:
+            way, first = _begun(way, first), []
     if len(way.stamps) < 2:
         raise InputError(f"sweeps: got {len(way.stamps)}, expected 2 or more")
     return Trajectory(np.array(way.stamps), np.array(way.poses))
@@ -69,19 +75,23 @@ def odometry(sweeps: Iterable[tuple[float, Points] | tuple[float, Points, NDArra
 class _Way:
     """Stamps and poses so far, and what is known of the last sweep."""
 
-    def __init__(self) -> None:
+    def __init__(self, begin: Trajectory | None = None) -> None:
+        """A way that begins, with a motion as from the first to the last pose of `begin`; at rest without it."""
         self.stamps: list[float] = []
         self.poses: list[NDArray[np.float64]] = []
+        at_rest = Trajectory(np.array([0, PERIOD_S]), np.array([np.eye(4)] * 2))
+        self._begin = at_rest if begin is None else begin
         self._registration = _registration()
         self._low = np.zeros((0, 3))
         self._places = np.zeros(0, np.int64)
 
     def go_on(self, stamp: float, points: Points, times: NDArray[np.float64] | None) -> None:
         """Take the way to the next sweep."""
+        points = as_points(points)
         if self.stamps and not stamp > self.stamps[-1]:
             raise PoseError(f"its stamp {stamp:.6f} s is not after that before it, {self.stamps[-1]:.6f} s; sort them")
         if times is not None:
-            points = self._motion(stamp).deskew(points, times, stamp)
+            points = self.motion(stamp).deskew(points, times, stamp)
         xyz = points[finite_rows(points), :3].astype(np.float64)
         ranges_m = np.linalg.norm(xyz, axis=1)
         standing, low = split_standing(xyz[(ranges_m > 0) & (ranges_m < FARTHEST_M)])
@@ -102,12 +112,13 @@ class _Way:
         self.poses.append(pose)
         self._low = low
 
-    def _motion(self, stamp: float) -> Trajectory:
-        """The way around `stamp`, as it was between the last two sweeps; none where there are no such."""
-        step, period_s = np.eye(4), PERIOD_S
-        if len(self.poses) > 1 and self.stamps[-1] - self.stamps[-2] <= LONGEST_GAP_S:
-            step, period_s = inverse(self.poses[-2]) @ self.poses[-1], self.stamps[-1] - self.stamps[-2]
-        return Trajectory(np.array([stamp - period_s, stamp]), np.array([inverse(step), np.eye(4)]))
+    def motion(self, stamp: float) -> Trajectory:
+        """The way around `stamp`, as it was between the last two sweeps; at rest where these are too far apart."""
+        poses, stamps = (self.poses, self.stamps) if len(self.poses) > 1 else (self._begin.poses, self._begin.stamps)
+        back, period_s = inverse(poses[-1]) @ poses[-2], float(stamps[-1] - stamps[-2])
+        if period_s > LONGEST_GAP_S:
+            back, period_s = np.eye(4), PERIOD_S
+        return Trajectory(np.array([stamp - period_s, stamp]), np.array([back, np.eye(4)]))
 
     def _check_common(self, stamp: float, standing: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
         places = np.unique(cell_keys(standing @ pose[:3, :3].T + pose[:3, 3], PLACE_M))
@@ -118,6 +129,17 @@ class _Way:
                 f"{self.stamps[-1]:.6f} s; take sweeps of one drive without gaps, or poses of another origin"
             )
         self._places = places
+
+
+def _begun(way: _Way, first: Sequence[tuple[float, Points, NDArray[np.float64] | None]]) -> _Way:
+    """A way of its first two sweeps, which know each other's motion."""
+    if all(times is None for _, _, times in first):
+        return way
+    for _ in range(BEGINNINGS):
+        way = _Way(way.motion(0.0))
+        for parts in first:
+            way.go_on(*parts)
+    return way
 
 
 def _registration() -> Any:  # noqa: ANN401
