@@ -331,3 +331,51 @@ def test_the_command_takes_sweeps_of_two(drive, tmp_path):
     assert windows(tmp_path / "out") == ["01234"] * 5 + ["567"] * 3
     outcome = runs.resumed([*runs.arguments(drive, tmp_path / "out"), "--sweeps", "-1"])
     assert outcome.exit_code == 2
+
+
+@pytest.fixture
+def timed(simulated, tmp_path):
+    """The simulated drive with the times at which its sweeps begin and end."""
+    drive = shutil.copytree(simulated.parent, tmp_path / "timed" / simulated.parent.name) / simulated.name
+    stamps = [np.datetime64(line.replace(" ", "T"), "ns") for line in _lines(drive / "velodyne_points/timestamps.txt")]
+    for name, later_ms in (("start", -50), ("end", 50)):
+        lines = [str(stamp + np.timedelta64(later_ms, "ms")).replace("T", " ") for stamp in stamps]
+        (drive / f"velodyne_points/timestamps_{name}.txt").write_text("".join(f"{line}\n" for line in lines))
+    return drive
+
+
+def _lines(path):
+    return path.read_text().splitlines()
+
+
+@pytest.mark.parametrize("sweeps", [0, 1])
+def test_motion_within_a_sweep_is_taken_out_before_points_are_labelled(timed, tmp_path, sweeps):
+    run(timed, tmp_path / "out", masks=str(timed / "masks_02"), sweeps=sweeps)
+    for frame in open_source(timed, truth=False):
+        points = ldls.read_result(tmp_path / f"out/{frame.name}.npz").points
+        np.testing.assert_array_equal(points, frame.trajectory.deskew(frame.points, frame.times, frame.stamp))
+        assert np.abs(points - frame.points).max() > 0.05
+
+
+def test_a_file_of_poses_takes_motion_out_in_place_of_the_source(timed, tmp_path):
+    source = open_source(timed, truth=False)
+    stamps = np.array(source.stamps)
+    way = "".join(f"{stamp:.6f} {2 * (stamp - stamps[0]):.6f} 0 0 0 0 0 1\n" for stamp in stamps)
+    (tmp_path / "given.txt").write_text(way)
+    run(timed, tmp_path / "out", masks=str(timed / "masks_02"), sweeps=0, poses=str(tmp_path / "given.txt"))
+    for frame in source:
+        points = ldls.read_result(tmp_path / f"out/{frame.name}.npz").points
+        expected = frame.points.astype(float)
+        expected[:, 0] += 2 * frame.times
+        np.testing.assert_allclose(points, expected, atol=1e-5)
+
+
+def test_poses_that_say_nothing_of_a_sweep_fail_its_frame_alone(timed, tmp_path):
+    source = open_source(timed, truth=False)
+    # from the third sweep on; the first two lie before all of them
+    way = "".join(f"{stamp:.6f} {0.1 * k} 0 0 0 0 0 1\n" for k, stamp in enumerate(source.stamps[2:]))
+    (tmp_path / "given.txt").write_text(way)
+    run(timed, tmp_path / "out", masks=str(timed / "masks_02"), sweeps=0, poses=str(tmp_path / "given.txt"))
+    failed = {name: record["error"] for name, record in records(tmp_path / "out").items() if "error" in record}
+    assert [name[-1] for name in failed] == ["0", "1"]
+    assert all("given.txt: stamp: no pose at" in error["message"] for error in failed.values())

@@ -114,7 +114,7 @@ NO_PLACE = street() * np.array([0.2, 0.2, 1]) - np.array([70, 30, 0])
                      "sweep 1: its stamp 0.000000 s is not after that before it", id="stamps"),
         pytest.param([(0, street()), (0.1, NO_PLACE)], ldls.PoseError, "sweep 1: the way is lost at 0.1", id="lost"),
         pytest.param([street()], ldls.InputError, "sweep 0 is an array of shape (10000, 3), exp", id="without stamps"),
-        pytest.param([(0, street(), [0.0])], ldls.ShapeError, "sweep 0: times: there are 1 for 10000 p", id="few times"),
+        pytest.param([(0, street(), [0.0])], ldls.ShapeError, "sweep 0: times: there are 1 for 10000", id="few times"),
         pytest.param([(0, street(), np.full(10000, 5e7))], ldls.PoseError, "sweep 0: times: a point has 5e+07 s",
                      id="nanoseconds"),
         pytest.param([(0, street(), [0.0], 1)], ldls.InputError, "expected (stamp, points) or (stamp, points, times)",
