@@ -252,6 +252,11 @@ CALLS = {
     ),
     "Trajectory": (ldls.Trajectory, {"stamps": [0, 0.1], "poses": np.stack([np.eye(4)] * 2)}),
     "Trajectory.at": (ldls.Trajectory([0, 0.1], np.stack([np.eye(4)] * 2)).at, {"stamp": 0.05}),
+    "Trajectory.motion": (ldls.Trajectory([0, 0.1], np.stack([np.eye(4)] * 2)).motion, {"start": 0.05, "end": 0.0}),
+    "Trajectory.deskew": (
+        ldls.Trajectory([0, 0.1], np.stack([np.eye(4)] * 2)).deskew,
+        {"points": np.ones((2, 3)), "times": np.array([0.0, 0.05]), "stamp": 0.05},
+    ),
     "odometry": (ldls.odometry, {"sweeps": [(0.0, W.street), (0.1, W.street)]}),
     "LabelledMap": (ldls.LabelledMap, {"voxel_m": 0.1}),
     "LabelledMap.add": (ldls.LabelledMap().add, {"sweep": W.sweep, "result": W.tracked}),

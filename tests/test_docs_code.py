@@ -87,6 +87,12 @@ def test_from_a_bag_to_a_labelled_bag(run):
     np.testing.assert_array_equal(labelled.cloud(1).fields["class_id"], names["result"].categories)
 
 
+def test_motion_within_a_sweep(run, capsys):
+    run("docs/drives.md", holding="deskew")
+    printed = capsys.readouterr().out.strip()
+    assert f"prints `{printed}`" in (pages.ROOT / "docs/drives.md").read_text()
+
+
 def test_ci_runs_the_test_command_of_the_readme():
     command = "pip install '.[test]' && pytest"
     assert command in (pages.ROOT / "README.md").read_text()
