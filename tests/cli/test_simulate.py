@@ -40,6 +40,7 @@ def test_no_errors_means_perfect_masks_and_calibration(tmp_path):
         pytest.param(["--suite", "tuning", "--layout", "kitti-raw"], id="a suite as a drive"),
         pytest.param(["--rig", "ring", "--layout", "kitti-raw"], id="a drive with a ring"),
         pytest.param(["--suite", "tuning", "--layout", "mcap"], id="a suite as a bag"),
+        pytest.param(["--spinning"], id="single scenes that take their time"),
     ],
 )
 def test_what_cannot_be_made_is_refused(tmp_path, arguments):
@@ -54,6 +55,15 @@ def test_a_drive_is_written_in_the_raw_layout(tmp_path):
     assert len(list((drive / "velodyne_points/data").iterdir())) == 2
     assert len((drive / "image_02/timestamps.txt").read_text().splitlines()) == 2
     assert "kept 2" in run(tmp_path, "--count", 2, "--layout", "kitti-raw", "--seed", 5, *SMALL).output
+
+
+def test_a_lidar_spins_in_drives_alone(tmp_path):
+    options = ["--count", 1, "--layout", "kitti-raw", "--seed", 5, *SMALL]
+    result = run(tmp_path, *options, "--spinning")
+    assert result.exit_code == 0, result.output
+    (begin,) = tmp_path.glob("*/*/velodyne_points/timestamps_start.txt")
+    assert begin.read_text().strip() == "2026-01-06 11:59:59.980000000"
+    assert run(tmp_path, *options).exit_code != 0, "what is there is of the other kind"
 
 
 @pytest.mark.parametrize(("layout", "name"), [("rosbag1", "drive.bag"), ("mcap", "drive/drive.mcap")])

@@ -96,6 +96,14 @@ def simulate(
         bool,
         typer.Option("--errors/--no-errors", help="Masks, calibration and clocks wrong as in life, or perfect."),
     ] = True,
+    spinning: Annotated[
+        bool,
+        typer.Option(
+            "--spinning",
+            help="In a drive, the lidar takes 0.1 s for a sweep, while it and all objects move; otherwise all stands "
+            "still during a sweep.",
+        ),
+    ] = False,
     cores: CoresOption = None,
 ) -> None:
     """Make scenes with perfect labels: streets and campuses, seen by a lidar and a camera.
@@ -106,13 +114,15 @@ def simulate(
 
     With --layout kitti-raw the frames are a drive, ten a second, through the scene of the seed: folder
     DATE/DATE_drive_NNNN_sync with velodyne_points, image_02, masks_02, annotations and oxts (poses); the calibration
-    is in DATE.
+    is in DATE. With --spinning, points have the coordinates of the lidar at their own time, in which it turns
+    counter-clockwise from timestamps_start.txt to timestamps_end.txt of velodyne_points.
 
     A seed is a frame, or a drive: the same one gives the same files. Frames that are there already are kept.
     Needs the extra `sim` of ldls.
 
     With --layout rosbag1, rosbag2 (SQLite) or mcap, OUT holds a bag of the VLP-16 and the camera of a robot, ten
-    frames a second, and masks (of the right categories) and annotations named by stamp. Needs the extra `ros` too.
+    frames a second, and masks (of the right categories) and annotations named by stamp. With --spinning, points have a
+    time, in seconds since the stamp. Needs the extra `ros` too.
 
     Example: ldls simulate scenes --count 5 --scene campus, and then ldls segment
     --points scenes/training/velodyne/000000.bin --calib scenes/training/calib/000000.txt
@@ -134,11 +144,13 @@ def simulate(
         raise ParameterError(f"--suite: the suite is in KITTI's layout; use --count with --layout {layout.value}")
     if suite and not errors:
         raise ParameterError("--no-errors: the suite's errors are part of it; use --count and --seed without --suite")
+    if spinning and layout is Layout.KITTI:
+        raise ParameterError("--spinning: single scenes are of one instant; use --layout kitti-raw, or that of a bag")
     processes = cores or default_threads()
     segmenter = SegmenterErrors() if errors else SegmenterErrors.none()
     sensors = SensorErrors() if errors else SensorErrors.none()
     if layout in BAGS:
-        _write_bag(out, layout, count, seed, None if errors else segmenter)
+        _write_bag(out, layout, count, seed, None if errors else segmenter, spinning=spinning)
     elif layout is Layout.KITTI_RAW:
         drive = Drive(
             n_frames=count,
@@ -148,6 +160,7 @@ def simulate(
             camera=rig.value,
             segmenter=segmenter,
             sensors=sensors,
+            spinning=spinning,
         )
         _follow(write_drive(out, drive, processes=processes), count, drive_folder(out, drive))
     else:
@@ -198,10 +211,12 @@ def _follow(frames: Iterator[FrameSummary | None], total: int, where: Path) -> N
         screen.print(f"kept {kept} that were there; delete them to make them anew", highlight=False)
 
 
-def _write_bag(out: Path, layout: Layout, frames: int, seed: int, segmenter: SegmenterErrors | None) -> None:
+def _write_bag(
+    out: Path, layout: Layout, frames: int, seed: int, segmenter: SegmenterErrors | None, *, spinning: bool
+) -> None:
     from ldls.simulation import write_robot_drive
 
     screen = console()
     with screen.status("simulating"):
-        path = write_robot_drive(out, layout.value, frames=frames, seed=seed, segmenter=segmenter)
+        path = write_robot_drive(out, layout.value, frames=frames, seed=seed, segmenter=segmenter, spinning=spinning)
     screen.print(f"wrote {frames} sweeps to {path}, masks and annotations beside it", highlight=False, soft_wrap=True)

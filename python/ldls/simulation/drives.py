@@ -1,7 +1,8 @@
 """Drives through one scene, in which objects move, ten frames a second: a car's, and a robot's.
 
-Objects move straight on and do not mind one another. The rig stays upright, and all stands still during a sweep. The
-world of a drive's poses is the lidar's own frame at the first sweep.
+Objects move straight on and do not mind one another. The rig stays upright. All stands still during a sweep, or the
+lidar spins: then all moves during the 0.1 s of its turn. The world of a drive's poses is the lidar's own frame at the
+first sweep.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.extrinsic import turn_of
-from ldls.camera.rigid import from_parts
+from ldls.camera.rigid import from_parts, inverse
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.ground import Ground
-from ldls.simulation.lidars import VLP_16
+from ldls.simulation.lidars import VLP_16, Lidar
+from ldls.simulation.motion import Motion
 from ldls.simulation.plan import Plan
 from ldls.simulation.rigs import ROBOT_LENS, MountedCamera, Rig, make_rig
 from ldls.simulation.scene_object import SceneObject
@@ -25,6 +27,7 @@ from ldls.simulation.scenes import Scene, build, make_plan, make_scene
 from ldls.simulation.simulated_frame import SimulatedFrame, take_frame
 
 PERIOD_S = 0.1
+"""Time from sweep to sweep, and of a turn of a lidar that spins."""
 SPEED_M_S = 5.0
 LONGEST_M = 40.0
 """Longest way of a drive, for scenes end; longer drives go slower."""
@@ -45,7 +48,7 @@ ROBOT_IMAGE_DELAY_S = 0.012
 class Drive:
     """A car's drive: what would come too near to the rig is taken away before.
 
-    The rig keeps its height above the ground, and stands still between an image and its sweep.
+    The rig keeps its height above the ground. It stands still between an image and its sweep, unless the lidar spins.
 
     Attributes:
         n_frames: Number of frames.
@@ -56,6 +59,8 @@ class Drive:
         segmenter: Errors of the masks.
         sensors: Errors of calibration and clocks, the same in all frames.
         turn_deg_s: Degrees a second by which the rig turns to the left all the way, -90 to 90.
+        spinning: The lidar takes 0.1 s for a sweep, and rig and objects move all the time. It turns counter-clockwise
+            seen from above, from behind to behind, as KITTI's does, and looks ahead at the stamp of the sweep.
 
     Raises:
         ParameterError: There is no frame, the rig turns too fast, or the camera is a ring.
@@ -69,6 +74,7 @@ class Drive:
     segmenter: SegmenterErrors = field(default_factory=SegmenterErrors)
     sensors: SensorErrors = field(default_factory=SensorErrors)
     turn_deg_s: float = 0.0
+    spinning: bool = False
 
     def __post_init__(self) -> None:
         if self.n_frames < 1:
@@ -99,22 +105,33 @@ def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
     if not 0 <= number < drive.n_frames:
         raise ParameterError(f"number: got {number}, expected 0 to {drive.n_frames - 1}")
     plan = make_plan(drive.seed, kind=drive.kind)
-    poses = _poses(drive, plan.ground)
+    poses = _poses(drive, plan.ground, _sweep_seconds(drive))
     plan.remove(_in_the_way(poses, plan))
     plan.clear(poses[:, :2, 3], CLEAR_M)
-    seconds, seed = number * PERIOD_S, 1000 * drive.seed + number
-    scene = _from_the_rig(build(plan), plan.ground, seconds, poses[number])
+    taken, seed = number * PERIOD_S, 1000 * drive.seed + number
+    swept = taken + drive.sensors.delay_s
+    world, pose = build(plan), poses[number]
+    photographed, moved, motion = _from_the_rig(world, plan.ground, taken, pose), None, None
+    scanned = photographed.after(drive.sensors.delay_s)
+    if drive.spinning:
+        (before,) = _poses(drive, plan.ground, np.array([taken - drive.sensors.delay_s]))
+        photographed = _from_the_rig(world, plan.ground, taken, before)
+        scanned = _from_the_rig(world, plan.ground, swept, pose)
+        moved = inverse(before) @ pose
+        motion = _motion(drive, world, plan.ground, number)
     return take_frame(
-        scene,
-        scene.after(drive.sensors.delay_s),
+        photographed,
+        scanned,
         drive.rig(),
         name=f"{number:010d}",
-        stamps=(seconds, seconds + drive.sensors.delay_s),
+        stamps=(taken, swept),
         sweep_noise=(seed, 0),
         mask_seed=seed,
         drift=drive.sensors.drift(drive.seed),
-        pose=poses[number],
+        pose=pose,
         segmenter=drive.segmenter,
+        moved=moved,
+        motion=motion,
     )
 
 
@@ -124,11 +141,25 @@ def drive_poses(drive: Drive) -> NDArray[np.float64]:
     Raises:
         ParameterError: There is no such kind of scene.
     """
-    return _poses(drive, make_plan(drive.seed, kind=drive.kind).ground)
+    return poses_after(drive, _sweep_seconds(drive))
+
+
+def poses_after(drive: Drive, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 4, 4) true T_world_lidar of a drive, so many seconds (n,) after its first sweep; of any time.
+
+    Raises:
+        ParameterError: There is no such kind of scene.
+    """
+    return _poses(drive, make_plan(drive.seed, kind=drive.kind).ground, seconds)
 
 
 def robot_drive(
-    frames: int, *, seed: int = 0, rig: Rig = ROBOT, segmenter: SegmenterErrors | None = None
+    frames: int,
+    *,
+    seed: int = 0,
+    rig: Rig = ROBOT,
+    segmenter: SegmenterErrors | None = None,
+    spinning: bool = False,
 ) -> Iterator[SimulatedFrame]:
     """The frames of a robot's drive along x through a campus; its calibration has no error.
 
@@ -139,6 +170,7 @@ def robot_drive(
         seed: Seed of the scene and its noise.
         rig: Lidar and camera.
         segmenter: Errors of the masks; by default the usual ones, but for wrong categories.
+        spinning: The lidar takes 0.1 s for a sweep while all moves, as in a `Drive`.
 
     Raises:
         ParameterError: `frames` is below 1.
@@ -161,6 +193,7 @@ def robot_drive(
             drift=np.eye(4),
             pose=from_parts(np.eye(3), np.array([ROBOT_SPEED_M_S * swept, 0, 0])),
             segmenter=ROBOT_SEGMENTER if segmenter is None else segmenter,
+            motion=_robot_motion(scene, rig.lidar) if spinning else None,
         )
 
 
@@ -170,17 +203,41 @@ def _from_the_robot(scene: Scene, seconds: float) -> Scene:
     return scene.after(seconds).moved(-np.tile(way, (len(scene.objects) + 1, 1)))
 
 
-def _poses(drive: Drive, ground: Ground) -> NDArray[np.float64]:
-    """(n, 4, 4) from the ground below the rig at each frame to that below the first; the lidar is as high above all.
+def _robot_motion(scene: Scene, lidar: Lidar) -> Motion:
+    """What moves on straight is the same in all turns."""
+    times = lidar.firing_times(PERIOD_S)
+    rig = np.tile(np.eye(4), (len(times), 1, 1))
+    rig[:, 0, 3] = ROBOT_SPEED_M_S * times
+    ways = np.zeros((len(scene.objects), len(times), 3))
+    ways[:, :, :2] = [np.outer(times, thing.velocity_m_s) for thing in scene.objects]
+    return Motion(times, rig, ways)
+
+
+def _sweep_seconds(drive: Drive) -> NDArray[np.float64]:
+    return PERIOD_S * np.arange(drive.n_frames, dtype=np.float64)
+
+
+def _poses(drive: Drive, ground: Ground, seconds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 4, 4) from the ground below the rig so long after the first sweep to that at it; the lidar is as high above.
 
     The way is an arc: its chord leads where the rig heads at half of the time.
     """
-    seconds = PERIOD_S * np.arange(drive.n_frames, dtype=np.float64)
     yaw = np.radians(drive.turn_deg_s) * seconds
     chord_m = drive.speed_m_s * seconds * np.sinc(yaw / (2 * np.pi))
     x_m, y_m = chord_m * np.cos(yaw / 2), chord_m * np.sin(yaw / 2)
     places = np.stack([x_m, y_m, ground.height_m(x_m, y_m)], axis=1)
     return np.array([from_parts(turn_of(0, 0, turn), place) for turn, place in zip(yaw, places, strict=True)])
+
+
+def _motion(drive: Drive, world: Scene, ground: Ground, number: int) -> Motion:
+    """Rig and objects during the turn of a sweep, as seen from the rig at its stamp."""
+    times = drive.rig().lidar.firing_times(PERIOD_S)
+    since = number * PERIOD_S
+    (pose,) = _poses(drive, ground, np.array([since]))
+    swept = since + drive.sensors.delay_s
+    ways = np.array([_moved_m(o, ground, swept + times) - _moved_m(o, ground, swept) for o in world.objects])
+    rig = inverse(pose) @ _poses(drive, ground, since + times)
+    return Motion(times, rig, ways.reshape(-1, len(times), 3) @ pose[:3, :3])
 
 
 def _from_the_rig(scene: Scene, ground: Ground, seconds: float, pose: NDArray[np.float64]) -> Scene:
@@ -190,10 +247,11 @@ def _from_the_rig(scene: Scene, ground: Ground, seconds: float, pose: NDArray[np
     return scene.moved(by_m - pose[:3, 3]).turned(-float(np.arctan2(pose[1, 0], pose[0, 0])))
 
 
-def _moved_m(thing: SceneObject, ground: Ground, seconds: float) -> tuple[float, float, float]:
-    x, y, _ = thing.centre_m
-    dx, dy = (speed * seconds for speed in thing.velocity_m_s)
-    return dx, dy, float(ground.height_m(x + dx, y + dy) - ground.height_m(x, y))
+def _moved_m(thing: SceneObject, ground: Ground, seconds: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    """(..., 3) way of an object that keeps to the ground, after so many seconds (...)."""
+    (x, y, _), (vx, vy) = thing.centre_m, thing.velocity_m_s
+    dx, dy = np.multiply(vx, seconds), np.multiply(vy, seconds)
+    return np.stack([dx, dy, ground.height_m(x + dx, y + dy) - ground.height_m(x, y)], axis=-1)
 
 
 def _in_the_way(poses: NDArray[np.float64], plan: Plan) -> set[int]:

@@ -55,6 +55,10 @@ class Lidar:
         toward = np.broadcast_arrays(np.cos(azimuth) * flat, np.sin(azimuth) * flat, np.sin(rise))
         return np.stack(toward, axis=-1).reshape(-1, 3)
 
+    def firing_times(self, turn_s: float) -> NDArray[np.float64]:
+        """(firings,) seconds of each azimuth step, of a turn from behind to behind that looks ahead at 0."""
+        return np.linspace(-turn_s / 2, turn_s / 2, self.firings, endpoint=False)
+
     def rings(self) -> NDArray[np.int32]:
         """(firings * beams,) number of the beam of each direction, 0 the highest."""
         return np.tile(np.arange(len(self.elevations_deg), dtype=np.int32), self.firings)

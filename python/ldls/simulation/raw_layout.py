@@ -5,6 +5,7 @@ OUT/DATE/calib_imu_to_velo.txt                                 the IMU is in the
 OUT/DATE/DATE_drive_NNNN_sync/oxts/timestamps.txt              times of the poses: those of the sweeps
 OUT/DATE/DATE_drive_NNNN_sync/oxts/data/*.txt                  true poses, as latitude, longitude, altitude and angles
 OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/timestamps.txt   times of the sweeps
+OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/timestamps_start.txt, timestamps_end.txt  begin and end of turns, if any
 OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/data/*.bin       points
 OUT/DATE/DATE_drive_NNNN_sync/image_02/timestamps.txt          times of the images
 OUT/DATE/DATE_drive_NNNN_sync/image_02/data/*.png              images
@@ -16,7 +17,7 @@ NNNN is the seed; a day is that of the seed too, for its calibration is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -24,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.errors import ParameterError
 from ldls.io.poses.kitti_raw import EARTH_RADIUS_M
 from ldls.simulation.drives import PERIOD_S, Drive, drive_frame, drive_poses
 from ldls.simulation.kitti_layout import row_of, write_lines, write_masks, write_picture, write_points, write_truth
@@ -34,6 +36,7 @@ FIRST_DAY = np.datetime64("2026-01-01")
 FIRST_MOMENT = np.timedelta64(12, "h")
 LATITUDE, LONGITUDE = 49.0, 8.4
 """Degrees at which every drive begins."""
+BEGIN, END = "timestamps_start", "timestamps_end"
 MADE = "calib_time: 01-Jan-2026 12:00:00"
 
 
@@ -49,17 +52,22 @@ def write_drive(folder: str | PathLike[str], drive: Drive, *, processes: int = 1
     With more than one process, call it from a script's main part only, as Python starts processes anew.
 
     Raises:
-        ParameterError: `processes` is below 1.
+        ParameterError: `processes` is below 1, or the folder has frames of this drive that take their time where it
+            does not spin, or the other way round.
         ImportError: `ldls[sim]` is not installed.
     """
     path = drive_folder(folder, drive)
+    orders = [DriveFrameOrder(drive, number) for number in range(drive.n_frames)]
+    _check_turns(folder, path / "velodyne_points", orders, spinning=drive.spinning)
     _write_calibration(path.parent, drive)
     for number, pose in enumerate(drive_poses(drive)):
         write_lines(path / "oxts/data" / f"{number:010d}.txt", [_measured(drive, pose)])
-    delay_s = drive.sensors.delay_s
-    for sensor, later_s in (("velodyne_points", delay_s), ("oxts", delay_s), ("image_02", 0.0)):
-        write_lines(path / sensor / "timestamps.txt", [_stamp(drive, k, later_s) for k in range(drive.n_frames)])
-    orders = [DriveFrameOrder(drive, number) for number in range(drive.n_frames)]
+    delay_s, half_s = drive.sensors.delay_s, PERIOD_S / 2
+    stamps = {"velodyne_points/timestamps": delay_s, "oxts/timestamps": delay_s, "image_02/timestamps": 0.0}
+    if drive.spinning:
+        stamps |= {f"velodyne_points/{BEGIN}": delay_s - half_s, f"velodyne_points/{END}": delay_s + half_s}
+    for name, later_s in stamps.items():
+        write_lines(path / f"{name}.txt", [_stamp(drive, k, later_s) for k in range(drive.n_frames)])
     yield from make_frames(folder, orders, processes=processes)
 
 
@@ -93,6 +101,21 @@ class DriveFrameOrder:
         write_masks(path / "masks_02" / f"{self.name}.json", image.masks, self.number)
         write_truth(path / "annotations" / f"{self.name}.txt", frame)
         return frame
+
+
+def _check_turns(
+    folder: str | PathLike[str], sweeps: Path, orders: Sequence[DriveFrameOrder], *, spinning: bool
+) -> None:
+    """Refuse to go on with frames of the other kind; begin and end of turns tell."""
+    kept = any(order.is_whole(folder) for order in orders)
+    if kept and (sweeps / f"{BEGIN}.txt").exists() != spinning:
+        there = "sweeps of one instant" if spinning else "sweeps that take 0.1 s"
+        raise ParameterError(
+            f"spinning: got {spinning}, and {sweeps.parent} has {there}; delete it, or write to another folder"
+        )
+    if not spinning:
+        for name in (BEGIN, END):
+            (sweeps / f"{name}.txt").unlink(missing_ok=True)
 
 
 def _measured(drive: Drive, pose: NDArray[np.float64]) -> str:

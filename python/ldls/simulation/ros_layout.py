@@ -56,11 +56,13 @@ def write_robot_drive(
     seed: int = 0,
     segmenter: SegmenterErrors | None = None,
     compressed: bool = False,
+    spinning: bool = False,
 ) -> Path:
     """Write the bag of a robot's drive through a campus, and return its path.
 
-    The bag has /velodyne_points (x y z intensity ring time, as the VLP-16's driver has it), /camera/image_raw (or
-    /camera/image_raw/compressed), /camera/camera_info with a plumb_bob lens, /tf_static and /tf.
+    The bag has /velodyne_points (x y z intensity ring, as the VLP-16's driver has it, and its time where the lidar
+    spins), /camera/image_raw (or /camera/image_raw/compressed), /camera/camera_info with a plumb_bob lens, /tf_static
+    and /tf.
 
     Args:
         folder: Where to write; made if need be.
@@ -69,6 +71,8 @@ def write_robot_drive(
         seed: Seed of the scene and its noise.
         segmenter: Errors of the masks; by default the usual ones, but for wrong categories.
         compressed: PNG images rather than raw ones.
+        spinning: The lidar takes 0.1 s for a sweep while all moves, as in a `Drive`; /tf then has begin and end of
+            each turn too.
 
     Raises:
         ParameterError: There is no such kind, or `frames` is below 1.
@@ -86,8 +90,11 @@ def write_robot_drive(
         bag.add_topic(Topic(POINTS_TOPIC, POINTS, 0))
         bag.add_topic(Topic(image_topic, COMPRESSED_IMAGE if compressed else IMAGE, 0))
         bag.add_topic(Topic(INFO_TOPIC, CAMERA_INFO, 0))
-        bag.write_message("/tf_static", _static_transforms(bag.types), START_NS)
-        for number, frame in enumerate(robot_drive(frames, seed=seed, segmenter=segmenter)):
+        first_ns = _stamp_ns(-PERIOD_S / 2 if spinning else 0)
+        bag.write_message("/tf_static", _static_transforms(bag.types), first_ns)
+        if spinning:
+            _write_place(bag, -PERIOD_S / 2)
+        for number, frame in enumerate(robot_drive(frames, seed=seed, segmenter=segmenter, spinning=spinning)):
             _write_frame(bag, image_topic, frame)
             stamp = _stamp_ns(frame.stamp)
             write_masks(folder / "masks" / f"{stamp}.json", frame.images[0].masks, number)
@@ -106,31 +113,39 @@ def _write_frame(bag: BagWriter, image_topic: str, frame: SimulatedFrame) -> Non
     image = (_png if image_topic.endswith("compressed") else _image)(bag.types, view.read(), image_header)
     info = _camera_info(bag.types, image_header)
     cloud = encode(bag.types, _velodyne_columns(frame), Header(swept, LIDAR_FRAME))
-    way = np.eye(4)
-    way[0, 3] = ROBOT_SPEED_M_S * frame.stamp
-    moved = make(bag.types, TRANSFORMS, transforms=[_transform(bag.types, Header(swept, "odom"), "base_link", way)])
+    _write_place(bag, frame.stamp)
     for topic, message, stamp_ns in (
-        ("/tf", moved, swept),
         (POINTS_TOPIC, cloud, swept),
         (image_topic, image, taken),
         (INFO_TOPIC, info, taken),
     ):
         bag.write_message(topic, message, stamp_ns + LATENCY_NS)
+    if frame.times is not None:
+        _write_place(bag, frame.stamp + PERIOD_S / 2)
+
+
+def _write_place(bag: BagWriter, seconds: float) -> None:
+    """Where the robot is at a time."""
+    way, stamp_ns = np.eye(4), _stamp_ns(seconds)
+    way[0, 3] = ROBOT_SPEED_M_S * seconds
+    transforms = [_transform(bag.types, Header(stamp_ns, "odom"), "base_link", way)]
+    bag.write_message("/tf", make(bag.types, TRANSFORMS, transforms=transforms), stamp_ns + LATENCY_NS)
 
 
 def _velodyne_columns(frame: SimulatedFrame) -> dict[str, NDArray[Any]]:
-    """The fields of the VLP-16's driver: ring 0 is the lowest beam, intensity 0 to 255, time in seconds of the turn."""
+    """The fields of the VLP-16's driver: ring 0 is the lowest beam, intensity 0 to 255, time counts from the stamp."""
     x, y, z, intensity = frame.points.T
-    turned = (np.pi - np.arctan2(y, x)) / (2 * np.pi)
     beams = len(ROBOT.lidar.elevations_deg)
-    return {
+    columns: dict[str, NDArray[Any]] = {
         "x": x,
         "y": y,
         "z": z,
         "intensity": np.round(255 * intensity).astype(np.float32),
         "ring": (beams - 1 - frame.rings).astype(np.uint16),
-        "time": (PERIOD_S * turned).astype(np.float32),
     }
+    if frame.times is not None:
+        columns["time"] = frame.times.astype(np.float32)
+    return columns
 
 
 def _image(types: Any, pixels: NDArray[np.uint8], header: Any) -> Any:  # noqa: ANN401

@@ -1,13 +1,16 @@
-"""One turn of a lidar in a scene."""
+"""One turn of a lidar in a scene: at one instant, or while all moves."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.simulation.lidars import Lidar
+from ldls.simulation.motion import Motion
+from ldls.simulation.moving_caster import MovingCaster
 from ldls.simulation.raycasting import MISS, RayCaster
 from ldls.simulation.scenes import Scene
 from ldls.simulation.shapes.shape import Material
@@ -15,7 +18,12 @@ from ldls.simulation.shapes.shape import Material
 GLASS_PASSES = 0.9
 """Share of laser pulses that a window lets through."""
 MAX_WINDOWS = 6
+COUNTER_CLOCKWISE = np.array([1.0, -1.0, 1.0])
+"""Mirrors the directions of a turn, which are clockwise."""
 F64 = NDArray[np.float64]
+I64 = NDArray[np.int64]
+Cast = Callable[[I64, F64], tuple[F64, I64]]
+"""Range and triangle that pulses (r,) meet next, each after so many metres (r,) of its way; ranges count from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,32 +34,59 @@ class Sweep:
         points: (N, 4) float32 x, y, z in the lidar frame (metres) and intensity in [0, 1].
         instances: (N,) int32 object of each point, 0 for scenery.
         rings: (N,) int32 beam of each point, 0 the highest.
+        times: (N,) seconds since the stamp of the sweep, negative before it; None if all are of one instant.
     """
 
     points: NDArray[np.float32]
     instances: NDArray[np.int32]
     rings: NDArray[np.int32]
+    times: F64 | None = None
 
 
 def scan(scene: Scene, caster: RayCaster, lidar: Lidar, height_m: float, rng: np.random.Generator) -> Sweep:
-    """A sweep of `scene` from `height_m` above its origin."""
+    """A sweep of `scene` from `height_m` above its origin, at one instant."""
     directions = lidar.directions()
     origin = np.array([0.0, 0.0, height_m])
-    ranges, faces = _through_windows(scene, caster, origin, directions, rng)
+
+    def cast(pulses: I64, after_m: F64) -> tuple[F64, I64]:
+        return caster.first_hits(origin + directions[pulses] * after_m[:, None], directions[pulses])
+
+    ranges, faces = _through_windows(scene, cast, len(directions), rng)
     cosine = np.abs(np.einsum("ij,ij->i", caster.normals[faces], directions))
-    reflectance = _reflectance(scene)[faces]
-    kept = (faces != MISS) & _returned(lidar, ranges, cosine, reflectance, rng)
-    measured = _measured(lidar, ranges[kept], rng)
-    intensity = np.clip(reflectance[kept] * (0.35 + 0.65 * cosine[kept]) * rng.normal(1, 0.06, kept.sum()), 0, 1)
-    points = np.column_stack([directions[kept] * measured[:, None], np.round(intensity, 2)])
-    return Sweep(points.astype(np.float32), scene.face_objects[faces[kept]], lidar.rings()[kept])
+    return _measured(scene, lidar, directions, None, ranges, faces, cosine, rng)
 
 
-def _through_windows(
-    scene: Scene, caster: RayCaster, origin: F64, directions: F64, rng: np.random.Generator
-) -> tuple[F64, NDArray[np.int64]]:
-    """Range and triangle where each pulse ends: most pass a window and go on to what is behind it."""
-    ranges, faces = caster.first_hits(origin, directions)
+def scan_moving(scene: Scene, lidar: Lidar, height_m: float, motion: Motion, rng: np.random.Generator) -> Sweep:
+    """A sweep that takes the time of its turn, counter-clockwise seen from above, as KITTI's lidar turns.
+
+    Each point has the coordinates of the lidar at the time of its pulse.
+
+    Args:
+        scene: The scene at the stamp, as seen from the ground below the rig.
+        lidar: The lidar.
+        height_m: Its height above the ground, in metres.
+        motion: Where rig and objects are at each of the lidar's firings.
+        rng: Numbers of the noise.
+    """
+    directions = lidar.directions() * COUNTER_CLOCKWISE
+    firings = np.repeat(np.arange(lidar.firings), len(lidar.elevations_deg))
+    by_firing = directions.reshape(lidar.firings, -1, 3)
+    towards = (by_firing @ motion.rig[:, :3, :3].transpose(0, 2, 1)).reshape(-1, 3)
+    origins = (motion.rig @ [0.0, 0.0, height_m, 1.0])[:, :3]
+    caster = MovingCaster(scene, motion.ways_m)
+
+    def cast(pulses: I64, after_m: F64) -> tuple[F64, I64]:
+        begin = origins[firings[pulses]] + towards[pulses] * after_m[:, None]
+        return caster.first_hits(begin, towards[pulses], firings[pulses])
+
+    ranges, faces = _through_windows(scene, cast, len(directions), rng)
+    cosine = np.abs(np.einsum("ij,ij->i", caster.normals[faces], towards))
+    return _measured(scene, lidar, directions, motion.times[firings], ranges, faces, cosine, rng)
+
+
+def _through_windows(scene: Scene, cast: Cast, count: int, rng: np.random.Generator) -> tuple[F64, I64]:
+    """Range and triangle where each of `count` pulses ends: most pass a window and go on to what is behind it."""
+    ranges, faces = cast(np.arange(count), np.zeros(count))
     glass = scene.shape.materials == Material.GLASS
     going = np.flatnonzero((faces != MISS) & glass[faces])
     for _ in range(MAX_WINDOWS):
@@ -59,10 +94,34 @@ def _through_windows(
         if len(going) == 0:
             break
         start = ranges[going] + 1e-3
-        onward, faces[going] = caster.first_hits(origin + directions[going] * start[:, None], directions[going])
+        onward, faces[going] = cast(going, start)
         ranges[going] = start + onward
         going = going[(faces[going] != MISS) & glass[faces[going]]]
     return ranges, faces
+
+
+def _measured(
+    scene: Scene,
+    lidar: Lidar,
+    directions: F64,
+    times: F64 | None,
+    ranges: F64,
+    faces: I64,
+    cosine: F64,
+    rng: np.random.Generator,
+) -> Sweep:
+    """What a lidar reports of the triangles that its pulses meet, each at an angle of such a cosine."""
+    reflectance = _reflectance(scene)[faces]
+    kept = (faces != MISS) & _returned(lidar, ranges, cosine, reflectance, rng)
+    measured = _noisy(lidar, ranges[kept], rng)
+    intensity = np.clip(reflectance[kept] * (0.35 + 0.65 * cosine[kept]) * rng.normal(1, 0.06, kept.sum()), 0, 1)
+    points = np.column_stack([directions[kept] * measured[:, None], np.round(intensity, 2)])
+    return Sweep(
+        points=points.astype(np.float32),
+        instances=scene.face_objects[faces[kept]],
+        rings=lidar.rings()[kept],
+        times=None if times is None else times[kept],
+    )
 
 
 def _reflectance(scene: Scene) -> F64:
@@ -83,7 +142,7 @@ def _returned(lidar: Lidar, ranges: F64, cosine: F64, reflectance: F64, rng: np.
     return seen
 
 
-def _measured(lidar: Lidar, ranges: F64, rng: np.random.Generator) -> F64:
+def _noisy(lidar: Lidar, ranges: F64, rng: np.random.Generator) -> F64:
     noisy = ranges + rng.normal(0, 1, len(ranges)) * lidar.range_noise_m
     if lidar.range_step_m == 0:
         return noisy

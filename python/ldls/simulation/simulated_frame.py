@@ -12,10 +12,11 @@ from ldls.datasets.frame import CameraImage, Frame
 from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
+from ldls.simulation.motion import Motion
 from ldls.simulation.photograph import PixelTruth, photograph
 from ldls.simulation.raycasting import RayCaster
 from ldls.simulation.rigs import Rig, make_rig
-from ldls.simulation.scanning import scan
+from ldls.simulation.scanning import scan, scan_moving
 from ldls.simulation.scene_object import CLASS_NAMES, SceneObject
 from ldls.simulation.scenes import Scene, make_scene
 from ldls.simulation.segmenting import segmented, true_masks
@@ -29,7 +30,8 @@ class SimulatedImage(CameraImage):
 
     Attributes:
         stamp: Time at which it was taken, in seconds since the scene began.
-        true_camera: The calibration without error.
+        true_camera: The calibration without error; the way of the rig between sweep and image is in it where the rig
+            moves all the time.
         true_masks: Masks of every object that the image shows.
         pixels: The object of each pixel.
     """
@@ -54,6 +56,8 @@ class SimulatedFrame(Frame):
         truth: True labels of the points: KITTI's classes or COCO's, and the objects as instances.
         rings: (N,) int32 beam of each point, 0 the highest.
         objects: Objects with their boxes in the lidar frame, at the time of the sweep.
+        times: (N,) float64 seconds of each point since the stamp, negative before it; its coordinates are those of the
+            lidar at that time. None where all stands still during the sweep.
     """
 
     stamp: float
@@ -61,6 +65,7 @@ class SimulatedFrame(Frame):
     truth: Labeling
     rings: NDArray[np.int32]
     objects: tuple[SceneObject, ...]
+    times: NDArray[np.float64] | None = None
 
 
 def scene_frame(
@@ -110,8 +115,10 @@ def take_frame(
     drift: NDArray[np.float64],
     pose: NDArray[np.float64] | None = None,
     segmenter: SegmenterErrors | None = None,
+    moved: NDArray[np.float64] | None = None,
+    motion: Motion | None = None,
 ) -> SimulatedFrame:
-    """The frame that a rig at the scene's origin takes.
+    """The frame that a rig at the origin of the scenes takes.
 
     Args:
         photographed: The scene at the time of the images.
@@ -124,17 +131,26 @@ def take_frame(
         drift: (4, 4) error of the calibration, after the true transform.
         pose: (4, 4) T_world_lidar at the time of the sweep, in a drive.
         segmenter: Errors of the masks; `SegmenterErrors()` by default.
+        moved: (4, 4) transform from the lidar at the time of the sweep to the lidar at that of the images; by default
+            the rig stands still between them.
+        motion: Where rig and objects are at each firing of the lidar; by default all stands still during the sweep.
 
     Raises:
         ImportError: `ldls[sim]` is not installed.
     """
     camera_rays = RayCaster(photographed.shape)
-    pulses = camera_rays if scanned is photographed else RayCaster(scanned.shape)
-    sweep = scan(scanned, pulses, rig.lidar, rig.height_m, np.random.default_rng(sweep_noise))
+    rng = np.random.default_rng(sweep_noise)
+    if motion is None:
+        pulses = camera_rays if scanned is photographed else RayCaster(scanned.shape)
+        sweep = scan(scanned, pulses, rig.lidar, rig.height_m, rng)
+    else:
+        sweep = scan_moving(scanned, rig.lidar, rig.height_m, motion, rng)
     images = []
     for k, mounted in enumerate(rig.cameras):
         rgb, pixels = photograph(photographed, camera_rays, mounted, rig.height_m)
         true_camera = mounted.calibration()
+        if moved is not None:
+            true_camera = replace(true_camera, T_camera_lidar=true_camera.T_camera_lidar @ moved)
         image = SimulatedImage(
             name=f"image_ring_{k}" if k else "image_2",
             camera=replace(true_camera, T_camera_lidar=drift @ true_camera.T_camera_lidar),
@@ -155,4 +171,5 @@ def take_frame(
         truth=Labeling.from_instance_labels(sweep.instances, [CLASS_NAMES[o.category] for o in scanned.objects]),
         rings=sweep.rings,
         objects=tuple(o.below(rig.height_m) for o in scanned.objects),
+        times=sweep.times,
     )

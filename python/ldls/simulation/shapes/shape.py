@@ -61,6 +61,11 @@ class Shape:
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
         return replace(self, vertices_m=self.vertices_m @ turn.T)
 
+    def part(self, faces: NDArray[np.int64]) -> Shape:
+        """The triangles of these numbers, with no vertices but theirs."""
+        used, corners = np.unique(self.faces[faces], return_inverse=True)
+        return Shape(self.vertices_m[used], corners.reshape(-1, 3), self.colours[faces], self.materials[faces])
+
 
 def painted(
     vertices_m: ArrayLike, faces: ArrayLike, colour: Sequence[float], material: Material = Material.PLAIN
