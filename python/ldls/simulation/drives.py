@@ -209,7 +209,8 @@ def _robot_motion(scene: Scene, lidar: Lidar) -> Motion:
     rig = np.tile(np.eye(4), (len(times), 1, 1))
     rig[:, 0, 3] = ROBOT_SPEED_M_S * times
     ways = np.zeros((len(scene.objects), len(times), 3))
-    ways[:, :, :2] = [np.outer(times, thing.velocity_m_s) for thing in scene.objects]
+    velocities = np.array([thing.velocity_m_s for thing in scene.objects]).reshape(-1, 1, 2)
+    ways[:, :, :2] = velocities * times[:, None]
     return Motion(times, rig, ways)
 
 
