@@ -115,7 +115,7 @@ def simulate(
     With --layout kitti-raw the frames are a drive, ten a second, through the scene of the seed: folder
     DATE/DATE_drive_NNNN_sync with velodyne_points, image_02, masks_02, annotations and oxts (poses); the calibration
     is in DATE. With --spinning, points have the coordinates of the lidar at their own time, in which it turns
-    counter-clockwise from timestamps_start.txt to timestamps_end.txt of velodyne_points.
+    clockwise from timestamps_start.txt to timestamps_end.txt of velodyne_points.
 
     A seed is a frame, or a drive: the same one gives the same files. Frames that are there already are kept.
     Needs the extra `sim` of ldls.

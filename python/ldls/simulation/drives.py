@@ -48,7 +48,7 @@ ROBOT_IMAGE_DELAY_S = 0.012
 class Drive:
     """A car's drive: what would come too near to the rig is taken away before.
 
-    The rig keeps its height above the ground. It stands still between an image and its sweep, unless the lidar spins.
+    The rig keeps its height above the ground, and stands still between an image and the stamp of its sweep.
 
     Attributes:
         n_frames: Number of frames.
@@ -59,8 +59,8 @@ class Drive:
         segmenter: Errors of the masks.
         sensors: Errors of calibration and clocks, the same in all frames.
         turn_deg_s: Degrees a second by which the rig turns to the left all the way, -90 to 90.
-        spinning: The lidar takes 0.1 s for a sweep, and rig and objects move all the time. It turns counter-clockwise
-            seen from above, from behind to behind, as KITTI's does, and looks ahead at the stamp of the sweep.
+        spinning: The lidar takes 0.1 s for a sweep, while rig and objects move. It turns clockwise seen from above,
+            from behind to behind, as KITTI's does, and looks ahead at the stamp of the sweep.
 
     Raises:
         ParameterError: There is no frame, the rig turns too fast, or the camera is a ring.
@@ -111,13 +111,10 @@ def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
     taken, seed = number * PERIOD_S, 1000 * drive.seed + number
     swept = taken + drive.sensors.delay_s
     world, pose = build(plan), poses[number]
-    photographed, moved, motion = _from_the_rig(world, plan.ground, taken, pose), None, None
+    photographed, motion = _from_the_rig(world, plan.ground, taken, pose), None
     scanned = photographed.after(drive.sensors.delay_s)
     if drive.spinning:
-        (before,) = _poses(drive, plan.ground, np.array([taken - drive.sensors.delay_s]))
-        photographed = _from_the_rig(world, plan.ground, taken, before)
         scanned = _from_the_rig(world, plan.ground, swept, pose)
-        moved = inverse(before) @ pose
         motion = _motion(drive, world, plan.ground, number)
     return take_frame(
         photographed,
@@ -130,7 +127,6 @@ def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
         drift=drive.sensors.drift(drive.seed),
         pose=pose,
         segmenter=drive.segmenter,
-        moved=moved,
         motion=motion,
     )
 
@@ -194,6 +190,7 @@ def robot_drive(
             pose=from_parts(np.eye(3), np.array([ROBOT_SPEED_M_S * swept, 0, 0])),
             segmenter=ROBOT_SEGMENTER if segmenter is None else segmenter,
             motion=_robot_motion(scene, rig.lidar) if spinning else None,
+            moved=False,
         )
 
 

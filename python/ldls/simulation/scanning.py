@@ -18,8 +18,6 @@ from ldls.simulation.shapes.shape import Material
 GLASS_PASSES = 0.9
 """Share of laser pulses that a window lets through."""
 MAX_WINDOWS = 6
-COUNTER_CLOCKWISE = np.array([1.0, -1.0, 1.0])
-"""Mirrors the directions of a turn, which are clockwise."""
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 Cast = Callable[[I64, F64], tuple[F64, I64]]
@@ -57,7 +55,7 @@ def scan(scene: Scene, caster: RayCaster, lidar: Lidar, height_m: float, rng: np
 
 
 def scan_moving(scene: Scene, lidar: Lidar, height_m: float, motion: Motion, rng: np.random.Generator) -> Sweep:
-    """A sweep that takes the time of its turn, counter-clockwise seen from above, as KITTI's lidar turns.
+    """A sweep that takes the time of its turn.
 
     Each point has the coordinates of the lidar at the time of its pulse.
 
@@ -68,7 +66,7 @@ def scan_moving(scene: Scene, lidar: Lidar, height_m: float, motion: Motion, rng
         motion: Where rig and objects are at each of the lidar's firings.
         rng: Numbers of the noise.
     """
-    directions = lidar.directions() * COUNTER_CLOCKWISE
+    directions = lidar.directions()
     firings = np.repeat(np.arange(lidar.firings), len(lidar.elevations_deg))
     by_firing = directions.reshape(lidar.firings, -1, 3)
     towards = (by_firing @ motion.rig[:, :3, :3].transpose(0, 2, 1)).reshape(-1, 3)

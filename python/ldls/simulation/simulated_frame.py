@@ -30,8 +30,7 @@ class SimulatedImage(CameraImage):
 
     Attributes:
         stamp: Time at which it was taken, in seconds since the scene began.
-        true_camera: The calibration without error; the way of the rig between sweep and image is in it where the rig
-            moves all the time.
+        true_camera: The calibration without error.
         true_masks: Masks of every object that the image shows.
         pixels: The object of each pixel.
     """
@@ -56,8 +55,6 @@ class SimulatedFrame(Frame):
         truth: True labels of the points: KITTI's classes or COCO's, and the objects as instances.
         rings: (N,) int32 beam of each point, 0 the highest.
         objects: Objects with their boxes in the lidar frame, at the time of the sweep.
-        times: (N,) float64 seconds of each point since the stamp, negative before it; its coordinates are those of the
-            lidar at that time. None where all stands still during the sweep.
     """
 
     stamp: float
@@ -65,7 +62,6 @@ class SimulatedFrame(Frame):
     truth: Labeling
     rings: NDArray[np.int32]
     objects: tuple[SceneObject, ...]
-    times: NDArray[np.float64] | None = None
 
 
 def scene_frame(
@@ -115,7 +111,7 @@ def take_frame(
     drift: NDArray[np.float64],
     pose: NDArray[np.float64] | None = None,
     segmenter: SegmenterErrors | None = None,
-    moved: NDArray[np.float64] | None = None,
+    moved: bool = True,
     motion: Motion | None = None,
 ) -> SimulatedFrame:
     """The frame that a rig at the origin of the scenes takes.
@@ -131,8 +127,8 @@ def take_frame(
         drift: (4, 4) error of the calibration, after the true transform.
         pose: (4, 4) T_world_lidar at the time of the sweep, in a drive.
         segmenter: Errors of the masks; `SegmenterErrors()` by default.
-        moved: (4, 4) transform from the lidar at the time of the sweep to the lidar at that of the images; by default
-            the rig stands still between them.
+        moved: Whether calibrations hold from the lidar at the time of the sweep to the camera at that of the images, as
+            they do where the rig stands still between them.
         motion: Where rig and objects are at each firing of the lidar; by default all stands still during the sweep.
 
     Raises:
@@ -149,8 +145,6 @@ def take_frame(
     for k, mounted in enumerate(rig.cameras):
         rgb, pixels = photograph(photographed, camera_rays, mounted, rig.height_m)
         true_camera = mounted.calibration()
-        if moved is not None:
-            true_camera = replace(true_camera, T_camera_lidar=true_camera.T_camera_lidar @ moved)
         image = SimulatedImage(
             name=f"image_ring_{k}" if k else "image_2",
             camera=replace(true_camera, T_camera_lidar=drift @ true_camera.T_camera_lidar),
@@ -158,6 +152,7 @@ def take_frame(
             stamp=stamps[0],
             masks=segmented(pixels, errors=segmenter, seed=mask_seed + 7919 * k),
             true_camera=true_camera,
+            moved=moved,
             true_masks=true_masks(pixels),
             pixels=pixels,
         )
