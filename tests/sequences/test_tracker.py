@@ -7,6 +7,7 @@ import pytest
 
 import ldls
 from conftest import pinhole
+from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
 WIDE = pinhole(100.0, (320.0, 240.0), T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -123,6 +124,39 @@ def test_sweeps_without_objects_change_nothing():
     assert result.instances == ()
 
 
+@pytest.mark.parametrize("together", [1, 2, 5])
+def test_an_overlooked_object_has_its_label_of_the_nearest_moment(together):
+    """One stands and one walks towards something that never has a mask; in the end some images have none at all."""
+    shown = [k < ENOUGH_IMAGES or k % 3 == 2 for k in range(ENOUGH_IMAGES + 8)]
+    sweeps = [
+        sweep_at(0.1 * k, [((6, -2), seen), ((7, -0.5 + 0.12 * k), seen), ((7, 3.2), False)])
+        for k, seen in enumerate(shown)
+    ]
+    tracker, results = ldls.Tracker(), []
+    for start in range(0, len(sweeps), together):
+        some = sweeps[start : start + together]
+        results += tracker.track(some, ldls.segment_sweeps(some, params=PARAMS))
+    for seen, result in zip(shown, results, strict=True):
+        assert all(instance.label == at for at, instance in enumerate(result.instances, start=1))
+        numbers = np.array([0, *(instance.track for instance in result.instances)])
+        of_standing, of_walking, of_rest = numbers[np.maximum(result.labels, 0)].reshape(-1, 125)
+        assert np.mean(of_standing == 1) > 0.7 and set(of_standing) <= {0, 1}
+        assert np.mean(of_walking == 2) > 0.7 and set(of_walking) <= {0, 2}
+        assert np.mean(of_rest == 0) > 0.9
+        if not seen and together == 1:
+            assert np.all(result.confidence[result.labels > 0] == np.float32(CONFIDENCE))
+            assert [thing.n_points > 100 for thing in result.objects] == [True, True]
+
+
+def test_what_few_images_showed_or_none_for_long_has_no_label_where_it_has_no_mask():
+    place, gone = [((6, 0), True)], [((6, 0), False)]
+    often, seldom = ([sweep_at(0.1 * k, place) for k in range(count)] for count in (ENOUGH_IMAGES, ENOUGH_IMAGES - 1))
+    soon, late = (0.1 * (ENOUGH_IMAGES - 1) + after for after in (FARTHEST_S - 0.05, FARTHEST_S + 0.05))
+    assert tracks_of(ldls.Tracker(), [*often, sweep_at(soon, gone)])[-1] == [1]
+    assert tracks_of(ldls.Tracker(), [*often, sweep_at(late, gone)])[-1] == [0]
+    assert tracks_of(ldls.Tracker(), [*seldom, sweep_at(soon, gone)])[-1] == [0]
+
+
 def test_memory_is_that_of_the_last_seconds():
     tracker = ldls.Tracker()
     for k in range(30):
@@ -150,7 +184,7 @@ def test_misuse_is_named():
     sweep = sweep_at(0.5, [((6, 0), True)])
     results = ldls.segment_sweeps([sweep], params=PARAMS)
     tracker = ldls.Tracker()
-    with pytest.raises(ldls.InputError, match="got 0, expected 1"):
+    with pytest.raises(ldls.InputError, match="got 0 for 1 sweeps"):
         tracker.track([sweep], [])
     tracker.track([sweep], results)
     with pytest.raises(ldls.InputError, match=r"one of 0\.5 s comes after one of 0\.5 s"):

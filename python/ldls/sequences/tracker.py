@@ -2,22 +2,23 @@
 
 Seen from above, an object goes on as itself where its points lie near those of a track, moved to the moment by its
 velocity, which is constant over some seconds. Pairs are chosen together (linear assignment), so that neighbours do not
-swap. Within sweeps that were segmented together an object keeps its label, and so its number.
+swap. Within sweeps that were segmented together an object keeps its label, and so its number. Sweeps whose images
+overlook an object have its label too (propagation.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
+from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, Floats, Ints, Moment, overlooked
 from ldls.sequences.sweeps import Sweep
 
 LONGEST_GAP_S = 5.0
@@ -28,27 +29,37 @@ MEMORY_S = 2.0
 """Time over which a velocity is constant."""
 SLOWEST_M_S = 0.5
 """What is slower stands still: the middle of what is visible of it moves."""
+FASTEST_M_S = 60.0
+"""What is faster is not one object at all times."""
 MOST_POINTS = 256
-"""Floats that stand for an object; of more, some."""
-
-Floats = NDArray[np.float64]
+"""Points that stand for an object; of more, some."""
 
 
 @dataclass(eq=False)
 class _Track:
-    """What is known of an object: its number, and where it was, in metres seen from above."""
+    """What is known of an object.
+
+    Attributes:
+        number: Its number.
+        instance: As what it was seen last.
+        points: Where, in metres seen from above.
+        n_images: Sweeps of which an image had a mask of it.
+        middles: Its places over the last seconds.
+    """
 
     number: int
-    category: int
+    instance: Instance
     points: Floats
+    n_images: int = 0
     middles: list[tuple[float, Floats]] = field(default_factory=list)
 
     @property
     def stamp(self) -> float:
         return self.middles[-1][0]
 
-    def advance(self, stamp: float, points: Floats) -> None:
-        self.points = points
+    def advance(self, stamp: float, instance: Instance, points: Floats) -> None:
+        self.instance, self.points = instance, points
+        self.n_images += bool(instance.sources)
         self.middles = [(then, middle) for then, middle in self.middles if stamp - then <= MEMORY_S]
         self.middles.append((stamp, np.median(points, axis=0)))
 
@@ -60,7 +71,11 @@ class _Track:
         if spread == 0:
             return np.zeros(2)
         slope: Floats = since @ np.array([middle for _, middle in self.middles]) / spread
-        return slope if np.linalg.norm(slope) >= SLOWEST_M_S else np.zeros(2)
+        return slope if SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
+
+    def as_instance(self, instance: Instance) -> Instance:
+        x, y = self.velocity().tolist()
+        return replace(instance, track=self.number, velocity=(x, y))
 
     def at(self, stamp: float) -> Floats:
         return self.points + self.velocity() * (stamp - self.stamp)
@@ -86,6 +101,7 @@ class Tracker:
         self._assign = require("scipy.optimize", "eval").linear_sum_assignment
         self._tree = require("scipy.spatial", "eval").KDTree
         self._tracks: list[_Track] = []
+        self._moments: list[Moment] = []
         self._count = 0
         self._stamp = -np.inf
 
@@ -100,28 +116,49 @@ class Tracker:
         Raises:
             InputError: There is not one result a sweep, or a sweep is not later than the one before it.
         """
-        if len(sweeps) != len(results):
-            raise InputError(f"results: got {len(results)}, expected {len(sweeps)}, one a sweep")
+        if len(sweeps) != len(results) or not sweeps:
+            raise InputError(f"results: got {len(results)} for {len(sweeps)} sweeps, expected one a sweep")
         for before, stamp in pairwise([self._stamp, *(sweep.stamp for sweep in sweeps)]):
             if not stamp > before:
                 raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
+        if len({len(result.instances) for result in results}) > 1:
+            raise InputError("results: their instances differ, expected those of one call of segment_sweeps")
         by_label: dict[int, _Track] = {}
         for sweep, result in zip(sweeps, results, strict=True):
             self._stamp = sweep.stamp
             self._follow(sweep, result, by_label)
-        known = {label: (track.number, track.velocity().tolist()) for label, track in by_label.items()}
+        numbers = {label: track.number for label, track in by_label.items()}
+        moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
+        self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
+        velocities = {track.number: track.velocity() for track in self._tracks if track.n_images >= ENOUGH_IMAGES}
+        found = [overlooked(moment, self._moments, velocities) for moment in moments]
+        of_number = {number: label for label, number in numbers.items()}
+        added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
+        tracked = []
+        for result, moment, rows in zip(results, moments, found, strict=True):
+            own = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
+            tracked.append(replace(_completed(result, moment, rows, of_number), instances=(*own, *added)))
+        return tuple(tracked)
 
-        def tracked(instance: Instance) -> Instance:
-            number, (x, y) = known.get(instance.label, (0, (0.0, 0.0)))
-            return replace(instance, track=number, velocity=(x, y))
+    def _added(self, found: Ints, of_number: dict[int, int], known: int) -> list[Instance]:
+        """Instances after the `known` ones, for what was `found` of objects that have no label among these.
 
-        return tuple(replace(result, instances=tuple(map(tracked, result.instances))) for result in results)
+        Their labels are added to `of_number`, the label of each track.
+        """
+        tracks = {track.number: track for track in self._tracks}
+        added: list[Instance] = []
+        for number in found.tolist():
+            if number and number not in of_number:
+                of_number[number] = known + len(added) + 1
+                track = tracks[number]
+                added.append(track.as_instance(replace(track.instance, label=of_number[number], sources=())))
+        return added
 
     def _follow(self, sweep: Sweep, result: Segmentation, by_label: dict[int, _Track]) -> None:
         """Take the tracks one sweep further; `by_label` has those of the labels that are known."""
         self._tracks = [track for track in self._tracks if sweep.stamp - track.stamp <= LONGEST_GAP_S]
         objects = _objects(sweep, result)
-        categories = {instance.label: instance.category for instance in result.instances}
+        instances = {instance.label: instance for instance in result.instances}
         new = [label for label in objects if label not in by_label]
         taken = {id(by_label[label]) for label in objects if label in by_label}
         free = [track for track in self._tracks if id(track) not in taken]
@@ -129,7 +166,7 @@ class Tracker:
         costs = np.full((len(new), len(free)), np.inf)
         for i, label in enumerate(new):
             for j, (track, place) in enumerate(zip(free, places, strict=True)):
-                if categories[label] == track.category:
+                if instances[label].category == track.instance.category:
                     costs[i, j] = self._apart(objects[label], place)
         # what cannot be is dearer than all that can be together
         dearest = NEAR_M * (len(new) + 1)
@@ -140,9 +177,9 @@ class Tracker:
         for label, points in objects.items():
             if label not in by_label:
                 self._count += 1
-                by_label[label] = _Track(self._count, categories[label], points)
+                by_label[label] = _Track(self._count, instances[label], points)
             track = by_label[label]
-            track.advance(sweep.stamp, points)
+            track.advance(sweep.stamp, instances[label], points)
             if track not in self._tracks:
                 self._tracks.append(track)
 
@@ -160,6 +197,17 @@ class Tracker:
             return float("inf")
         middle = np.linalg.norm(np.median(one, axis=0) - np.median(other, axis=0))
         return float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
+
+
+def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Mapping[int, int]) -> Segmentation:
+    """The result with the labels of what was `found` at its moment."""
+    new = np.flatnonzero(found)
+    if not len(new):
+        return result
+    labels, confidence, rows = result.labels.copy(), result.confidence.copy(), moment.rows[new]
+    labels[rows] = [of_number[number] for number in found[new].tolist()]
+    confidence[rows] = CONFIDENCE
+    return replace(result, labels=labels, confidence=confidence)
 
 
 def _objects(sweep: Sweep, result: Segmentation) -> dict[int, Floats]:
