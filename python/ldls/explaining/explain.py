@@ -35,12 +35,18 @@ def explain(result: Segmentation, point: int) -> Explanation:
     Raises:
         ParameterError: `point` is no row of the cloud.
         InputError: The result is not of these points: its labels are of another number; or it was labelled together
-            with other sweeps, whose points it does not hold.
+            with other sweeps, whose points it does not hold; or the point has the label of another sweep, by a tracker.
         ImportError: The extra `eval` is not installed.
     """
     point = _checked_row(point, len(result.points))
     if len(result.labels) != len(result.points):
         raise InputError(f"result: {len(result.labels)} labels, expected one for each of {len(result.points)} points")
+    label, diffused = int(result.labels[point]), int(result.diffused_labels[point])
+    if label > 0 and label != diffused:
+        raise InputError(
+            f"point: {point} has label {label} from another sweep, by the tracker, and not from its graph; explain the "
+            "result before it was tracked"
+        )
     x, y, z = result.points[point, :3].astype(np.float64).tolist()
     seen: dict[str, Any] = {"sights": sights_of(result, point, None)}
     row = int(np.searchsorted(result.in_view, point))
@@ -49,10 +55,10 @@ def explain(result: Segmentation, point: int) -> Explanation:
     return Explanation(
         point=point,
         xyz=(x, y, z),
-        label=int(result.labels[point]),
+        label=label,
         confidence=float(result.confidence[point]),
         abstain=result.params.abstain,
-        diffused_label=int(result.diffused_labels[point]),
+        diffused_label=diffused,
         names={-1: "out of view", 0: "background", **{each.label: each.name for each in result.instances}},
         **seen,
     )

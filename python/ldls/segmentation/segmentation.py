@@ -55,7 +55,7 @@ class Segmentation:
     Attributes:
         labels: (N,) int32: -1 out of view, 0 background, m instance m, which is `instances[m - 1]`, and with one camera
             and one sweep `masks[m - 1]`.
-        diffused_labels: (N,) int32: the same before outlier removal.
+        diffused_labels: (N,) int32: the same before outlier removal, and before a tracker.
         confidence: (N,) float32 in [0, 1]: probability that the label is of the right class, or, where the parameters
             are not `calibrated`, likelihood of the diffused label over the sum of all; 0 out of view.
         in_view: (n,) int64: indices of the points that any camera sees, ascending.

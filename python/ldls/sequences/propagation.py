@@ -16,11 +16,14 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.segmentation import Segmentation
 from ldls.sequences.sweeps import Sweep
+from ldls.sequences.track import Floats, Track
 
 FARTHEST_S = 1.2
 """Time over which labels go on."""
-ENOUGH_IMAGES = 12
-"""Images that must have shown an object, or what they do not show is rather not there."""
+ENOUGH_IMAGES = 10
+"""Images that must have shown an object, or what others do not show is rather not there."""
+FEW_IMAGES = 3
+"""The same where the images show nothing at all, and so do not say that it is not there."""
 NEAR_M = 0.8
 """Distance up to which a point takes the label of one of another moment: lines of a lidar are as far apart."""
 BELOW_M = 0.03
@@ -30,7 +33,6 @@ WHOLE = 0.8
 CONFIDENCE = 0.85
 """Share of the points labelled in this way whose label is right, on drives with a fifth of the masks left out."""
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
@@ -44,6 +46,7 @@ class Moment:
         tracks: (n,) number of the object of each point; 0 of none.
         rows: (n,) row of each in the points of its sweep.
         counts: Points of each object.
+        blind: True if no image shows anything.
     """
 
     stamp: float
@@ -51,6 +54,7 @@ class Moment:
     tracks: Ints
     rows: Ints
     counts: Mapping[int, int]
+    blind: bool
 
     @classmethod
     def of(cls, sweep: Sweep, result: Segmentation, numbers: Mapping[int, int]) -> Self:
@@ -62,7 +66,8 @@ class Moment:
         of_label[list(numbers)] = list(numbers.values())
         tracks = of_label[np.maximum(result.labels[rows], 0)]
         each, counts = np.unique(tracks[tracks > 0], return_counts=True)
-        return cls(sweep.stamp, xyz[order], tracks, rows, dict(zip(each.tolist(), counts.tolist(), strict=True)))
+        blind = not any(instance.sources for instance in result.instances)
+        return cls(sweep.stamp, xyz[order], tracks, rows, dict(zip(each.tolist(), counts.tolist(), strict=True)), blind)
 
     def within(self, low: Floats, high: Floats) -> Ints:
         """Indices of the points in a box."""
@@ -72,7 +77,7 @@ class Moment:
         return inside
 
 
-def overlooked(moment: Moment, moments: Sequence[Moment], velocities: Mapping[int, Floats]) -> Ints:
+def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track]) -> Ints:
     """(n,) number of an object for each point of a moment that has none and must be of one; 0 for all others.
 
     A point is of an object if the nearest point of the moment that shows it, which moves with it, is nearer than all
@@ -81,18 +86,21 @@ def overlooked(moment: Moment, moments: Sequence[Moment], velocities: Mapping[in
     Args:
         moment: The moment.
         moments: Those that are known, itself among them.
-        velocities: Metres a second along x and y of each object that may be overlooked, by its number.
+        tracks: The objects that are known.
     """
     found = np.zeros(len(moment.points), np.int64)
     distances = np.full(len(moment.points), np.inf)
-    for number, velocity in velocities.items():
+    for track in tracks:
+        if track.n_images < (FEW_IMAGES if moment.blind else ENOUGH_IMAGES):
+            continue
+        number = track.number
         shown = [each for each in moments if each is not moment and number in each.counts]
         there = min(shown, key=lambda each: abs(each.stamp - moment.stamp), default=None)
         if there is None or abs(there.stamp - moment.stamp) > FARTHEST_S:
             continue
         if moment.counts.get(number, 0) >= WHOLE * there.counts[number]:
             continue
-        way = np.array([*velocity, 0.0]) * (moment.stamp - there.stamp)
+        way = np.array([*track.velocity(), 0.0]) * (moment.stamp - there.stamp)
         own = there.points[there.tracks == number] + way
         low, high = own.min(axis=0) - (NEAR_M, NEAR_M, BELOW_M), own.max(axis=0) + NEAR_M
         free = moment.within(low, high)

@@ -9,7 +9,7 @@ overlook an object have its label too (propagation.py).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,67 +18,16 @@ from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
-from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, Floats, Ints, Moment, overlooked
+from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, Ints, Moment, overlooked
 from ldls.sequences.sweeps import Sweep
+from ldls.sequences.track import Floats, Track
 
 LONGEST_GAP_S = 5.0
 """Time without a point after which a track ends."""
 NEAR_M = 2.0
 """Distance from above up to which an object may be a track."""
-MEMORY_S = 2.0
-"""Time over which a velocity is constant."""
-SLOWEST_M_S = 0.5
-"""What is slower stands still: the middle of what is visible of it moves."""
-FASTEST_M_S = 60.0
-"""What is faster is not one object at all times."""
 MOST_POINTS = 256
 """Points that stand for an object; of more, some."""
-
-
-@dataclass(eq=False)
-class _Track:
-    """What is known of an object.
-
-    Attributes:
-        number: Its number.
-        instance: As what it was seen last.
-        points: Where, in metres seen from above.
-        n_images: Sweeps of which an image had a mask of it.
-        middles: Its places over the last seconds.
-    """
-
-    number: int
-    instance: Instance
-    points: Floats
-    n_images: int = 0
-    middles: list[tuple[float, Floats]] = field(default_factory=list)
-
-    @property
-    def stamp(self) -> float:
-        return self.middles[-1][0]
-
-    def advance(self, stamp: float, instance: Instance, points: Floats) -> None:
-        self.instance, self.points = instance, points
-        self.n_images += bool(instance.sources)
-        self.middles = [(then, middle) for then, middle in self.middles if stamp - then <= MEMORY_S]
-        self.middles.append((stamp, np.median(points, axis=0)))
-
-    def velocity(self) -> Floats:
-        """Metres a second: the slope of a line through its places."""
-        stamps = np.array([stamp for stamp, _ in self.middles])
-        since = stamps - stamps.mean()
-        spread = float(since @ since)
-        if spread == 0:
-            return np.zeros(2)
-        slope: Floats = since @ np.array([middle for _, middle in self.middles]) / spread
-        return slope if SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
-
-    def as_instance(self, instance: Instance) -> Instance:
-        x, y = self.velocity().tolist()
-        return replace(instance, track=self.number, velocity=(x, y))
-
-    def at(self, stamp: float) -> Floats:
-        return self.points + self.velocity() * (stamp - self.stamp)
 
 
 class Tracker:
@@ -100,7 +49,7 @@ class Tracker:
         """
         self._assign = require("scipy.optimize", "eval").linear_sum_assignment
         self._tree = require("scipy.spatial", "eval").KDTree
-        self._tracks: list[_Track] = []
+        self._tracks: list[Track] = []
         self._moments: list[Moment] = []
         self._count = 0
         self._stamp = -np.inf
@@ -109,12 +58,17 @@ class Tracker:
     def track(self, sweeps: Sequence[Sweep], results: Sequence[Segmentation]) -> tuple[Segmentation, ...]:
         """Return the results with track and velocity of each instance that has points in any of the sweeps.
 
+        An object that images overlook has points where it was, or went by its velocity, within 1.2 s of a sweep that
+        shows it: if ten images did before, or three where the images of the sweep show nothing at all. Confidence there
+        is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances.
+
         Args:
             sweeps: The next sweeps of the drive, in the order of their stamps.
             results: What `segment_sweeps` says of them together.
 
         Raises:
-            InputError: There is not one result a sweep, or a sweep is not later than the one before it.
+            InputError: There is no sweep, or not one result a sweep; a sweep is not later than the one before it, or
+                results are not of one call of `segment_sweeps`.
         """
         if len(sweeps) != len(results) or not sweeps:
             raise InputError(f"results: got {len(results)} for {len(sweeps)} sweeps, expected one a sweep")
@@ -123,15 +77,14 @@ class Tracker:
                 raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
         if len({len(result.instances) for result in results}) > 1:
             raise InputError("results: their instances differ, expected those of one call of segment_sweeps")
-        by_label: dict[int, _Track] = {}
+        by_label: dict[int, Track] = {}
         for sweep, result in zip(sweeps, results, strict=True):
             self._stamp = sweep.stamp
             self._follow(sweep, result, by_label)
         numbers = {label: track.number for label, track in by_label.items()}
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
         self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
-        velocities = {track.number: track.velocity() for track in self._tracks if track.n_images >= ENOUGH_IMAGES}
-        found = [overlooked(moment, self._moments, velocities) for moment in moments]
+        found = [overlooked(moment, self._moments, self._tracks) for moment in moments]
         of_number = {number: label for label, number in numbers.items()}
         added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
         tracked = []
@@ -154,7 +107,7 @@ class Tracker:
                 added.append(track.as_instance(replace(track.instance, label=of_number[number], sources=())))
         return added
 
-    def _follow(self, sweep: Sweep, result: Segmentation, by_label: dict[int, _Track]) -> None:
+    def _follow(self, sweep: Sweep, result: Segmentation, by_label: dict[int, Track]) -> None:
         """Take the tracks one sweep further; `by_label` has those of the labels that are known."""
         self._tracks = [track for track in self._tracks if sweep.stamp - track.stamp <= LONGEST_GAP_S]
         objects = _objects(sweep, result)
@@ -177,7 +130,7 @@ class Tracker:
         for label, points in objects.items():
             if label not in by_label:
                 self._count += 1
-                by_label[label] = _Track(self._count, instances[label], points)
+                by_label[label] = Track(self._count, instances[label], points)
             track = by_label[label]
             track.advance(sweep.stamp, instances[label], points)
             if track not in self._tracks:
