@@ -71,7 +71,5 @@ def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evalua
 
 def _labeling(result: ldls.Segmentation) -> Labeling:
     """Labels with tracks for instances; truth says which points count."""
-    labels = np.maximum(result.labels, 0)
-    named = Labeling.from_instance_labels(labels, [instance.name for instance in result.instances])
-    tracks = np.array([0, *(instance.track for instance in result.instances)], np.int32)
-    return Labeling(named.classes, tracks[labels], named.ignored, named.names)
+    names = [instance.name for instance in result.instances]
+    return Labeling.from_instance_labels(np.maximum(result.labels, 0), names, instance_ids=result.instance_ids[1:])
