@@ -77,6 +77,10 @@ def test_poses_lie_between_the_messages(tmp_path, kind, world):
     for number, frame in enumerate(pickle.loads(pickle.dumps(bag))):
         expected = [[0, -1, 0, number + 0.25], [1, 0, 0, 0], [0, 0, 1, 1], [0, 0, 0, 1]]
         np.testing.assert_allclose(frame.pose, expected, atol=1e-6)
+        # 10 m/s along the world's x, which is to the right of the lidar
+        motion = frame.trajectory.motion(frame.stamp + 0.01, frame.stamp)
+        np.testing.assert_allclose(motion[:3, 3], [0, -1e7 / STEP_NS, 0], atol=1e-5)
+        np.testing.assert_allclose(frame.trajectory.at(frame.stamp), frame.pose, atol=1e-6)
 
 
 def test_without_a_world_nothing_has_a_pose(tmp_path):
