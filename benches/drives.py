@@ -47,7 +47,7 @@ def _sweeps(folder: Path) -> Iterator[tuple[ldls.Sweep, Labeling]]:
 
 
 def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evaluation, TrackingScores, float]:
-    """Scores of windows of so many sweeps, those of tracks over all drives, and seconds a sweep."""
+    """Scores of windows of so many sweeps before tracking, those of tracks over all drives, and seconds a sweep."""
     params, seconds, n_sweeps, pairs = ldls.Params(threads=threads), 0.0, 0, []
     classes = ClassSet.kitti(CLASSES)
     tracking = TrackingScores(CLASSES)
@@ -59,10 +59,11 @@ def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evalua
             start = time.perf_counter()
             results = ldls.segment_sweeps(sweeps, params=params)
             seconds += time.perf_counter() - start
-            for at, (result, (_, truth)) in enumerate(zip(tracker.track(sweeps, results), window, strict=True)):
-                own.append(Pair(f"{number} {first + at}", _labeling(result), truth))
+            tracked = tracker.track(sweeps, results)
+            for at, (result, numbered, (_, truth)) in enumerate(zip(results, tracked, window, strict=True)):
+                pairs.append(Pair(f"{number} {first + at}", _labeling(result), truth))
+                own.append(Pair(f"{number} {first + at}", _labeling(numbered), truth))
         n_sweeps += len(drive)
-        pairs += own
         of_drive = evaluate(own, classes=classes, track=True).tracking
         assert of_drive is not None
         tracking.merge(of_drive)
@@ -70,6 +71,6 @@ def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evalua
 
 
 def _labeling(result: ldls.Segmentation) -> Labeling:
-    """Labels with tracks for instances; truth says which points count."""
+    """Labels, with tracks for instances where there are some; truth says which points count."""
     names = [instance.name for instance in result.instances]
     return Labeling.from_instance_labels(np.maximum(result.labels, 0), names, instance_ids=result.instance_ids[1:])
