@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         save as save,
         save_objects as save_objects,
     )
-    from ldls.label_diffusion import LabelDiffusion as LabelDiffusion, segment as segment
+    from ldls.label_diffusion import segment as segment
     from ldls.masks import InstanceMasks as InstanceMasks
     from ldls.params import Params as Params
     from ldls.segmentation import (
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         SegmentedObject as SegmentedObject,
     )
     from ldls.sequences import (  # type: ignore[no-redef]
+        LabelDiffusion as LabelDiffusion,
         LabelledMap as LabelledMap,
         Sweep as Sweep,
         Tracker as Tracker,
@@ -96,11 +97,11 @@ _NAMES = {
         "save",
         "save_objects",
     ),
-    "ldls.label_diffusion": ("LabelDiffusion", "segment"),
+    "ldls.label_diffusion": ("segment",),
     "ldls.masks": ("InstanceMasks",),
     "ldls.params": ("Params",),
     "ldls.segmentation": ("Instance", "OrientedBox", "Report", "Segmentation", "SegmentedObject"),
-    "ldls.sequences": ("LabelledMap", "Sweep", "Tracker", "Trajectory", "odometry", "segment_sweeps"),
+    "ldls.sequences": ("LabelDiffusion", "LabelledMap", "Sweep", "Tracker", "Trajectory", "odometry", "segment_sweeps"),
     "ldls.view": ("SeenView", "View"),
 }
 """The public names, by the module that they come from."""

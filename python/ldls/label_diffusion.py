@@ -1,4 +1,4 @@
-"""Segment a cloud, or the clouds of a stream."""
+"""Segment a cloud."""
 
 from __future__ import annotations
 
@@ -76,67 +76,10 @@ def segment(
         InputError: `points`, `masks` or `camera` cannot be used; see its subclasses.
         LimitError: The cloud has more points than the graph can index.
     """
-    return _segment(points, _views(masks, camera), params or Params(), nonfinite, keep_origin, same_object)
+    return segment_views(points, _views(masks, camera), params or Params(), nonfinite, keep_origin, same_object)
 
 
-class LabelDiffusion:
-    """Segments the frames of a stream: what one camera, or a ring of them, and one lidar yield, frame after frame.
-
-    Does what `segment` does, with cameras and parameters that are checked once. Several threads may call at a time.
-
-    Attributes:
-        camera: The camera that takes the images, or several.
-        params: Parameters of the method.
-
-    Examples:
-        >>> diffusion = ldls.LabelDiffusion(camera)  # doctest: +SKIP
-        >>> for points, masks in stream:  # doctest: +SKIP
-        ...     labels = diffusion.segment(points, masks).labels
-    """
-
-    @checked
-    def __init__(self, camera: Camera | Sequence[Camera] = (), params: Params | None = None) -> None:
-        """Prepare for the images of a camera or of several; the parameters are the best known by default.
-
-        Without a camera, each frame brings its own: `segment(points, [View(masks, camera), ...])`.
-
-        Raises:
-            InputError: `camera` or `params` is of another type.
-        """
-        cameras = tuple(camera) if isinstance(camera, Sequence) else (camera,)
-        self.camera = camera
-        self._cameras = cameras
-        self.params = params or Params()
-
-    @checked
-    def segment(
-        self,
-        points: ArrayLike,
-        masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View],
-        *,
-        nonfinite: Literal["drop", "raise"] = "drop",
-        keep_origin: bool = False,
-        same_object: float = SAME_OBJECT,
-    ) -> Segmentation:
-        """Segment the next frame: points, and masks for each camera, or views.
-
-        Options, result and errors are those of `ldls.segment`.
-        """
-        views = self._views(masks) if self._cameras else _views(masks, None)
-        return _segment(points, views, self.params, nonfinite, keep_origin, same_object)
-
-    def _views(self, masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View]) -> tuple[View, ...]:
-        each = (masks,) if isinstance(masks, InstanceMasks) else tuple(masks)
-        if len(each) != len(self._cameras):
-            raise InputError(f"masks: got those of {len(each)} images, expected {len(self._cameras)}, one a camera")
-        # a View refuses what is no InstanceMasks
-        return tuple(View(own, camera) for own, camera in zip(each, self._cameras, strict=True))  # type: ignore[arg-type]
-
-    def __repr__(self) -> str:
-        return f"LabelDiffusion({self.camera!r}, {self.params!r})"
-
-
-def _views(masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View], camera: Camera | None) -> tuple[View, ...]:
+def _views(masks: InstanceMasks | Sequence[View], camera: Camera | None) -> tuple[View, ...]:
     if not isinstance(masks, InstanceMasks):
         if camera is not None:
             raise InputError("camera: expected None beside views, which have cameras of their own")
@@ -148,7 +91,7 @@ def _views(masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View], came
     return (View(masks, camera),)  # type: ignore[arg-type]
 
 
-def _segment(
+def segment_views(
     points: ArrayLike,
     views: tuple[View, ...],
     params: Params,
@@ -156,6 +99,7 @@ def _segment(
     keep_origin: bool,
     same_object: float,
 ) -> Segmentation:
+    """What `segment` does with its arguments as views; warnings name the line that called its caller."""
     cloud = as_points(points)
     if nonfinite == "raise":
         check_finite(cloud)

@@ -9,7 +9,7 @@ from batch import runs
 from datasets import layouts
 from ldls import batch
 from ldls.errors import BatchError, ChangedFileWarning, UnsafePathError
-from ldls.label_diffusion import LabelDiffusion
+from ldls.sequences import LabelDiffusion
 
 ALL = ("npz", "label", "ply", "png", "pcd", "csv", "kitti-boxes", "lidarseg", "panoptic")
 

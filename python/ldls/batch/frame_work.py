@@ -18,11 +18,11 @@ from ldls.datasets.stored_masks import StoredMasks, fill, own_masks
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_result
 from ldls.io.objects import FrameObjects
-from ldls.label_diffusion import LabelDiffusion, nothing_in_view
+from ldls.label_diffusion import nothing_in_view
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
-from ldls.sequences import Sweep, segment_sweeps
+from ldls.sequences import LabelDiffusion, Sweep, segment_sweeps
 from ldls.view import View
 from ldls.viewing.formats import PICTURE, RESULT, file_name, file_names, write_formats, written_formats
 

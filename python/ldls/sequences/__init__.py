@@ -2,8 +2,9 @@
 
 from ldls.sequences.labelled_map import LabelledMap
 from ldls.sequences.odometry import odometry
+from ldls.sequences.stream import LabelDiffusion
 from ldls.sequences.sweeps import Sweep, segment_sweeps
 from ldls.sequences.tracker import Tracker
 from ldls.sequences.trajectory import Trajectory
 
-__all__ = ["LabelledMap", "Sweep", "Tracker", "Trajectory", "odometry", "segment_sweeps"]
+__all__ = ["LabelDiffusion", "LabelledMap", "Sweep", "Tracker", "Trajectory", "odometry", "segment_sweeps"]

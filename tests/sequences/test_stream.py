@@ -1,0 +1,76 @@
+"""Streams of sweeps of a drive."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ldls
+from ldls.simulation import Drive, drive_frame
+
+PARAMS = replace(ldls.Params(), threads=1)
+
+
+@pytest.fixture(scope="module")
+def frames():
+    drive = Drive(n_frames=5, seed=5, lidar="vlp-16")
+    return [drive_frame(drive, number) for number in range(5)]
+
+
+def sweep_of(frame):
+    return ldls.Sweep(frame.points, [ldls.View(i.masks, i.camera) for i in frame.images], frame.pose, frame.stamp)
+
+
+@pytest.mark.parametrize("before", [0, 2, 4])
+def test_a_stream_of_a_drive_labels_each_sweep_with_those_before_it(frames, before):
+    camera = frames[0].images[0].camera
+    with_camera, without = (
+        ldls.LabelDiffusion(camera, PARAMS, before=before),
+        ldls.LabelDiffusion((), PARAMS, before=before),
+    )
+    tracker, sweeps = ldls.Tracker(), []
+    for frame in frames:
+        sweeps.append(sweep_of(frame))
+        latest = ldls.segment_sweeps(sweeps[-1 - before :], params=PARAMS)[-1]
+        (expected,) = tracker.track(sweeps[-1:], [latest])
+        place = {"pose": frame.pose, "stamp": frame.stamp}
+        for found in (
+            with_camera.segment(frame.points, frame.images[0].masks, **place),
+            without.segment(frame.points, sweeps[-1].views, **place | {"pose": frame.pose.tolist()}),
+        ):
+            np.testing.assert_array_equal(found.labels, expected.labels)
+            assert found.instances == expected.instances and any(i.track for i in found.instances)
+            assert found.report.n_sweeps == min(len(sweeps), before + 1)
+
+
+def test_a_frame_without_pose_is_none_of_the_drive(frames):
+    one, two, _, _, _ = frames
+    stream = ldls.LabelDiffusion(one.images[0].camera, PARAMS)
+    first = stream.segment(one.points, one.images[0].masks, pose=one.pose, stamp=one.stamp)
+    alone = stream.segment(two.points, two.images[0].masks)
+    expected = ldls.segment(two.points, two.images[0].masks, two.images[0].camera, params=PARAMS)
+    np.testing.assert_array_equal(alone.labels, expected.labels)
+    assert first.report.n_sweeps == alone.report.n_sweeps == 1 and not any(i.track for i in alone.instances)
+
+
+def test_misuse_is_named_and_forgotten(frames):
+    one, two, _, _, _ = frames
+    (image,) = one.images
+    stream = ldls.LabelDiffusion(image.camera, PARAMS)
+    with pytest.raises(ldls.InputError, match="stamp: got None beside a pose"):
+        stream.segment(one.points, image.masks, pose=one.pose)
+    with pytest.raises(ldls.InputError, match="pose: got None beside a stamp"):
+        stream.segment(one.points, image.masks, stamp=0.0)
+    with pytest.raises(ldls.CalibrationError, match="pose"):
+        stream.segment(one.points, image.masks, pose=2 * np.eye(4), stamp=0.0)
+    with pytest.raises(ldls.ParameterError, match="before: got -1, expected 0 to 50"):
+        ldls.LabelDiffusion(before=-1)
+    with pytest.raises(
+        ldls.InputError, match="got InstanceMasks, expected a list of View, for the stream has no camera"
+    ):
+        ldls.LabelDiffusion().segment(one.points, image.masks)
+    stream.segment(one.points, image.masks, pose=one.pose, stamp=one.stamp)
+    with pytest.raises(ldls.InputError, match="comes after one of"):
+        stream.segment(one.points, image.masks, pose=one.pose, stamp=one.stamp)
+    latest = stream.segment(two.points, two.images[0].masks, pose=two.pose, stamp=two.stamp)
+    assert latest.report.n_sweeps == 2
