@@ -116,7 +116,7 @@ def test_without_masks_frames_are_shown_as_they_are(drive):
 def test_results_of_a_run_are_shown_and_nothing_is_segmented(drive, monkeypatch):
     command = ["run", drive, "--masks", drive / "masks_02", "--out", "results", "--formats", "npz", "--frames", "0:2"]
     assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
-    monkeypatch.setattr("ldls.label_diffusion._segment", None)
+    monkeypatch.setattr("ldls.label_diffusion.diffuse_labels", None)
     done = run(drive, "--results", "results", "--frames", "0:2", "--rerun", "a.rrd")
     assert done.exit_code == 0, done.output
     name = ldls.datasets.open_source(drive).names[1]
