@@ -23,6 +23,7 @@ import numpy as np
 import rosbags.rosbag1
 import rosbags.rosbag2
 import rosbags.serde.utils
+import rosbags.typesys.store
 from PIL import Image
 from rosbags.highlevel import anyreader
 
@@ -349,7 +350,15 @@ def fill(made, types, serialized):
             made.write(topics[topic], 1000 + number, serialized(messages(types)[topic], topic))
 
 
-# the library reads and compiles the types of messages again with every bag; kept, bags are read ten times as fast
+@functools.lru_cache(maxsize=100)
+def classes_of(source):
+    names = {"__name__": "rosbags.usertypes"}
+    exec(source, names)
+    return names
+
+
+# the library makes the classes of messages again for every bag; kept, bags are read several times as fast
+rosbags.typesys.store.exec = lambda source, names: names.update(classes_of(source))
 rosbags.serde.utils.exec = lambda source, names: exec(compiled(source), names)
 compiled = functools.cache(lambda source: compile(source, "<types of messages>", "exec"))
 anyreader.get_types_from_msg = functools.lru_cache(maxsize=100)(anyreader.get_types_from_msg)
@@ -518,10 +527,8 @@ def sam(_):
     return [[json.dumps(kept).encode()], [json.dumps({"image": {}, "annotations": kept}).encode()]]
 
 
-def cityscapes(_):
-    file = io.BytesIO()
-    Image.fromarray(np.array([[0, 26001], [7, 24002]], np.uint16)).save(file, "PNG")
-    return [[file.getvalue()]]
+INSTANCE_IDS = Image.fromarray(np.array([[0, 26001], [7, 24002]], np.uint16))
+"""As Cityscapes has them: 1000 times the class and the number of the instance."""
 
 
 def panoptic_masks(_):
@@ -793,7 +800,9 @@ PARSERS: dict[str, Parser] = {
     ),
     "masks SAM": Parser(("a.json",), sam, ldls.read_masks, text=True, gentle=0.5),
     "masks YOLO": Parser(("a.txt",), texts(YOLO), lambda path: ldls.read_masks(path, image_size=(60, 80)), text=True),
-    "masks Cityscapes": Parser(("a_instanceIds.png",), cityscapes, ldls.read_masks, gentle=0.4),
+    "masks Cityscapes": Parser(
+        ("a_instanceIds.png",), png_parts(INSTANCE_IDS.save), ldls.read_masks, packed_png, gentle=0.4
+    ),
     "camera OpenCV XML": Parser(("a.xml",), texts(XML), read_camera(T_camera_lidar=T_CAMERA_LIDAR), text=True),
     "extrinsic": Parser(("a.json",), texts(EXTRINSIC, EXTRINSIC_JSON), as_extrinsic, text=True),
     "masks .npz": Parser(

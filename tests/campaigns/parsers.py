@@ -67,6 +67,7 @@ def parsed():
 def show(name, seed, number):
     """Read one input in this process; whatever is wrong with it is seen."""
     content = Inputs(name, seed)[number]
+    be_strict()
     with tempfile.TemporaryDirectory() as folder:
         path = PARSERS[name].place(Path(folder), content)
         print(f"{path}: {len(content)} bytes: {content[:2000]!r}")
@@ -94,20 +95,19 @@ class Worker:
 
     def work(self):
         """Read the inputs from the one that is next, in the process of its own."""
+        be_strict()
         with Path(os.devnull).open("wb") as nowhere:
             os.dup2(nowhere.fileno(), 2)  # where panics of libraries print
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("error", RuntimeWarning)  # NumPy's, of numbers that nobody has looked at
         resource.setrlimit(resource.RLIMIT_AS, (address_space() + SPARE_BYTES, resource.RLIM_INFINITY))
         for at in range(self.at.value, len(self.numbers)):
             # what it takes to make an input is not the parser's
             made = self.inputs[self.numbers[at]]
-            before = peak_bytes(anew=True)
+            before, peak_before = resident_bytes(), peak_bytes()
             self.at.value, self.since.value = at, time.monotonic()
             kind = self.inputs.parser.outcome(self.folder, made)
             if time.monotonic() - self.since.value > SLOW_S:
                 kind = "slow"
-            if peak_bytes() - before > FAT_BYTES:
+            if peak_bytes() > max(peak_before, before + FAT_BYTES):
                 kind = "fat"
             if kind in self.read:
                 self.read[kind].value += 1
@@ -150,17 +150,28 @@ class Worker:
         self.kept.cleanup()
 
 
-def peak_bytes(anew=False):
-    """The most memory that this process had; `anew` begins with what it has now."""
-    if anew:
-        Path("/proc/self/clear_refs").write_text("5")
-    (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM")]
-    return int(line.split()[1]) * 1024
+def be_strict():
+    """Warnings of NumPy, of numbers that nobody has looked at, are errors; no other warning is shown."""
+    warnings.simplefilter("ignore")
+    warnings.simplefilter("error", RuntimeWarning)
+
+
+def peak_bytes():
+    """The most memory that this process ever had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def resident_bytes():
+    return pages()[1] * resource.getpagesize()
 
 
 def address_space():
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    return pages * resource.getpagesize()
+    return pages()[0] * resource.getpagesize()
+
+
+def pages():
+    """Pages of this process: of its address space, those in memory, and more."""
+    return [int(word) for word in Path("/proc/self/statm").read_text().split()]
 
 
 def campaign(name, options):

@@ -133,3 +133,8 @@ def test_bits_that_are_no_number_make_no_warning(tmp_path):
     values = np.full(20, 0x7FA00000, "<u4")  # a signalling NaN
     (tmp_path / "sweep.bin").write_bytes(values.tobytes())
     assert np.isnan(ldls.read_points(tmp_path / "sweep.bin")).all()
+    values = np.column_stack([sweep(98, 4), np.full((98, 2), 1e9, "<f4")])
+    values.view("<u4")[7, 0] = 0x7FA00000
+    values.tofile(tmp_path / "sweep.bin")
+    with pytest.raises(ldls.FileFormatError, match="points lie farther"):
+        ldls.read_points(tmp_path / "sweep.bin")

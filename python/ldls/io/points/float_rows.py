@@ -94,7 +94,8 @@ def _likeliest(values: NDArray[np.float32]) -> int | None:
 
 def _step_m(values: NDArray[np.float32], columns: int) -> float:
     """Median distance from one point to the next in metres; those of a lidar lie along its scan lines."""
-    steps = np.diff(values.reshape(-1, columns)[:, :3].astype(np.float64), axis=0)
+    with np.errstate(invalid="ignore"):  # NaNs that signal
+        steps = np.diff(values.reshape(-1, columns)[:, :3].astype(np.float64), axis=0)
     distances = np.linalg.norm(steps, axis=1)
     return float(np.nanmedian(distances)) if np.isfinite(distances).any() else 0.0
 
