@@ -18,7 +18,7 @@ class Step:
 
     Attributes:
         pose: (4, 4) the one.
-        shift: (3,) from its place to that of the other.
+        shift: (3,) from its place to that of the other, in metres.
         axis: (3,) of the turn, in coordinates of the one; zeros for none.
         half_turn: Half of the angle, in radians.
     """

@@ -26,9 +26,9 @@ class Track:
     Attributes:
         number: Its number.
         instance: As what it was seen last.
-        points: Where, in metres seen from above.
+        points: (n, 2) where it was seen last: x y of its points in the world, in metres.
         n_images: Sweeps of which an image had a mask of it.
-        middles: Its places over the last seconds.
+        middles: Its places over the last seconds: stamp in seconds and (2,) median of its points, in metres.
     """
 
     number: int
@@ -65,5 +65,5 @@ class Track:
         return replace(instance, track=self.number, velocity=(x, y))
 
     def at(self, stamp: float) -> Floats:
-        """Where its points are at a moment."""
+        """(n, 2) where its points are at a moment, in metres."""
         return self.points + self.velocity() * (stamp - self.stamp)
