@@ -80,12 +80,12 @@ def test_motion_within_sweeps_whose_points_have_times_is_taken_out():
     metres, degrees = {}, {}
     for times in (True, False):
         found = ldls.odometry(sweep if times else sweep[:2] for sweep in sweeps).poses
-        metres[times] = np.linalg.norm(found[:, :3, 3] - true[:, :3, 3], axis=1).max()
+        metres[times] = np.linalg.norm(found[:, :3, 3] - true[:, :3, 3], axis=1).mean()
         turns = Rotation.from_matrix(true[:, :3, :3].transpose(0, 2, 1) @ found[:, :3, :3])
-        degrees[times] = np.degrees(turns.magnitude()).max()
-    assert metres[True] < 0.03 and degrees[True] < 0.05
+        degrees[times] = np.degrees(turns.magnitude()).mean()
+    assert metres[True] < 0.02 and degrees[True] < 0.02
     # what does not undo it finds poses that are off
-    assert metres[False] > 2 * metres[True] and degrees[False] > 1.5 * degrees[True]
+    assert metres[False] > 1.3 * metres[True] and degrees[False] > 3 * degrees[True]
 
 
 def street(seed=0):

