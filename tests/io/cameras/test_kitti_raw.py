@@ -70,6 +70,12 @@ def test_it_is_the_camera_of_the_object_file(write, data_folder):
         pytest.param(LIDAR, CAMERAS.replace("R_rect_00: 1", "R_rect_00: nan"), "line 3: expected finite", id="NaN"),
         pytest.param(LIDAR, CAMERAS.replace("3.75e+02", "0.5"), "S_rect: expected width and height", id="size"),
         pytest.param(LIDAR, CAMERAS.replace("R_rect_00: 1", "R_rect_00: 2"), "deviates", id="no rotation"),
+        pytest.param(
+            LIDAR.replace("T: 0.1", "T: 1e10"),
+            CAMERAS.replace("R_rect_00: 1", "R_rect_00: 1e300"),
+            r"T_camera_lidar\[0, 3\] is inf",
+            id="beyond float64",
+        ),
     ],
 )
 def test_faults_are_named(write, lidar, cameras, message):

@@ -53,8 +53,13 @@ def read(path: str | PathLike[str], *, camera: int = 2, image_size: tuple[int, i
 def _rectified(path: Path, matrices: Matrices) -> NDArray[np.float64]:
     """(4, 4) from lidar to rectified camera coordinates."""
     velo_to_cam = _homogeneous(_get_matrix(path, matrices, "Tr_velo_to_cam", OBJECT_ARCHIVE).reshape(3, 4))
-    rectification = _homogeneous(_get_matrix(path, matrices, "R0_rect", OBJECT_ARCHIVE).reshape(3, 3))
-    return rectification @ velo_to_cam
+    return _turned(_get_matrix(path, matrices, "R0_rect", OBJECT_ARCHIVE), velo_to_cam)
+
+
+def _turned(rotation: NDArray[np.float64], transform: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(4, 4) a transform followed by a rotation, of nine numbers."""
+    with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is then not finite
+        return _homogeneous(rotation.reshape(3, 3)) @ transform
 
 
 def read_raw(folder: str | PathLike[str], *, camera: int = 2) -> Camera:
@@ -79,7 +84,7 @@ def read_raw(folder: str | PathLike[str], *, camera: int = 2) -> Camera:
     with within(folder):
         return Camera(
             projection=projection.reshape(3, 4),
-            T_camera_lidar=_homogeneous(rectification.reshape(3, 3)) @ to_camera,
+            T_camera_lidar=_turned(rectification, to_camera),
             image_size=size,
         )
 
