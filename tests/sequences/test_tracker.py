@@ -84,6 +84,18 @@ def test_velocities_are_those_of_the_world():
     assert walking == pytest.approx((0, speed), abs=0.1)
 
 
+def test_what_stands_has_no_velocity_though_more_of_it_is_seen_in_each_sweep():
+    """The side of a lorry, as it comes out from behind a house: the middle of what is visible of it moves."""
+    tracker = ldls.Tracker()
+    for k in range(20):
+        sweep = sweep_at(0.1 * k, [((8, -2 + 0.2 * part), True) for part in range(k + 1)])
+        mask = ldls.InstanceMasks.from_array(sweep.views[0].masks.to_array().any(axis=0)[None], categories=[1])
+        sweep = replace(sweep, views=[ldls.View(mask, WIDE)])
+        (result,) = tracker.track([sweep], ldls.segment_sweeps([sweep], params=PARAMS))
+        assert (result.labels == 1).mean() > 0.9
+        assert result.instances[0].track == 1 and result.instances[0].velocity == (0, 0)
+
+
 def test_a_turn_of_the_lidar_moves_no_object():
     places = [((6, -1.5), True), ((6.5, 1.5), True)]
     sweeps = []

@@ -100,7 +100,7 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
             continue
         if moment.counts.get(number, 0) >= WHOLE * there.counts[number]:
             continue
-        way = np.array([*track.velocity(), 0.0]) * (moment.stamp - there.stamp)
+        way = np.array([*track.velocity, 0.0]) * (moment.stamp - there.stamp)
         own = there.points[there.tracks == number] + way
         low, high = own.min(axis=0) - (NEAR_M, NEAR_M, BELOW_M), own.max(axis=0) + NEAR_M
         free = moment.within(low, high)

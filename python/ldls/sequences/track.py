@@ -1,8 +1,10 @@
-"""What is known of an object of a drive, and where it is at a moment: it goes on by a constant velocity."""
+"""What is known of an object of a drive, and where it is at a moment: it goes on by a constant velocity, or stands."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +14,28 @@ from ldls.segmentation import Instance
 MEMORY_S = 2.0
 """Time over which a velocity is constant."""
 SLOWEST_M_S = 0.5
-"""What is slower stands still: the middle of what is visible of it moves."""
+"""What is slower stands still."""
 FASTEST_M_S = 60.0
 """What is faster is not one object at all times."""
+MOVES = 0.5
+"""Share of the distance between the points of two moments that a motion may leave: the middle of what is visible of a
+standing object moves too, but its points stay where they are."""
 
 Floats = NDArray[np.float64]
+
+
+class Sighting(NamedTuple):
+    """The points of an object at a moment.
+
+    Attributes:
+        stamp: When, in seconds.
+        points: (n, 2) x y in the world, in metres.
+        shown: Whether an image has a mask of it.
+    """
+
+    stamp: float
+    points: Floats
+    shown: bool
 
 
 @dataclass(eq=False)
@@ -26,44 +45,58 @@ class Track:
     Attributes:
         number: Its number.
         instance: As what it was seen last.
-        points: (n, 2) where it was seen last: x y of its points in the world, in metres.
         n_images: Sweeps of which an image had a mask of it.
-        middles: Its places over the last seconds: stamp in seconds and (2,) median of its points, in metres.
+        sightings: Those of the last two seconds in which it was seen.
+        velocity: (2,) x y in the world, in metres a second; zeros where it stands.
     """
 
     number: int
     instance: Instance
-    points: Floats
     n_images: int = 0
-    middles: list[tuple[float, Floats]] = field(default_factory=list)
+    sightings: list[Sighting] = field(default_factory=list)
+    velocity: Floats = field(default_factory=lambda: np.zeros(2))
 
     @property
     def stamp(self) -> float:
         """When it was seen last, in seconds."""
-        return self.middles[-1][0]
+        return self.sightings[-1].stamp
 
-    def advance(self, stamp: float, instance: Instance, points: Floats) -> None:
-        """Note that it was seen."""
-        self.instance, self.points = instance, points
-        self.n_images += bool(instance.sources)
-        self.middles = [(then, middle) for then, middle in self.middles if stamp - then <= MEMORY_S]
-        self.middles.append((stamp, np.median(points, axis=0)))
-
-    def velocity(self) -> Floats:
-        """(2,) metres a second: the slope of a line through its places."""
-        stamps = np.array([stamp for stamp, _ in self.middles])
-        since = stamps - stamps.mean()
-        spread = float(since @ since)
-        if spread == 0:
-            return np.zeros(2)
-        slope: Floats = since @ np.array([middle for _, middle in self.middles]) / spread
-        return slope if SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
+    def advance(self, instance: Instance, sightings: Sequence[Sighting]) -> None:
+        """Note that it was seen again."""
+        self.instance = instance
+        self.n_images += sum(each.shown for each in sightings)
+        first = sightings[-1].stamp - MEMORY_S
+        self.sightings = [each for each in (*self.sightings, *sightings) if each.stamp >= first]
+        self.velocity = _velocity(self.sightings)
 
     def as_instance(self, instance: Instance) -> Instance:
         """The instance with number and velocity."""
-        x, y = self.velocity().tolist()
+        x, y = self.velocity.tolist()
         return replace(instance, track=self.number, velocity=(x, y))
 
     def at(self, stamp: float) -> Floats:
-        """(n, 2) where its points are at a moment, in metres."""
-        return self.points + self.velocity() * (stamp - self.stamp)
+        """(n, 2) where the points of all its sightings are at a moment, in metres."""
+        return np.concatenate([points + self.velocity * (stamp - then) for then, points, _ in self.sightings])
+
+
+def _velocity(sightings: Sequence[Sighting]) -> Floats:
+    """The slope of a line through the middles, if the first points, moved so, lie on the last; zeros otherwise."""
+    stamps = np.array([each.stamp for each in sightings])
+    since = stamps - stamps.mean()
+    spread = float(since @ since)
+    if spread == 0:
+        return np.zeros(2)
+    slope: Floats = since @ np.array([np.median(each.points, axis=0) for each in sightings]) / spread
+    first, last = sightings[0], sightings[-1]
+    way = slope * (last.stamp - first.stamp)
+    moves = _apart(first.points + way, last.points) < MOVES * _apart(first.points, last.points)
+    return slope if moves and SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
+
+
+def _apart(one: Floats, other: Floats) -> float:
+    """Mean distance in metres of the points of one to the nearest of the other.
+
+    It is the less of both ways: of a standing object more may be visible at one of the moments.
+    """
+    distances = np.linalg.norm(one[:, None] - other, axis=2)
+    return float(min(distances.min(axis=0).mean(), distances.min(axis=1).mean()))

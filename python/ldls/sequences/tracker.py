@@ -1,13 +1,14 @@
 """The objects of a drive: one number for each in all sweeps, through gaps of some seconds.
 
-Seen from above, an object goes on as itself where its points lie near those of a track, moved to the moment by its
-velocity, which is constant over some seconds. Pairs are chosen together (linear assignment), so that neighbours do not
-swap. Within sweeps that were segmented together an object keeps its label, and so its number. Sweeps whose images
-overlook an object have its label too (propagation.py).
+Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds,
+moved to the moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
+Within sweeps that were segmented together an object keeps its label, and so its number. Sweeps whose images overlook an
+object have its label too (propagation.py).
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -20,14 +21,14 @@ from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, Ints, Moment, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import Floats, Track
+from ldls.sequences.track import Floats, Sighting, Track
 
 LONGEST_GAP_S = 5.0
 """Time without a point after which a track ends."""
 NEAR_M = 2.0
 """Distance from above up to which an object may be a track."""
-MOST_POINTS = 256
-"""Points that stand for an object; of more, some."""
+MOST_POINTS = 48
+"""Points that stand for an object in a sweep; of more, some."""
 
 
 class Tracker:
@@ -77,10 +78,12 @@ class Tracker:
                 raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
         if len({len(result.instances) for result in results}) > 1:
             raise InputError("results: their instances differ, expected those of one call of segment_sweeps")
-        by_label: dict[int, Track] = {}
-        for sweep, result in zip(sweeps, results, strict=True):
-            self._stamp = sweep.stamp
-            self._follow(sweep, result, by_label)
+        self._stamp = sweeps[-1].stamp
+        instances = {instance.label: instance for instance in results[0].instances}
+        sightings = _sightings(sweeps, results)
+        by_label = self._matched(instances, sightings, sweeps[0].stamp)
+        for label, track in by_label.items():
+            track.advance(instances[label], sightings[label])
         numbers = {label: track.number for label, track in by_label.items()}
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
         self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
@@ -107,34 +110,32 @@ class Tracker:
                 added.append(track.as_instance(replace(track.instance, label=of_number[number], sources=())))
         return added
 
-    def _follow(self, sweep: Sweep, result: Segmentation, by_label: dict[int, Track]) -> None:
-        """Take the tracks one sweep further; `by_label` has those of the labels that are known."""
-        self._tracks = [track for track in self._tracks if sweep.stamp - track.stamp <= LONGEST_GAP_S]
-        objects = _objects(sweep, result)
-        instances = {instance.label: instance for instance in result.instances}
-        new = [label for label in objects if label not in by_label]
-        taken = {id(by_label[label]) for label in objects if label in by_label}
-        free = [track for track in self._tracks if id(track) not in taken]
-        places = [track.at(sweep.stamp) for track in free]
-        costs = np.full((len(new), len(free)), np.inf)
-        for i, label in enumerate(new):
-            for j, (track, place) in enumerate(zip(free, places, strict=True)):
+    def _matched(
+        self, instances: Mapping[int, Instance], sightings: Mapping[int, Sequence[Sighting]], stamp: float
+    ) -> dict[int, Track]:
+        """The track of each label that has points in sweeps from `stamp` on: a known one, or a new one."""
+        self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
+        labels = list(sightings)
+        costs = np.full((len(labels), len(self._tracks)), np.inf)
+        for i, label in enumerate(labels):
+            first = sightings[label][0]
+            for j, track in enumerate(self._tracks):
                 if instances[label].category == track.instance.category:
-                    costs[i, j] = self._apart(objects[label], place)
+                    costs[i, j] = self._apart(first.points, track.at(first.stamp))
         # what cannot be is dearer than all that can be together
-        dearest = NEAR_M * (len(new) + 1)
+        dearest = NEAR_M * (len(labels) + 1)
         rows, columns = self._assign(np.where(np.isfinite(costs), costs, dearest))
-        for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
-            if np.isfinite(costs[i, j]):
-                by_label[new[i]] = free[j]
-        for label, points in objects.items():
-            if label not in by_label:
-                self._count += 1
-                by_label[label] = Track(self._count, instances[label], points)
-            track = by_label[label]
-            track.advance(sweep.stamp, instances[label], points)
-            if track not in self._tracks:
-                self._tracks.append(track)
+        known = {
+            labels[i]: self._tracks[j]
+            for i, j in zip(rows.tolist(), columns.tolist(), strict=True)
+            if np.isfinite(costs[i, j])
+        }
+        return {label: known.get(label) or self._begin(instances[label]) for label in labels}
+
+    def _begin(self, instance: Instance) -> Track:
+        self._count += 1
+        self._tracks.append(Track(self._count, instance))
+        return self._tracks[-1]
 
     def _apart(self, one: Floats, other: Floats) -> float:
         """How far apart objects are in metres, infinite beyond `NEAR_M`.
@@ -163,14 +164,16 @@ def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Map
     return replace(result, labels=labels, confidence=confidence)
 
 
-def _objects(sweep: Sweep, result: Segmentation) -> dict[int, Floats]:
-    """The points of each label that has some, in the world, seen from above."""
-    labelled = np.flatnonzero(result.labels > 0)
-    labelled = labelled[np.argsort(result.labels[labelled], kind="stable")]
-    labels, starts = np.unique(result.labels[labelled], return_index=True)
-    objects = {}
-    for label, rows in zip(labels.tolist(), np.split(labelled, starts)[1:], strict=True):
-        some = rows[:: -(-len(rows) // MOST_POINTS)]
-        xyz = result.points[some, :3].astype(np.float64)
-        objects[label] = xyz @ sweep.pose[:2, :3].T + sweep.pose[:2, 3]
-    return objects
+def _sightings(sweeps: Sequence[Sweep], results: Sequence[Segmentation]) -> dict[int, list[Sighting]]:
+    """Those of each label that has points."""
+    sightings: dict[int, list[Sighting]] = defaultdict(list)
+    for sweep, result in zip(sweeps, results, strict=True):
+        labelled = np.flatnonzero(result.labels > 0)
+        labelled = labelled[np.argsort(result.labels[labelled], kind="stable")]
+        labels, starts = np.unique(result.labels[labelled], return_index=True)
+        for label, rows in zip(labels.tolist(), np.split(labelled, starts)[1:], strict=True):
+            some = rows[:: -(-len(rows) // MOST_POINTS)]
+            xyz = result.points[some, :3].astype(np.float64)
+            xy = xyz @ sweep.pose[:2, :3].T + sweep.pose[:2, 3]
+            sightings[label].append(Sighting(sweep.stamp, xy, shown=bool(result.instances[label - 1].sources)))
+    return sightings
