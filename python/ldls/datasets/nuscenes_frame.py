@@ -8,6 +8,7 @@ It has the `timestamp` in seconds; `lidar` with `file` and `columns`; `cameras` 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
-from ldls.cloud import Points
+from ldls.cloud import MAX_COLUMNS, Points
 from ldls.datasets.file_source import image_from_file
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.errors import within
@@ -77,7 +78,7 @@ class NuScenesFrameSource:
         with open_file(self._file, "key frame", limit=MAX_BYTES) as file:
             frame = json.loads(file.text())
             self._points = self._path(frame["lidar"]["file"])
-            self._columns = len(frame["lidar"]["columns"])
+            self._columns = _count(frame["lidar"]["columns"])
             self._boxes: list[dict[str, Any]] = frame["boxes_3d"]
             self._images = tuple(self._image(name, each) for name, each in frame["cameras"].items())
             self.stamps: tuple[float | None, ...] = (float(frame["timestamp"]),)
@@ -146,7 +147,7 @@ def label_by_upright_boxes(boxes: Sequence[Mapping[str, Any]], points: Points) -
     names = tuple(dict.fromkeys([BACKGROUND, *(str(box["category"]) for box in boxes)]))
     classes, instances = np.zeros((2, len(points)), np.int32)
     numbered = list(enumerate((_upright(box) for box in boxes), start=1))
-    for number, (category, numbers) in sorted(numbered, key=lambda box: -np.prod(box[1][1][3:6])):
+    for number, (category, numbers) in sorted(numbered, key=lambda box: -math.prod(box[1][1][3:6].tolist())):
         inside = points_in_upright_box(points, numbers)
         classes[inside], instances[inside] = names.index(category), number
     return Labeling(classes, instances, np.zeros(len(points), bool), names)
@@ -156,7 +157,7 @@ def points_in_upright_box(points: Points, numbers: NDArray[np.float64]) -> NDArr
     """(N,) True for points in the box x y z of its middle, length, width, height and yaw, its faces included."""
     centre, (length, width, height), yaw = numbers[:3], numbers[3:6], numbers[6]
     # infinite coordinates become NaN, which lies in no box
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         x, y, z = (points[:, :3].astype(np.float64) - centre).T
         along, across = np.cos(yaw) * x + np.sin(yaw) * y, np.cos(yaw) * y - np.sin(yaw) * x
     inside: NDArray[np.bool_] = (
@@ -168,6 +169,12 @@ def points_in_upright_box(points: Points, numbers: NDArray[np.float64]) -> NDArr
 def described_in(path: str | PathLike[str]) -> Path:
     """The frame.json that `path` is, or holds."""
     return Path(path) / FILE if Path(path).is_dir() else Path(path)
+
+
+def _count(columns: Sequence[str]) -> int:
+    if columns[:3] != ["x", "y", "z"] or len(columns) > MAX_COLUMNS:
+        raise ValueError(f"lidar.columns: expected x, y, z and up to {MAX_COLUMNS - 3} more, got {columns}")
+    return len(columns)
 
 
 def _upright(box: Mapping[str, Any]) -> tuple[str, NDArray[np.float64]]:
