@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -117,11 +118,12 @@ class Tracker:
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
         labels = list(sightings)
         costs = np.full((len(labels), len(self._tracks)), np.inf)
-        for i, label in enumerate(labels):
-            first = sightings[label][0]
-            for j, track in enumerate(self._tracks):
+        for j, track in enumerate(self._tracks):
+            at = cache(track.at)
+            for i, label in enumerate(labels):
+                first = sightings[label][0]
                 if instances[label].category == track.instance.category:
-                    costs[i, j] = self._apart(first.points, track.at(first.stamp))
+                    costs[i, j] = self._apart(first.points, at(first.stamp))
         # what cannot be is dearer than all that can be together
         dearest = NEAR_M * (len(labels) + 1)
         rows, columns = self._assign(np.where(np.isfinite(costs), costs, dearest))
