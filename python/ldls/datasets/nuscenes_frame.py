@@ -78,7 +78,7 @@ class NuScenesFrameSource:
         with open_file(self._file, "key frame", limit=MAX_BYTES) as file:
             frame = json.loads(file.text())
             self._points = self._path(frame["lidar"]["file"])
-            self._columns = _count(frame["lidar"]["columns"])
+            self._columns = _n_columns(frame["lidar"]["columns"])
             self._boxes: list[dict[str, Any]] = frame["boxes_3d"]
             self._images = tuple(self._image(name, each) for name, each in frame["cameras"].items())
             self.stamps: tuple[float | None, ...] = (float(frame["timestamp"]),)
@@ -171,7 +171,7 @@ def described_in(path: str | PathLike[str]) -> Path:
     return Path(path) / FILE if Path(path).is_dir() else Path(path)
 
 
-def _count(columns: Sequence[str]) -> int:
+def _n_columns(columns: Sequence[str]) -> int:
     if columns[:3] != ["x", "y", "z"] or len(columns) > MAX_COLUMNS:
         raise ValueError(f"lidar.columns: expected x, y, z and up to {MAX_COLUMNS - 3} more, got {columns}")
     return len(columns)
