@@ -23,9 +23,9 @@ import numpy as np
 import rosbags.rosbag1
 import rosbags.rosbag2
 import rosbags.serde.utils
-import rosbags.typesys.store
 from PIL import Image
 from rosbags.highlevel import anyreader
+from rosbags.typesys.store import Typestore
 
 import ldls
 from campaigns.mutations import changed_bytes, mutated
@@ -99,13 +99,13 @@ class Parser:
 
     def place(self, folder, content):
         """Write `content` below `folder`; the path to read."""
-        names, contents = self.files, content.split(BETWEEN_FILES)
-        if len(names) == 1:
-            contents = [content]
-        for name, own in zip(names, contents, strict=False):
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(own)
-        return folder / names[0] if len(names) == 1 else folder
+        if len(self.files) == 1:
+            path = folder / self.files[0]
+            write(path, content)
+            return path
+        for name, own in zip(self.files, content.split(BETWEEN_FILES), strict=False):
+            write(folder / name, own)
+        return folder
 
     def outcome(self, folder, content):
         """What becomes of `content`: "accepted", "refused", "fat", or what wrong error came, and from where."""
@@ -124,6 +124,14 @@ class Parser:
                 raise
             return place_of(error)
         return "accepted"
+
+
+def write(path, content):
+    try:
+        path.write_bytes(content)
+    except FileNotFoundError:
+        path.parent.mkdir(parents=True)
+        path.write_bytes(content)
 
 
 def place_of(error):
@@ -350,17 +358,22 @@ def fill(made, types, serialized):
             made.write(topics[topic], 1000 + number, serialized(messages(types)[topic], topic))
 
 
-@functools.lru_cache(maxsize=100)
-def classes_of(source):
-    names = {"__name__": "rosbags.usertypes"}
-    exec(source, names)
-    return names
+def register(types, definitions):
+    """Put definitions of messages into a new typestore; the library works all of them out again for every bag."""
+    key = repr(definitions)
+    if key not in stores:
+        register_anew(types, definitions)
+        if len(stores) == MOST_STORES:
+            stores.clear()
+        stores[key] = types
+    vars(types).update(vars(stores[key]))
 
 
-# the library makes the classes of messages again for every bag; kept, bags are read several times as fast
-rosbags.typesys.store.exec = lambda source, names: names.update(classes_of(source))
+MOST_STORES = 100
+# bags are read twice as fast with what is the same in nearly all of them kept
+stores, register_anew, Typestore.register = {}, Typestore.register, register
 rosbags.serde.utils.exec = lambda source, names: exec(compiled(source), names)
-compiled = functools.cache(lambda source: compile(source, "<types of messages>", "exec"))
+compiled = functools.lru_cache(maxsize=10_000)(lambda source: compile(source, "<types of messages>", "exec"))
 anyreader.get_types_from_msg = functools.lru_cache(maxsize=100)(anyreader.get_types_from_msg)
 
 
