@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.distortion import Distortion
+from ldls.checks.values import shown
 from ldls.errors import CalibrationError, within
 
 
@@ -51,7 +52,7 @@ class Fields:
         """
         entries = self.get(name)
         if not isinstance(entries, Mapping):
-            raise CalibrationError(f"{self.place}: {name} is {_short(entries)}, expected keys with values")
+            raise CalibrationError(f"{self.place}: {name} is {shown(entries)}, expected keys with values")
         return Fields(f"{self.place}: {name}", entries)
 
     def image_size(self) -> tuple[int, int] | None:
@@ -92,7 +93,7 @@ class Fields:
             return None
         number = self.matrix((1,), *spellings)[0]
         if not (number >= 0 and number == np.floor(number)):
-            raise CalibrationError(f"{self.place}: {spellings[0]}: expected a whole number from 0, got {_short(value)}")
+            raise CalibrationError(f"{self.place}: {spellings[0]}: expected a whole number from 0, got {shown(value)}")
         return int(number)
 
     def distortion(self, model: str, coefficients: NDArray[np.float64]) -> Distortion:
@@ -111,10 +112,12 @@ class Fields:
             values = np.array(value, np.float64)
         except (TypeError, ValueError):
             raise CalibrationError(
-                f"{self.place}: {name}: expected numbers with a decimal point, got {_short(value)}"
+                f"{self.place}: {name}: expected numbers with a decimal point, got {shown(value)}"
             ) from None
+        except OverflowError:  # a whole number that float64 has not
+            values = np.array(np.inf)
         if not np.isfinite(values).all():
-            raise CalibrationError(f"{self.place}: {name}: expected finite numbers, got {_short(value)}")
+            raise CalibrationError(f"{self.place}: {name}: expected finite numbers, got {shown(value)}")
         return values
 
     def _rows_and_columns(self, matrix: Fields) -> NDArray[np.float64]:
@@ -125,8 +128,3 @@ class Fields:
         if values.size != rows * columns:
             raise CalibrationError(f"{matrix.place}: {rows} rows x {columns} cols, got {values.size} numbers")
         return values.reshape(rows, columns)
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."

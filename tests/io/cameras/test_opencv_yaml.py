@@ -130,6 +130,8 @@ def test_models_of_distortion(write, entries, options, model):
             f"K: [1, 2]\nD: {D}", r"K: expected 9 numbers \(3 x 3\), got 2|camera_matrix: expected 9", id="two"
         ),
         pytest.param(OPENCV.replace("720.5", ".nan"), "expected finite numbers", id="NaN"),
+        pytest.param(OPENCV.replace("720.5", f"1{400 * '0'}"), "expected finite numbers, got", id="400 digits"),
+        pytest.param(ROS.replace("1280", f"0x{5000 * 'f'}"), "width: expected finite numbers", id="5000 digits"),
         pytest.param(OPENCV.replace("720.5", ".Nan"), "expected numbers .*Nan", id="NaN as OpenCV writes it"),
         pytest.param(ROS.replace("720.5", "'720,5'"), "expected numbers with a decimal point", id="decimal comma"),
         pytest.param(ROS.replace("plumb_bob", "omni"), "model 'omni' is unknown, expected one of", id="unknown model"),
