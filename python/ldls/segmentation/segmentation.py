@@ -63,7 +63,7 @@ class Segmentation:
         instances: What the labels 1, 2, ... stand for.
         views: Each camera's masks, points and pixels.
         report: What was noticed about the input and the run.
-        timings: Seconds that each step took.
+        timings: Seconds that each step took; for `neighbors`, those after `depth`, beside which they are searched.
         points: (N, >= 3) the points given, x y z first, in metres.
         params: The parameters used.
     """

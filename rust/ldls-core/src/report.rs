@@ -37,7 +37,7 @@ impl Report {
 pub struct Timings {
     /// Projection to pixels.
     pub project: Duration,
-    /// K nearest neighbours, and the order of their tree.
+    /// K nearest neighbours, and the order of their tree: what they take longer than depth, which is seen meanwhile.
     pub neighbors: Duration,
     /// Heights above the ground, and depth groups of the masks.
     pub depth: Duration,

@@ -11,6 +11,7 @@ use crate::projection::{Cloud, Sighting};
 use crate::report::{Report, Timings, timed};
 use crate::ring::{Images, Objects, View};
 use crate::{Cancel, Error, Params, Real, Result};
+use std::mem::take;
 
 /// Label of points that no image sees.
 const OUT_OF_VIEW: i32 = -1;
@@ -59,16 +60,21 @@ pub fn segment(
 ) -> Result<Segmentation> {
     check(cloud, views, params)?;
     let mut t = Timings::default();
-    let (in_view, mut images) = timed(&mut t.project, || {
+    let (mut in_view, mut images) = timed(&mut t.project, || {
         Images::project(cloud, views, same_object, keep_origin, cancel)
     })?;
-    timed(&mut t.depth, || {
-        images.see_depth(&in_view.points, params, cancel)
-    })?;
-    let (scene, k) = (&images, params.neighbors);
-    let nearest = &timed(&mut t.neighbors, || {
-        neighbors::search(in_view.points, k, cancel)
-    })?;
+    let points = take(&mut in_view.points);
+    // side by side, since parts of each are for one thread alone
+    let (seen, nearest) = timed(&mut t.neighbors, || {
+        rayon::join(
+            || timed(&mut t.depth, || images.see_depth(&points, params, cancel)),
+            || neighbors::search(&points, params.neighbors, cancel),
+        )
+    });
+    t.neighbors -= t.depth;
+    drop(points);
+    seen?;
+    let (scene, nearest) = (&images, &nearest?);
     let order = &nearest.order;
     let heights = &arrange(order, &scene.heights, cancel)?;
     let pixels = || scene.pixel_labels(order, params, cancel);
@@ -156,12 +162,11 @@ fn remove_outliers(
     params: &Params,
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
-    let mut kept = collect(labels.iter().copied(), cancel)?;
-    if params.remove_outliers {
-        let at_depth = |row: usize, label| images.at_depth(order[row], label);
-        kept = remove_outliers_by_index(a, labels, order, params.part_size, at_depth, cancel)?;
+    if !params.remove_outliers {
+        return collect(labels.iter().copied(), cancel);
     }
-    Ok(kept)
+    let at_depth = |row: usize, label| images.at_depth(order[row], label);
+    remove_outliers_by_index(a, labels, order, params.part_size, at_depth, cancel)
 }
 
 fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32], cancel: &Cancel) -> Result<Vec<i32>> {

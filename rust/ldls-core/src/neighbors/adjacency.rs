@@ -30,11 +30,11 @@ impl Adjacency {
     /// The `k` nearest neighbours of each of `points`, of which `tree` is made; all others where there are fewer.
     pub(super) fn search(
         tree: KdTree,
-        points: Vec<[f64; 3]>,
+        points: &[[f64; 3]],
         k: usize,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let points = arrange(&tree.order, &{ points }, cancel)?;
+        let points = arrange(&tree.order, points, cancel)?;
         let degree = k.min(points.len().saturating_sub(1)) + 1;
         let mut columns = zeros(points.len() * degree, cancel)?;
         let tasks = columns

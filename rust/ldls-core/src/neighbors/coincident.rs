@@ -44,7 +44,7 @@ pub(super) fn search(points: &[[f64; 3]], k: usize, cancel: &Cancel) -> Result<A
     let members = Members::new(&place_of, places.len(), cancel)?;
     // k other places are enough: the lowest point of each is among the nearest
     let tree = KdTree::new(&places, cancel)?;
-    let nearest = Adjacency::search(tree, places, k, cancel)?;
+    let nearest = Adjacency::search(tree, &places, k, cancel)?;
     let degree = k.min(points.len() - 1) + 1;
 
     let mut order = with_room(points.len())?;

@@ -6,10 +6,11 @@
 //! coincident points), the point searches alone.
 
 use super::candidates::decide;
-use super::kdtree::{Boxes, FAN, KdTree};
+use super::kdtree::{Boxes, FAN, KdTree, larger};
 use super::keys::{Key, key, position_of, squared_of};
 use super::lone_search::search_alone;
 use multiversion::multiversion;
+use wide::f32x8;
 
 /// Squared distances in single precision are right to this share.
 const ROUNDING: f32 = 2e-6;
@@ -72,15 +73,15 @@ fn search_with<const LEN: usize>(
     let mut unsure = 0;
     for slot in (0..FAN).filter(|slot| wanted >> slot & 1 == 1) {
         let position = leaf * FAN + slot;
-        if search.overflow >> slot & 1 == 1
-            || !decide::<LEN>(
-                tree,
-                points,
-                search.candidates(slot),
-                position,
-                &mut rows[slot * degree + 1..(slot + 1) * degree],
-            )
-        {
+        let row = &mut rows[slot * degree + 1..(slot + 1) * degree];
+        if search.overflow >> slot & 1 == 1 {
+            unsure |= 1 << slot;
+        } else if search.tells_apart(slot) {
+            // the nearest is the point itself
+            for (column, &key) in row.iter_mut().zip(&search.lists[slot][1..]) {
+                *column = position_of(key);
+            }
+        } else if !decide::<LEN>(tree, points, search.candidates(slot), position, row) {
             unsure |= 1 << slot;
         }
     }
@@ -90,6 +91,35 @@ fn search_with<const LEN: usize>(
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2"))]
 fn run<const LEN: usize>(search: &mut Search<LEN>) {
     search.run();
+}
+
+/// Visits the children of a node that are near enough, but for the one that is done.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2"))]
+fn visit_node<const LEN: usize>(
+    search: &mut Search<LEN>,
+    boxes: &Boxes,
+    level: usize,
+    node: usize,
+    done: Option<usize>,
+) {
+    if level == 0 {
+        search.visit_children(boxes, node, done);
+        return;
+    }
+    let tree = search.tree;
+    let squared = boxes.squared_distances(&search.low, &search.high);
+    for child in 0..FAN {
+        if squared[child] <= search.farthest && Some(child) != done {
+            let child = node * FAN + child;
+            visit_node(
+                search,
+                &tree.levels[level - 1][child],
+                level - 1,
+                child,
+                None,
+            );
+        }
+    }
 }
 
 /// The search of the points of one leaf.
@@ -133,6 +163,13 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
         search
     }
 
+    /// True if single precision tells the neighbours of a slot from one another and from all other points.
+    fn tells_apart(&self, slot: usize) -> bool {
+        let nearest = &self.lists[slot][..self.last + 2];
+        let mut pairs = nearest.iter().zip(&nearest[1..]);
+        pairs.all(|(&key, &next)| squared_of(next) > self.reach_of(key))
+    }
+
     fn candidates(&self, slot: usize) -> &[Key] {
         let list = &self.lists[slot];
         let reach = self.reach_of(list[self.last]);
@@ -145,7 +182,7 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
 
     #[inline(always)]
     fn run(&mut self) {
-        self.visit_leaf(self.leaf);
+        self.visit_own_leaf();
         let node = self.leaf / FAN;
         let tree = self.tree;
         self.visit_children(&tree.levels[0][node], node, Some(self.leaf % FAN));
@@ -159,23 +196,7 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
         for (level, nodes) in tree.levels.iter().enumerate().skip(1) {
             let child = node % FAN;
             node /= FAN;
-            self.visit_node(&nodes[node], level, node, Some(child));
-        }
-    }
-
-    /// Visits the children of a node that are near enough, but for the one that is done.
-    fn visit_node(&mut self, boxes: &Boxes, level: usize, node: usize, done: Option<usize>) {
-        if level == 0 {
-            self.visit_children(boxes, node, done);
-            return;
-        }
-        let tree = self.tree;
-        let squared = boxes.squared_distances(&self.low, &self.high);
-        for child in 0..FAN {
-            if squared[child] <= self.farthest && Some(child) != done {
-                let child = node * FAN + child;
-                self.visit_node(&tree.levels[level - 1][child], level - 1, child, None);
-            }
+            visit_node(self, &nodes[node], level, node, Some(child));
         }
     }
 
@@ -185,11 +206,10 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
         let squared = boxes.squared_distances(&self.low, &self.high);
         let mut near = [0.0; FAN];
         let mut count = 0;
-        for child in 0..FAN {
+        for child in ones(bits(&squared, &[self.farthest; FAN])) {
             // distance and number in one value that sorts as the distance does
             near[count] = key(squared[child], child as u32);
-            let wanted = squared[child] <= self.farthest && Some(child) != done;
-            count += usize::from(wanted);
+            count += usize::from(Some(child) != done);
         }
         let near = &mut near[..count];
         near.sort_unstable_by(f64::total_cmp);
@@ -209,9 +229,8 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
         for axis in 0..3 {
             let (low, high) = (boxes.low[axis][child], boxes.high[axis][child]);
             for slot in 0..FAN {
-                let gap = (low - queries[axis][slot])
-                    .max(queries[axis][slot] - high)
-                    .max(0.0);
+                let gap = larger(low - queries[axis][slot], queries[axis][slot] - high);
+                let gap = larger(gap, 0.0);
                 squared[slot] += gap * gap;
             }
         }
@@ -221,44 +240,46 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
         }
     }
 
+    /// Fills the lists with the points of the leaf itself, all slots at once.
     #[inline(always)]
-    fn visit_leaf(&mut self, leaf: usize) {
-        let near = bits(&[0.0; FAN], &self.reach);
-        self.compare(leaf, near);
+    fn visit_own_leaf(&mut self) {
+        let own = &self.tree.leaves[self.leaf];
+        let mut ranks = [[0.0; FAN]; FAN];
+        // one after the other: compilers that take several at a time shuffle more than they compute
+        for other in ones(u32::from(u16::MAX)) {
+            let squared = own.squared_distances(own.point(other));
+            for slot in 0..FAN {
+                ranks[other][slot] = key(squared[slot], (self.leaf * FAN + other) as u32);
+            }
+        }
+        sort_ranks(&mut ranks);
+        for (slot, list) in self.lists.iter_mut().enumerate() {
+            for (place, keys) in list.iter_mut().zip(&ranks) {
+                *place = keys[slot];
+            }
+        }
+        for slot in ones(bits(&[0.0; FAN], &self.reach)) {
+            self.update_reach(slot);
+        }
+        self.farthest = largest(self.reach);
     }
 
     /// Offers the points of `leaf` to the lists of the slots whose bits are set in `near`.
     #[inline(always)]
-    fn compare(&mut self, leaf: usize, mut near: u32) {
-        let others = &self.tree.leaves[leaf].0;
-        while near != 0 {
-            let slot = near.trailing_zeros() as usize;
-            near &= near - 1;
-            let point = self.tree.leaves[self.leaf].point(slot);
-            let mut squared = [0.0_f32; FAN];
-            for other in 0..FAN {
-                let [x, y, z] = [
-                    others[0][other] - point[0],
-                    others[1][other] - point[1],
-                    others[2][other] - point[2],
-                ];
-                squared[other] = x * x + y * y + z * z;
-            }
-            let mut better = bits(&squared, &[self.reach[slot]; FAN]);
+    fn compare(&mut self, leaf: usize, near: u32) {
+        let [own, others] = [self.leaf, leaf].map(|leaf| &self.tree.leaves[leaf]);
+        for slot in ones(near) {
+            let squared = others.squared_distances(own.point(slot));
+            let better = bits(&squared, &[self.reach[slot]; FAN]);
             if better == 0 {
                 continue;
             }
-            while better != 0 {
-                let other = better.trailing_zeros() as usize;
-                better &= better - 1;
+            for other in ones(better) {
                 self.insert(slot, key(squared[other], (leaf * FAN + other) as u32));
             }
             self.update_reach(slot);
         }
-        self.farthest = self
-            .reach
-            .iter()
-            .fold(-1.0, |a, &b| if b > a { b } else { a });
+        self.farthest = largest(self.reach);
     }
 
     /// Puts `key` in its place in the list of `slot`; the largest one falls out.
@@ -294,26 +315,87 @@ impl<'a, const LEN: usize> Search<'a, LEN> {
     /// Squared distance within which all points may be as near as the one with `key`.
     #[inline(always)]
     fn reach_of(&self, key: Key) -> f32 {
-        let squared = squared_of(key);
+        let mut squared = squared_of(key);
         if squared == f32::INFINITY {
             // short of the places without a candidate: a list that is not filled yet has room
             return f32::MAX;
         }
-        if self.tree.rounding == 0.0 {
-            return squared * (1.0 + ROUNDING);
+        if self.tree.rounding > 0.0 {
+            // either of two points may be off in each of three coordinates
+            let distance = squared.sqrt() + 8.0 * self.tree.rounding;
+            squared = distance * distance;
         }
-        // either of two points may be off in each of three coordinates
-        let distance = squared.sqrt() + 8.0 * self.tree.rounding;
-        distance * distance * (1.0 + ROUNDING)
+        // squares below the least normal number have lost digits
+        squared * (1.0 + ROUNDING) + f32::MIN_POSITIVE
+    }
+}
+
+/// Pairs of ranks that, put in order one after the other, leave all in order: Batcher's merge sort.
+const EXCHANGES: [[usize; 2]; 63] = {
+    let mut pairs = [[0; 2]; 63];
+    let (mut count, mut sorted) = (0, 1);
+    while sorted < FAN {
+        let mut apart = sorted;
+        while apart > 0 {
+            let first = apart % sorted;
+            let mut low = first;
+            while low + apart < FAN {
+                let of_one_run = low / (2 * sorted) == (low + apart) / (2 * sorted);
+                if of_one_run && (low - first) / apart % 2 == 0 {
+                    pairs[count] = [low, low + apart];
+                    count += 1;
+                }
+                low += 1;
+            }
+            apart /= 2;
+        }
+        sorted *= 2;
+    }
+    pairs
+};
+
+/// Sorts the keys of each slot.
+#[inline(always)]
+fn sort_ranks(ranks: &mut [[Key; FAN]; FAN]) {
+    for [low, high] in EXCHANGES {
+        let (one, other) = (ranks[low], ranks[high]);
+        for slot in 0..FAN {
+            ranks[low][slot] = one[slot].min(other[slot]);
+            ranks[high][slot] = one[slot].max(other[slot]);
+        }
     }
 }
 
 /// Bit i where `values[i] <= limits[i]`.
 #[inline(always)]
 fn bits(values: &[f32; FAN], limits: &[f32; FAN]) -> u32 {
-    let mut found = 0;
-    for i in 0..FAN {
-        found |= u32::from(values[i] <= limits[i]) << i;
+    let halves = values.as_chunks().0.iter().zip(limits.as_chunks().0);
+    let bits = |(values, limits): (&[f32; 8], &[f32; 8])| {
+        f32x8::from(*values)
+            .simd_le(f32x8::from(*limits))
+            .to_bitmask()
+    };
+    halves.map(bits).rev().fold(0, |all, half| all << 8 | half)
+}
+
+/// Places of the bits that are set, ascending.
+#[inline(always)]
+fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = (bits != 0).then(|| bits.trailing_zeros() as usize);
+        bits &= bits.wrapping_sub(1);
+        place
+    })
+}
+
+#[inline(always)]
+fn largest(mut values: [f32; FAN]) -> f32 {
+    let mut half = FAN / 2;
+    while half > 0 {
+        for i in 0..half {
+            values[i] = larger(values[i], values[i + half]);
+        }
+        half /= 2;
     }
-    found
+    values[0]
 }
