@@ -101,12 +101,12 @@ impl<T: Real> PointGraph<T> {
                 .zip(columns.chunks(degree))
                 .zip(own);
             for ((weights, columns), point) in rows {
-                weights[0] = T::from_f64(1.0);
-                for (weight, &j) in weights[1..].iter_mut().zip(&columns[1..]) {
+                for (weight, &j) in weights.iter_mut().zip(columns) {
                     let squared = squared_distance(point, &points[j as usize]);
-                    *weight = T::from_f64(-squared / sigma).exp();
+                    *weight = T::from_f64(-squared / sigma);
                 }
             }
+            T::exp(weights);
             Ok::<(), Error>(())
         })?;
         Ok(Self {
