@@ -56,7 +56,8 @@ impl Series {
                 (1.0 - x.powi(terms as i32)) / complement
             }
         };
-        let mut nodes = 256;
+        // twice as many as there are terms yield all of them
+        let mut nodes = (2 * terms).next_power_of_two().min(256);
         loop {
             let mut coefficients = interpolate(sum, middle, half_width, nodes);
             // the sum is a polynomial of degree `terms` - 1: beyond it there is rounding and nothing else
@@ -126,13 +127,13 @@ impl Series {
 fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
     let row = |i: usize| {
         let (columns, weights) = a.slices(i..i + 1);
-        let sum: f64 = weights.iter().map(|weight| weight.to_f64()).sum();
-        let own = columns
-            .iter()
-            .zip(weights)
-            .filter(|(column, _)| **column as usize == i);
-        let own: f64 = own.map(|(_, weight)| weight.to_f64()).sum();
-        let positive = weights.iter().all(|weight| *weight >= T::default());
+        let (mut sum, mut own, mut positive) = (0.0, 0.0, true);
+        for (&column, weight) in columns.iter().zip(weights) {
+            let weight = weight.to_f64();
+            sum += weight;
+            own += if column as usize == i { weight } else { 0.0 };
+            positive &= weight >= 0.0;
+        }
         positive.then_some([2.0 * own - sum, sum])
     };
     let hull = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];

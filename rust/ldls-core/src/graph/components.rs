@@ -1,7 +1,7 @@
 //! Outlier removal: an instance keeps its largest connected component and what is certainly part of it (method, step 7).
 
 use super::point_graph::PointGraph;
-use crate::memory::{collect, filled};
+use crate::memory::{collect, filled, push};
 use crate::{Cancel, Error, Result};
 
 /// Share of its points that a component beside the largest needs at the distance of its object.
@@ -47,38 +47,43 @@ pub(crate) fn remove_outliers_by_index(
             problem,
         });
     }
-    let look = |i: usize| {
-        if i.is_multiple_of(ROWS_A_BLOCK) {
-            cancel.check()
-        } else {
-            Ok(())
-        }
-    };
+    let mut members = Vec::new();
+    for (row, _) in (0..).zip(labels).filter(|&(_, &label)| label > 0) {
+        push(&mut members, row)?;
+    }
     let mut sets = DisjointSets::new(labels.len(), cancel)?;
-    for (i, &label) in labels.iter().enumerate() {
-        look(i)?;
-        if label == 0 {
-            continue;
-        }
-        for (j, _) in graph.row(i).filter(|&(j, _)| labels[j] == label) {
-            sets.join(i as u32, j as u32);
+    for rows in members.chunks(ROWS_A_BLOCK) {
+        cancel.check()?;
+        for &row in rows {
+            let label = labels[row as usize];
+            let edges = graph.row(row as usize);
+            for (other, _) in edges.filter(|&(other, _)| labels[other] == label) {
+                sets.join(row, other as u32);
+            }
         }
     }
-    let roots = collect((0..labels.len() as u32).map(|i| sets.root(i)), cancel)?;
     let mut components = filled(Component::NONE, labels.len(), cancel)?;
-    for (i, (&root, &index)) in roots.iter().zip(indices).enumerate() {
-        look(i)?;
-        let counts = part_size < 1.0 && labels[i] > 0 && at_depth(i, labels[i]);
-        components[root as usize].add(root, index, counts);
+    for rows in members.chunks(ROWS_A_BLOCK) {
+        cancel.check()?;
+        for &row in rows {
+            let (at, root) = (row as usize, sets.root(row));
+            let counts = part_size < 1.0 && at_depth(at, labels[at]);
+            components[root as usize].add(root, indices[at], counts);
+        }
     }
     cancel.check()?;
     let largest = largest_of_each(labels, &components);
-    let stays = |label: u32, root: u32| {
-        let (component, largest) = (&components[root as usize], &largest[label as usize]);
-        root == largest.root || (part_size < 1.0 && component.is_part_of(largest, part_size))
-    };
-    let kept = |(&label, &root): (&u32, &u32)| if stays(label, root) { label } else { 0 };
-    collect(labels.iter().zip(&roots).map(kept), cancel)
+    let mut kept = collect(labels.iter().copied(), cancel)?;
+    for &row in &members {
+        let (label, root) = (&mut kept[row as usize], sets.root(row));
+        let (component, largest) = (&components[root as usize], &largest[*label as usize]);
+        let stays =
+            root == largest.root || (part_size < 1.0 && component.is_part_of(largest, part_size));
+        if !stays {
+            *label = 0;
+        }
+    }
+    Ok(kept)
 }
 
 /// Points between two looks at the flag.
