@@ -17,6 +17,8 @@ use std::mem::take;
 const OUT_OF_VIEW: i32 = -1;
 /// Points between two looks at the flag where one thread does the work.
 const POINTS_A_BLOCK: usize = 1 << 16;
+/// Points up to which depth is seen and neighbours are searched at the same time; of more the memory of both counts.
+const MOST_SIDE_BY_SIDE: usize = 1 << 20;
 /// Most edges of a graph: what 32 bits index.
 const MAX_EDGES: u64 = u32::MAX as u64;
 
@@ -64,12 +66,12 @@ pub fn segment(
         Images::project(cloud, views, same_object, keep_origin, cancel)
     })?;
     let points = take(&mut in_view.points);
-    // side by side, since parts of each are for one thread alone
-    let (seen, nearest) = timed(&mut t.neighbors, || {
-        rayon::join(
-            || timed(&mut t.depth, || images.see_depth(&points, params, cancel)),
-            || neighbors::search(&points, params.neighbors, cancel),
-        )
+    let mut depth = || timed(&mut t.depth, || images.see_depth(&points, params, cancel));
+    let search = || neighbors::search(&points, params.neighbors, cancel);
+    let (seen, nearest) = timed(&mut t.neighbors, || match points.len() {
+        // parts of each are for one thread alone
+        ..=MOST_SIDE_BY_SIDE => rayon::join(depth, search),
+        _ => (depth(), search()),
     });
     t.neighbors -= t.depth;
     drop(points);
