@@ -96,6 +96,12 @@ def test_boxes_regions_and_view_label_points():
     assert label_by_boxes([BOX, region, person], points, CAMERA).classes.tolist() == found.classes.tolist()
 
 
+def test_a_box_whose_volume_is_beyond_float64_is_the_largest():
+    huge = replace(BOX, type="Tram", dimensions=(1e308,) * 3)
+    found = label_by_boxes([BOX, huge], np.array([[1.5, 1.0, 20.0], [5.0, 1.0, 20.0]]), CAMERA)
+    assert [found.names[c] for c in found.classes] == ["Car", "Tram"]
+
+
 def test_an_object_in_a_region_keeps_its_points():
     region = replace(BOX, type="DontCare", bbox=(0, 0, 99, 79))
     found = label_by_boxes([BOX, region], np.array([[1.5, 1.0, 20.0]]), CAMERA)

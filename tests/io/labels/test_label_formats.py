@@ -44,6 +44,13 @@ def test_squeezeseg_counts_pixels_with_a_range(tmp_path):
     assert read_squeezeseg_ranges(tmp_path / "a.npy")[:4].tolist() == [10, 20, 0, 30]
 
 
+def test_a_range_that_is_a_signalling_nan_makes_no_warning(tmp_path):
+    image = range_image().astype(np.float32)
+    image.view(np.uint32)[0, 1, 4] = 0x7FA00000
+    np.save(tmp_path / "a.npy", image)
+    np.testing.assert_array_equal(read_squeezeseg_ranges(tmp_path / "a.npy")[:4], [10, np.nan, 0, 30])
+
+
 def test_squeezeseg_predictions_are_labels_alone(tmp_path):
     labels = np.zeros((64, 512), np.uint8)
     labels[1, 0] = 3

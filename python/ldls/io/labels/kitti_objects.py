@@ -145,7 +145,7 @@ def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Ca
         classes[in_view[(u >= left) & (u <= right) & (v >= top) & (v <= bottom)]] = names.index(region.type)
     seen = in_camera_frame(cloud[in_view], camera)
     boxes = [(number, row) for number, row in enumerate(objects, start=1) if not row.is_region]
-    for number, row in sorted(boxes, key=lambda box: -np.prod(box[1].dimensions)):
+    for number, row in sorted(boxes, key=lambda box: -math.prod(box[1].dimensions)):
         inside = in_view[row.contains(seen)]
         classes[inside], instances[inside] = names.index(row.type), number
     ignored = np.ones(len(cloud), bool)

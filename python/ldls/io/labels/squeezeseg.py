@@ -50,7 +50,8 @@ def read_squeezeseg_ranges(path: str | PathLike[str]) -> NDArray[np.float64] | N
         FileFormatError: It is not a whole file of such an array.
     """
     image = _load(path)
-    return None if image.ndim == 2 else image[:, :, RANGE].reshape(-1).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # NaNs that signal
+        return None if image.ndim == 2 else image[:, :, RANGE].reshape(-1).astype(np.float64)
 
 
 def _load(path: str | PathLike[str]) -> NDArray[Any]:
