@@ -35,6 +35,7 @@ __all__ = [
     "project",
     "remove_outliers",
     "segment",
+    "unpack_laz",
 ]
 
 __version__: str
@@ -188,3 +189,6 @@ def confidence(
     scores: NDArray[np.float32],
 ) -> NDArray[np.float32]: ...
 def clear_ground(labels: NDArray[np.uint32], heights: NDArray[np.float64], clearance: float) -> NDArray[np.int32]: ...
+def unpack_laz(
+    file: bytes, offset: int, laszip: bytes, n_points: int
+) -> tuple[NDArray[np.int32], NDArray[np.uint16]]: ...

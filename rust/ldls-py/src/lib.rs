@@ -11,6 +11,7 @@ mod arrays;
 mod call;
 mod camera;
 mod errors;
+mod laz;
 mod masks;
 mod products;
 mod segment;
@@ -23,6 +24,8 @@ mod _ldls {
     use crate::call::{default_threads, panic_in_worker};
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::laz::unpack_laz;
     #[pymodule_export]
     use crate::masks::{Masks, Rle};
     #[pymodule_export]

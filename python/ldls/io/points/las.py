@@ -1,7 +1,7 @@
 """LAS and LAZ files.
 
-Source: https://www.asprs.org/wp-content/uploads/2019/07/LAS_1_4_r15.pdf. The library that reads them takes a file
-that was cut short for a whole one; therefore the header is held against the size of the file first.
+Source: https://www.asprs.org/wp-content/uploads/2019/07/LAS_1_4_r15.pdf. They are read here, for the libraries that
+could take a file that was cut short for a whole one, and some damaged ones end the process.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls import _ldls
 from ldls._optional import require
 from ldls.errors import CorruptFileError, LimitError, NonFiniteError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import InputFile, open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances
-from ldls.io.points.laz_chunks import check_chunks
+from ldls.io.points.laz_chunks import check_chunks, laszip_record
 
 SIGNATURE = b"LASF"
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}
@@ -27,7 +28,6 @@ VLR_BYTES = 54
 POINT_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)
 """Least size of a record, by point format."""
 COMPRESSED = 0x80
-CHUNK_POINTS = 1 << 20
 SCALE_M = 1e-4
 """Steps of the coordinates, in metres: they keep to half of it."""
 MAX_STEPS = 2**31 - 1
@@ -62,26 +62,17 @@ def read(path: Path) -> NDArray[np.float64]:
         TruncatedFileError: The file ends before the points that the header says.
         CorruptFileError: The header contradicts itself or the file.
         UnsupportedFormatError: The version or the point format is unknown.
-        ImportError: The extra `las` is not installed.
     """
-    laspy = require("laspy", "las")
     with open_file(path, "LAS or LAZ file") as file:
         header = _read_header(file)
         _check(header, file.size)
         if header.n_points == 0:
             return np.zeros((0, 4))
-        if header.is_compressed:
-            require("lazrs", "las")
-            check_chunks(file, _vlrs(file, header), header.offset, header.record_bytes, header.n_points)
-        file.seek(0)
-        # chunk by chunk and on one thread: the parallel decoder takes the memory that the file asks for, or aborts
-        with (
-            laspy.open(file, laz_backend=laspy.LazBackend.Lazrs, read_evlrs=False, closefd=False) as reader,
-            np.errstate(over="ignore", invalid="ignore"),
-        ):
-            points = np.concatenate([_columns(chunk) for chunk in reader.chunk_iterator(CHUNK_POINTS)])
-        if len(points) != header.n_points:
-            raise TruncatedFileError(f"the header says {header.n_points} points, found {len(points)}")
+        steps, intensities = (_unpacked if header.is_compressed else _records)(file, header)
+        points = np.empty((header.n_points, 4))
+        with np.errstate(over="ignore", invalid="ignore"):
+            points[:, :3] = steps * np.array(header.scales) + header.offsets_m
+        points[:, 3] = intensities
         if not np.isfinite(points).all():
             raise CorruptFileError(
                 f"scales {header.scales} and offsets {header.offsets_m} make coordinates that are not finite"
@@ -89,8 +80,25 @@ def read(path: Path) -> NDArray[np.float64]:
         return points
 
 
-def _columns(chunk: Any) -> NDArray[np.float64]:  # noqa: ANN401
-    return np.stack([np.asarray(values, np.float64) for values in (chunk.x, chunk.y, chunk.z, chunk.intensity)], axis=1)
+def _records(file: InputFile, header: Header) -> tuple[NDArray[np.int32], NDArray[np.uint16]]:
+    """Steps along x y z and intensities."""
+    record = np.dtype({
+        "names": ["steps", "intensity"],
+        "formats": ["3<i4", "<u2"],
+        "offsets": [0, 12],
+        "itemsize": header.record_bytes,
+    })  # fmt: skip
+    file.seek(header.offset)
+    records = np.frombuffer(file.read(header.n_points * header.record_bytes), record)
+    return records["steps"], records["intensity"]
+
+
+def _unpacked(file: InputFile, header: Header) -> tuple[NDArray[np.int32], NDArray[np.uint16]]:
+    """The same."""
+    laszip = laszip_record(_vlrs(file, header))
+    check_chunks(file, laszip, header.offset, header.record_bytes, header.n_points)
+    file.seek(0)
+    return _ldls.unpack_laz(file.read(), header.offset, laszip, header.n_points)
 
 
 def _vlrs(file: InputFile, header: Header) -> bytes:

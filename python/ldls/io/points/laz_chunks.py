@@ -17,7 +17,8 @@ NOT_HERE = -1
 TABLE_HEAD = struct.Struct("<4xI")
 """Version, number of chunks."""
 ITEMS_AT = 32
-LAYERED = 3
+ONE_CHUNK, LAYERED = 1, 3
+"""Ways of packing; the first has no table."""
 ITEM_BYTES = {6: 20, 7: 8, 8: 6, 9: 29, 10: 30, 11: 6, 12: 8, 13: 29}
 """Size of each item of a point: core, time, colour and wave packet of point formats 0 to 5; core, colour, colour with
 infrared and wave packet of formats 6 to 10."""
@@ -27,27 +28,28 @@ LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
 """Layers of each item of formats 6 to 10; extra bytes have one a byte."""
 
 
-def check_chunks(file: InputFile, vlrs: bytes, offset: int, record_bytes: int, n_points: int) -> None:
+def check_chunks(file: InputFile, laszip: bytes, offset: int, record_bytes: int, n_points: int) -> None:
     """Hold the chunks of a LAZ file against its size and its number of points.
 
     Only layered chunks, those of point formats 6 to 10, have sizes in them.
 
     Args:
         file: The file.
-        vlrs: Its bytes between header and points.
+        laszip: Its record of LASzip.
         offset: Where its points begin.
         record_bytes: Size of a point, unpacked.
         n_points: How many there are.
 
     Raises:
         TruncatedFileError: The file ends before its chunks do.
-        CorruptFileError: The chunks have another number of points, or end elsewhere than their table begins, or there
-            is no record of LASzip.
+        CorruptFileError: The chunks have another number of points, or end elsewhere than their table begins.
     """
-    laszip = _laszip_record(vlrs)
     items = _items(laszip, record_bytes)
+    (packing,) = struct.unpack_from("<H", laszip)
+    if packing == ONE_CHUNK:
+        return
     table = _table_offset(file, offset, record_bytes)
-    if struct.unpack_from("<H", laszip) != (LAYERED,):
+    if packing != LAYERED:
         return
     n_layers = sum(LAYERS.get(kind, size) for kind, size in items)
     head = struct.Struct(f"<{record_bytes}x{1 + n_layers}I")
@@ -113,7 +115,12 @@ def _unpack(file: InputFile, layout: struct.Struct, at: int) -> int:
     return number
 
 
-def _laszip_record(vlrs: bytes) -> bytes:
+def laszip_record(vlrs: bytes) -> bytes:
+    """The record of LASzip among the bytes between header and points.
+
+    Raises:
+        CorruptFileError: There is none.
+    """
     start = 0
     while start + VLR_HEADER.size <= len(vlrs):
         _, user, _, size, _ = VLR_HEADER.unpack_from(vlrs, start)
