@@ -186,6 +186,30 @@ def test_rows_of_six_floats(rig, frame):
     np.testing.assert_array_equal(open_source(rig)[0].points[:, :3], frame.points[:, :3])
 
 
+@pytest.mark.parametrize("name", ['left "one"', "back\\slash", "tab\tand\nline", "über", "\x7f"])
+def test_names_of_any_text_are_quoted(rig, frame, name):
+    (rig / "front").rename(rig / name)
+    (rig / "lidar").rename(rig / f"lidar {name}")
+    (rig / "labels").rename(rig / f"labels {name}")
+    (calibration,) = (image.camera for image in frame.images)
+    write(rig / f"{name}.yaml", intrinsics(calibration))
+    write(rig / f"{name}.txt", rows(calibration.T_camera_lidar))
+    result = run("init", rig)
+    assert result.exit_code == 0, result.output
+    assert described(rig)["points"] == f"lidar {name}/{{frame}}.bin"
+    (camera,) = next(iter(open_source(rig))).images
+    np.testing.assert_allclose(camera.camera.T_camera_lidar, calibration.T_camera_lidar)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names are text there")
+def test_a_name_that_is_no_text_is_named(rig):
+    (rig / "lidar").rename(rig / os.fsdecode(b"lidar\xff"))
+    result = run("init", rig)
+    assert result.exit_code == 1
+    assert "not in UTF-8 cannot stand in ldls.toml; rename it" in " ".join(result.output.split())
+    assert not (rig / "ldls.toml").exists()
+
+
 @pytest.mark.parametrize(
     ("harm", "missing"),
     [

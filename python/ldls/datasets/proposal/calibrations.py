@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
@@ -16,7 +17,7 @@ from ldls.camera.extrinsic import extrinsic
 from ldls.camera.fields import Fields
 from ldls.camera.rigid import inverse, rigid
 from ldls.cloud import Points
-from ldls.errors import LdlsError, LimitError
+from ldls.errors import LdlsError, LimitError, SourceError
 from ldls.io import read_camera
 from ldls.io.cameras.extrinsic_file import as_extrinsic
 from ldls.io.cameras.field_file import read_fields
@@ -75,9 +76,9 @@ def camera_in(path: Path, pattern: str, hint: str) -> FoundCamera | None:
         pattern: What ldls.toml is to call it.
         hint: Name of the folder of the camera's images, which may tell which of several cameras it is.
     """
-    line = f'calibration = "{pattern}"'
+    line = f"calibration = {quoted(pattern)}"
     for which in _which(hint):
-        number = f'"{which}"' if isinstance(which, str) else which
+        number = quoted(which) if isinstance(which, str) else which
         keys = () if which is None else (f"calibration_camera = {number}",)
         camera = _read(path, camera=which)
         if camera is not None:
@@ -100,7 +101,7 @@ def camera_in(path: Path, pattern: str, hint: str) -> FoundCamera | None:
 def transforms_in(path: Path, pattern: str) -> list[FoundTransform]:
     """The transforms of a file, in all ways in which it can be read; none where it has none."""
     try:
-        return [FoundTransform(as_extrinsic(path), f'T_camera_lidar = "{pattern}"', pattern, True)]
+        return [FoundTransform(as_extrinsic(path), f"T_camera_lidar = {quoted(pattern)}", pattern, True)]
     except (LdlsError, ImportError, ValueError):
         return [each for name, table in _tables(path) for each in _of_table(name, table, pattern)]
 
@@ -130,6 +131,20 @@ def view_of(camera: Camera, points: Points, size: tuple[int, int]) -> tuple[bool
     in_view, _ = project(points, camera, image_size=camera.image_size or size)
     finite = int(np.isfinite(np.asarray(points)[:, :3]).all(axis=1).sum())
     return bool(-y > 0.5 * np.hypot(x, y)), len(in_view) / max(finite, 1)
+
+
+def quoted(text: str) -> str:
+    """A name in quotes, as ldls.toml has it.
+
+    Raises:
+        SourceError: It is that of a file whose bytes are no text.
+    """
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise SourceError(f"{text!a}: a name that is not in UTF-8 cannot stand in ldls.toml; rename it") from None
+    # what JSON escapes, TOML does in the same way, and DEL
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", r"\u007f")
 
 
 def matrix_line(name: str, matrix: NDArray[np.float64]) -> str:

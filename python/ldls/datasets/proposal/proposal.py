@@ -15,6 +15,7 @@ from ldls.datasets.proposal.calibrations import (
     FoundCamera,
     camera_in,
     plausible_transforms,
+    quoted,
     transforms_in,
     view_of,
 )
@@ -58,7 +59,7 @@ class Proposal:
 
     def ask(self, question: str) -> None:
         """Add a question as a comment."""
-        self.lines.append(f"# ? {question}")
+        self.lines.append(f"# ? {''.join(sign if sign.isprintable() else ' ' for sign in question)}")
 
 
 def propose(folder: Path) -> Proposal:
@@ -79,7 +80,7 @@ def propose(folder: Path) -> Proposal:
     made.lines += [
         "# What `ldls init` found; lines with # ? are questions. Paths are relative to this folder; {frame} is",
         "# the name of a frame. docs/datasets.md has all keys.",
-        f'points = "{sweeps.text}"',
+        f"points = {quoted(sweeps.text)}",
     ]
     made.found.append(f"{sweeps.text}: {_count(sweeps, 'sweep')}, the first of {len(points):,} points")
     if columns is not None:
@@ -140,7 +141,7 @@ def _add_truth(made: Proposal, sweeps: Pattern, patterns: Iterable[Pattern], col
         with suppress(LdlsError, ImportError):
             name = min(common)
             if len(read_labeling(pattern.files[name])) == len(read_points(sweeps.files[name], columns=columns)):
-                made.lines.append(f'truth = "{pattern.text}"')
+                made.lines.append(f"truth = {quoted(pattern.text)}")
                 made.found.append(f"{pattern.text}: true labels")
                 return
 
@@ -158,7 +159,7 @@ def _add_camera(
     name = "camera" if place == PurePosixPath() else "_".join(place.parts).replace(" ", "_")
     common = picture.shared(sweeps)
     size = read_image_size(picture.files[min(common)])
-    made.lines += ["", f'[cameras."{name}"]', f'images = "{picture.text}"']
+    made.lines += ["", f"[cameras.{quoted(name)}]", f"images = {quoted(picture.text)}"]
     count = f"{_count(picture, 'image')} of {size[1]} x {size[0]}, {len(common):,} with a sweep"
     made.found.append(f"{picture.text}: {count}")
     own = [pattern for pattern in patterns if pattern not in (picture, sweeps)]
@@ -183,7 +184,7 @@ def _add_masks(
         made.ask("no masks were found: any format of docs/masks.md, or `ldls run --segmenter`")
         return
     _, n_common, masks = max(fitting, key=lambda each: each[:2])
-    made.lines.append(f'masks = "{masks.text}"')
+    made.lines.append(f"masks = {quoted(masks.text)}")
     made.found.append(f"{masks.text}: masks of {_number(n_common, 'image')}")
 
 
