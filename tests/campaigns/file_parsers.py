@@ -374,7 +374,8 @@ MOST_STORES = 100
 stores, register_anew, Typestore.register = {}, Typestore.register, register
 rosbags.serde.utils.exec = lambda source, names: exec(compiled(source), names)
 compiled = functools.lru_cache(maxsize=10_000)(lambda source: compile(source, "<types of messages>", "exec"))
-anyreader.get_types_from_msg = functools.lru_cache(maxsize=100)(anyreader.get_types_from_msg)
+parsed_types = functools.lru_cache(maxsize=1000)(anyreader.get_types_from_msg)
+anyreader.get_types_from_msg = rosbags.typesys.get_types_from_msg = parsed_types
 
 
 def shrink(path):
