@@ -489,7 +489,7 @@ from ldls import batch
 
 def measure(finished, _failed, _total):
     # by then allocators have what they keep
-    if finished in (1000, 3000):
+    if finished > 1000:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
         print(pages * resource.getpagesize())
 
@@ -504,8 +504,9 @@ def test_memory_stays_flat(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", MEMORY, source, tmp_path / "out"], capture_output=True, text=True, check=True
     )
-    before, after = map(int, done.stdout.split())
-    assert (after - before) / 2000 < 2048
+    used = [int(line) for line in done.stdout.split()]
+    # what is there at the least: how much frames take for a moment depends on what else the machine does
+    assert (min(used[-500:]) - min(used[:500])) / 1500 < 2048
 
 
 def test_masks_that_are_nowhere(few, tmp_path):
