@@ -488,7 +488,6 @@ from pathlib import Path
 from ldls import batch
 
 def measure(finished, _failed, _total):
-    # by then allocators have what they keep
     if finished > 1000:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
         print(pages * resource.getpagesize())
@@ -499,14 +498,15 @@ batch.run(source, out, batch.RunSettings(masks=f"{source}/masks"), on_progress=m
 
 
 def test_memory_stays_flat(tmp_path):
-    source = layouts.many_frames(tmp_path / "source", 3000)
+    source = layouts.many_frames(tmp_path / "source", 4500)
     # in a process of its own: what other tests have left in this one moves its memory as well
     done = subprocess.run(
         [sys.executable, "-c", MEMORY, source, tmp_path / "out"], capture_output=True, text=True, check=True
     )
     used = [int(line) for line in done.stdout.split()]
-    # what is there at the least: how much frames take for a moment depends on what else the machine does
-    assert (min(used[-500:]) - min(used[:500])) / 1500 < 2048
+    # what is there at the least, for momentary peaks depend on what else the machine does; where it does much,
+    # allocators go on for some thousand frames to gather what they keep, 4 MB
+    assert (min(used[-500:]) - min(used[:500])) / 3000 < 2048
 
 
 def test_masks_that_are_nowhere(few, tmp_path):
