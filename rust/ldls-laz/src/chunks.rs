@@ -55,8 +55,8 @@ impl<'a> Chunks<'a> {
 
     /// Unpacks the next record.
     pub fn next(&mut self, record: &mut [u8]) -> laz::Result<()> {
-        while self.left == 0 {
-            let next = self.counts.next();
+        if self.left == 0 {
+            let next = self.counts.find(|&count| count > 0);
             self.left = next.ok_or_else(|| io::Error::other("more points than in all chunks"))?;
             self.begin()?;
         }

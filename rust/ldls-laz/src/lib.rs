@@ -86,12 +86,10 @@ impl<'a> Points<'a> {
                     Records::Layered(layers) => layers.decompress_one(&mut self.record)?,
                 }
                 let (words, _) = self.record[POSITION].as_chunks();
-                let [low, high] = self.record[INTENSITY] else {
-                    unreachable!("of two bytes")
-                };
+                let intensity = &self.record[INTENSITY];
                 take(
                     [words[0], words[1], words[2]].map(i32::from_le_bytes),
-                    u16::from_le_bytes([low, high]),
+                    u16::from_le_bytes([intensity[0], intensity[1]]),
                 );
             }
             Ok(())

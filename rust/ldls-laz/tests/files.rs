@@ -1,13 +1,16 @@
 //! Points that the crate `laz` packs come back, and bytes that it did not pack do no harm.
 
-use laz::{LasZipCompressor, LazItemRecordBuilder, LazItemType, LazVlr, LazVlrBuilder};
+use laz::{LasZipCompressor, LazItemRecordBuilder, LazItemType, LazVlrBuilder};
 use ldls_laz::{Error, Points};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use std::io::Cursor;
+use std::ops::Range;
 
 /// Bytes before the packed points.
 const OFFSET: u64 = 5;
+/// Where LASzip's record has the number of points of a chunk.
+const CHUNK_SIZE: Range<usize> = 12..16;
 
 #[derive(Debug, Clone)]
 struct Point {
@@ -61,32 +64,42 @@ fn points(format: &Format, count: usize) -> Vec<Point> {
     (0..count).map(point).collect()
 }
 
-/// The file, and LASzip's record.
-fn packed(format: &Format, points: &[Point], chunk: u32) -> (Vec<u8>, Vec<u8>) {
+/// The packer of a file, and LASzip's record; chunks are of any size where none is given.
+fn packer(
+    format: &Format,
+    chunk: Option<u32>,
+) -> (LasZipCompressor<'static, Cursor<Vec<u8>>>, Vec<u8>) {
     let mut items = LazItemRecordBuilder::new();
     for item in &format.0 {
         items.add_item(*item);
     }
-    let vlr = LazVlrBuilder::new(items.build())
-        .with_fixed_chunk_size(chunk)
-        .build();
+    let vlr = LazVlrBuilder::new(items.build());
+    let vlr = match chunk {
+        Some(size) => vlr.with_fixed_chunk_size(size),
+        None => vlr.with_variable_chunk_size(),
+    }
+    .build();
     let mut laszip = Vec::new();
     vlr.write_to(&mut laszip).unwrap();
-    (file(vlr, points), laszip)
-}
-
-fn file(vlr: LazVlr, points: &[Point]) -> Vec<u8> {
     let mut file = Cursor::new(vec![0; OFFSET as usize]);
     file.set_position(OFFSET);
-    let mut packer = LasZipCompressor::new(file, vlr).unwrap();
+    (LasZipCompressor::new(file, vlr).unwrap(), laszip)
+}
+
+fn pack(packer: &mut LasZipCompressor<'_, Cursor<Vec<u8>>>, point: &Point) {
+    let mut record: Vec<_> = point.steps.into_iter().flat_map(i32::to_le_bytes).collect();
+    record.extend(point.intensity.to_le_bytes());
+    record.extend(&point.rest);
+    packer.compress_one(&record).unwrap();
+}
+
+fn packed(format: &Format, points: &[Point], chunk: u32) -> (Vec<u8>, Vec<u8>) {
+    let (mut packer, laszip) = packer(format, Some(chunk));
     for point in points {
-        let mut record: Vec<_> = point.steps.into_iter().flat_map(i32::to_le_bytes).collect();
-        record.extend(point.intensity.to_le_bytes());
-        record.extend(&point.rest);
-        packer.compress_one(&record).unwrap();
+        pack(&mut packer, point);
     }
     packer.done().unwrap();
-    packer.into_inner().into_inner()
+    (packer.into_inner().into_inner(), laszip)
 }
 
 fn unpacked(file: &[u8], laszip: &[u8], count: usize) -> Result<Vec<([i32; 3], u16)>, Error> {
@@ -134,52 +147,40 @@ proptest! {
 #[test]
 fn one_chunk_without_a_table_is_read_to_its_end() {
     let format = Format(vec![LazItemType::Point10, LazItemType::GpsTime], 14);
-    let point = |i: u16| Point {
-        steps: [i.into(); 3],
-        intensity: i,
-        rest: vec![0; 14],
-    };
-    let points: Vec<_> = (0..99).map(point).collect();
+    let points = points(&format, 99);
     let (mut file, mut laszip) = packed(&format, &points, 1000);
     file.drain(OFFSET as usize..OFFSET as usize + 8);
     laszip[0] = 1;
     let found = unpacked(&file, &laszip, 99).unwrap();
-    assert_eq!(found[98], ([98; 3], 98));
+    assert_eq!(found[98], (points[98].steps, points[98].intensity));
 }
 
 #[test]
 fn chunks_of_several_sizes_have_them_in_the_table() {
-    let format = vec![LazItemType::Point10, LazItemType::GpsTime];
-    let mut items = LazItemRecordBuilder::new();
-    for item in format {
-        items.add_item(item);
-    }
-    let vlr = LazVlrBuilder::new(items.build())
-        .with_variable_chunk_size()
-        .build();
-    let mut laszip = Vec::new();
-    vlr.write_to(&mut laszip).unwrap();
-    let mut file = Cursor::new(vec![0; OFFSET as usize]);
-    file.set_position(OFFSET);
-    let mut packer = LasZipCompressor::new(file, vlr).unwrap();
-    for i in 0..10_u8 {
-        let mut record = [0; 28];
-        record[0] = i;
-        packer.compress_one(&record).unwrap();
+    let format = Format(vec![LazItemType::Point10, LazItemType::GpsTime], 14);
+    let points = points(&format, 10);
+    let (mut packer, laszip) = packer(&format, None);
+    for (i, point) in points.iter().enumerate() {
+        pack(&mut packer, point);
         if i == 2 || i == 3 {
             packer.finish_current_chunk().unwrap();
         }
     }
     packer.done().unwrap();
     let file = packer.into_inner().into_inner();
-    let found = unpacked(&file, &laszip, 10).unwrap();
-    assert!(found.iter().map(|point| point.0[0]).eq(0..10));
-    assert!(
-        unpacked(&file, &laszip, 11)
-            .unwrap_err()
-            .to_string()
-            .contains("all chunks")
-    );
+    // a size of 0 says the same
+    let mut unsized_chunks = laszip.clone();
+    unsized_chunks[CHUNK_SIZE].fill(0);
+    for laszip in [laszip, unsized_chunks] {
+        let found = unpacked(&file, &laszip, 10).unwrap();
+        assert!(
+            found
+                .into_iter()
+                .eq(points.iter().map(|point| (point.steps, point.intensity)))
+        );
+        let error = unpacked(&file, &laszip, 11).unwrap_err();
+        assert!(error.to_string().contains("all chunks"));
+    }
 }
 
 #[test]

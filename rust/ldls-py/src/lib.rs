@@ -1,5 +1,5 @@
 //! The private extension module `ldls._ldls`. It extracts arguments, checks them, releases the GIL, calls `ldls_core`
-//! and wraps what comes back. No algorithm lives here.
+//! or `ldls_laz` and wraps what comes back. No algorithm lives here.
 
 #![allow(
     clippy::needless_pass_by_value,

@@ -1,7 +1,7 @@
 """LAS and LAZ files.
 
-Source: https://www.asprs.org/wp-content/uploads/2019/07/LAS_1_4_r15.pdf. They are read here, for the libraries that
-could take a file that was cut short for a whole one, and some damaged ones end the process.
+Source: https://www.asprs.org/wp-content/uploads/2019/07/LAS_1_4_r15.pdf. They are written by laspy, and read here:
+libraries take a file that was cut short for a whole one, and some damaged files make them end the process.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.errors import CorruptFileError, LimitError, NonFiniteError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import InputFile, open_file, whole_file
@@ -81,7 +81,7 @@ def read(path: Path) -> NDArray[np.float64]:
 
 
 def _records(file: InputFile, header: Header) -> tuple[NDArray[np.int32], NDArray[np.uint16]]:
-    """Steps along x y z and intensities."""
+    """Steps along x y z, (N, 3) int32, and intensities, (N,) uint16."""
     record = np.dtype({
         "names": ["steps", "intensity"],
         "formats": ["3<i4", "<u2"],
@@ -94,7 +94,7 @@ def _records(file: InputFile, header: Header) -> tuple[NDArray[np.int32], NDArra
 
 
 def _unpacked(file: InputFile, header: Header) -> tuple[NDArray[np.int32], NDArray[np.uint16]]:
-    """The same."""
+    """The same, of packed points."""
     laszip = laszip_record(_vlrs(file, header))
     check_chunks(file, laszip, header.offset, header.record_bytes, header.n_points)
     file.seek(0)
