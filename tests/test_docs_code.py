@@ -96,7 +96,8 @@ def test_motion_within_a_sweep(run, capsys):
 def test_ci_runs_the_test_command_of_the_readme():
     command = "pip install '.[test]' && pytest"
     assert command in (pages.ROOT / "README.md").read_text()
-    assert command in (pages.ROOT / ".ci/run").read_text()
+    # in a group of its own, which fails where the install does
+    assert f"\n({command})\n" in (pages.ROOT / ".ci/run").read_text()
 
 
 def test_viewing(run, own_demo, tmp_path, monkeypatch):
