@@ -174,3 +174,14 @@ def test_a_database_with_a_topic_without_a_name_is_refused(bag):
         messages(path)
     with pytest.warns(RecoveredFileWarning):
         assert len(messages(path, recover=True)) == len(recorded) - 1
+
+
+@pytest.mark.parametrize("bag", ["rosbag2"], indirect=True)
+def test_a_message_that_is_a_number_asks_for_no_memory(bag):
+    path, _, recorded = bag
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("UPDATE messages SET data = 1 << 40 WHERE id = 2")
+    with pytest.raises(CorruptFileError, match="a.db3: .*not 'int'"):
+        messages(path)
+    with pytest.warns(RecoveredFileWarning):
+        assert len(messages(path, recover=True)) == len(recorded) - 1

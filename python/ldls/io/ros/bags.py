@@ -211,7 +211,8 @@ def _indexed(path: Path) -> Bag:
         for found, (connection, received_ns, raw) in enumerate(  # noqa: B007 - counted for the check below
             reader.messages(connections, start_ns, stop_ns), start=1
         ):
-            yield RawMessage(connection.topic, received_ns, bytes(raw))
+            # a damaged database may hold a number, of which `bytes` would make as many zeros
+            yield RawMessage(connection.topic, received_ns, bytes(memoryview(raw)))
         # the reader passes over records of a wrong length without a word
         if start_ns is None and stop_ns is None and found < expected:
             raise TruncatedFileError(

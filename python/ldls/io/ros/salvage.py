@@ -26,11 +26,8 @@ NO_LIMIT = sys.maxsize
 """Bags are as large as disks are; what is read of one at once is no larger than a chunk."""
 WHOLE_PAGES = "ldls-whole-pages"
 TOPICS = "SELECT id, name, type FROM topics WHERE typeof(name) = 'text' AND typeof(type) = 'text'"
-MESSAGES = """
-    SELECT id, topic_id, timestamp, data FROM messages
-    WHERE typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY id
-"""
-"""Rows of a database; pages full of zeros hold NULL, and data are read so that those cut short count as damaged."""
+MESSAGES = "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id"
+"""Rows of a database; data are read so that those cut short count as damaged."""
 
 
 class FileBytes:
@@ -281,12 +278,17 @@ class _Database(_Scan):
             with closing(self.connect()) as connection:
                 for number, topic, kind in connection.execute(TOPICS):
                     self.topics[number], self.salvaged.types[topic] = topic, kind
-                for number, topic_number, received_ns, _ in connection.execute(MESSAGES):
-                    self.add(topic_number, received_ns, partial(self.read, number))
+                n_broken = 0
+                for number, topic_number, received_ns, raw in connection.execute(MESSAGES):
+                    # pages full of zeros hold NULL
+                    if isinstance(received_ns, int) and isinstance(raw, bytes):
+                        self.add(topic_number, received_ns, partial(self.read, number))
+                    else:
+                        n_broken += 1
         except require("apsw", "ros").Error as error:
             return f"SQLite finds it damaged ({error})"
         self.closed = True
-        return None
+        return f"holds {n_broken} messages that are no bytes, or of no time" if n_broken else None
 
     def read(self, number: int) -> bytes:
         """The message of a row."""
