@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from rich.progress import track
+from scipy.spatial.transform import Rotation
 
 import ldls
 from ldls.datasets import open_source
@@ -19,6 +21,9 @@ from ldls.simulation.production import SUITE_SEGMENTER, SUITE_SENSORS
 FIRST_SEED = 4000
 KINDS = ("street", "campus")
 CLASSES = ("Car", "Pedestrian")
+
+OFF_M, OFF_DEG, OFF_S = 0.05, 0.3, 0.05
+"""What wrong poses are off by."""
 
 Window = Sequence[tuple[ldls.Sweep, Labeling]]
 
@@ -44,6 +49,21 @@ def _sweeps(folder: Path) -> Iterator[tuple[ldls.Sweep, Labeling]]:
             raise RuntimeError(f"{folder}: frame {frame.name} has no pose, stamp or truth")
         in_view = np.isin(np.arange(len(frame.points)), seen)
         yield ldls.Sweep(frame.points, [view], frame.pose, frame.stamp), frame.truth.restricted(in_view)
+
+
+def with_wrong_poses(drive: Window, seed: int) -> Window:
+    """The drive with poses of `OFF_S` too early or too late, and then `OFF_M` and `OFF_DEG` off, each another way."""
+    generator = np.random.default_rng(seed)
+    sweeps = [sweep for sweep, _ in drive]
+    trajectory = ldls.Trajectory([sweep.stamp for sweep in sweeps], [sweep.pose for sweep in sweeps])
+    wrong = []
+    for sweep, truth in drive:
+        off_s, shift, turn = generator.choice([-OFF_S, OFF_S]), generator.normal(size=3), generator.normal(size=3)
+        off = np.eye(4)
+        off[:3, :3] = Rotation.from_rotvec(np.deg2rad(OFF_DEG) * turn / np.linalg.norm(turn)).as_matrix()
+        off[:3, 3] = OFF_M * shift / np.linalg.norm(shift)
+        wrong.append((replace(sweep, pose=trajectory.at(sweep.stamp + off_s) @ off), truth))
+    return wrong
 
 
 def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evaluation, TrackingScores, float]:
