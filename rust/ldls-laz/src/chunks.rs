@@ -4,7 +4,7 @@ use crate::Source;
 use crate::times::Times;
 use laz::errors::LasZipError;
 use laz::las::{v1, v2};
-use laz::laszip::ChunkTable;
+use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::record::{RecordDecompressor, SequentialPointRecordDecompressor};
 use laz::{LazItem, LazItemType, LazVlr};
 use std::io;
@@ -16,28 +16,42 @@ const CHUNKS: u16 = 2;
 
 type Records<'a> = SequentialPointRecordDecompressor<'a, Source<'a>>;
 
+/// One chunk.
+#[derive(Debug, Clone, Copy)]
+struct Chunk {
+    /// Where its bytes begin, if not after those of the one before.
+    start: Option<u64>,
+    n_records: u64,
+}
+
+impl Chunk {
+    /// One of so many records, after the one before.
+    fn next(n_records: u64) -> Self {
+        let start = None;
+        Self { start, n_records }
+    }
+}
+
 /// The records of a file, and where its chunks end.
 pub struct Chunks<'a> {
     records: Records<'a>,
     items: Vec<LazItem>,
-    /// Numbers of records of the chunks to come.
-    counts: Box<dyn Iterator<Item = u64> + Send + Sync>,
+    to_come: Box<dyn Iterator<Item = Chunk> + Send + Sync>,
     left: u64,
 }
 
 impl<'a> Chunks<'a> {
     /// The records at the position of `source`, packed as `packing` and `vlr` say.
     pub fn new(mut source: Source<'a>, packing: u16, vlr: &LazVlr) -> laz::Result<Self> {
-        let counts: Box<dyn Iterator<Item = u64> + Send + Sync> = match packing {
-            ONE_CHUNK => Box::new(repeat(u64::MAX)),
+        let to_come: Box<dyn Iterator<Item = Chunk> + Send + Sync> = match packing {
+            ONE_CHUNK => Box::new(repeat(Chunk::next(u64::MAX))),
             CHUNKS if vlr.uses_variable_size_chunks() => {
                 let table = ChunkTable::read_from(&mut source, vlr)?;
-                let counts: Vec<_> = (0..table.len()).map(|at| table[at].point_count).collect();
-                Box::new(counts.into_iter())
+                Box::new(listed(&table, source.position()).into_iter())
             }
             CHUNKS => {
                 source.set_position(source.position() + ChunkTable::OFFSET_SIZE as u64);
-                Box::new(repeat(vlr.chunk_size().into()))
+                Box::new(repeat(Chunk::next(vlr.chunk_size().into())))
             }
             other => {
                 return Err(
@@ -48,7 +62,7 @@ impl<'a> Chunks<'a> {
         Ok(Self {
             records: Records::new(source),
             items: vlr.items().clone(),
-            counts,
+            to_come,
             left: 0,
         })
     }
@@ -56,22 +70,40 @@ impl<'a> Chunks<'a> {
     /// Unpacks the next record.
     pub fn next(&mut self, record: &mut [u8]) -> laz::Result<()> {
         if self.left == 0 {
-            let next = self.counts.find(|&count| count > 0);
-            self.left = next.ok_or_else(|| io::Error::other("more points than in all chunks"))?;
-            self.begin()?;
+            // a chunk without records may have bytes all the same
+            let next = self.to_come.find(|chunk| chunk.n_records > 0);
+            self.begin(next.ok_or_else(|| io::Error::other("more points than in all chunks"))?)?;
         }
         self.left -= 1;
         Ok(self.records.decompress_next(record)?)
     }
 
     /// Forgets what the last chunk had shown.
-    fn begin(&mut self) -> laz::Result<()> {
+    fn begin(&mut self, chunk: Chunk) -> laz::Result<()> {
+        self.left = chunk.n_records;
         self.records.reset();
+        if let Some(start) = chunk.start {
+            self.records.get_mut().set_position(start);
+        }
         for item in &self.items {
             add(&mut self.records, *item)?;
         }
         Ok(())
     }
+}
+
+/// Chunks as they stand in `table`, the first from byte `start` on.
+fn listed(table: &ChunkTable, mut start: u64) -> Vec<Chunk> {
+    let chunk = |at| {
+        let entry: &ChunkTableEntry = &table[at];
+        let chunk = Chunk {
+            start: Some(start),
+            n_records: entry.point_count,
+        };
+        start = start.saturating_add(entry.byte_count);
+        chunk
+    };
+    (0..table.len()).map(chunk).collect()
 }
 
 /// Adds the decoder of `item`.

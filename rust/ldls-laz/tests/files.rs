@@ -162,7 +162,12 @@ fn chunks_of_several_sizes_have_them_in_the_table() {
     let (mut packer, laszip) = packer(&format, None);
     for (i, point) in points.iter().enumerate() {
         pack(&mut packer, point);
-        if i == 2 || i == 3 {
+        // one of three points, one of one, and one of none
+        if i == 2 {
+            packer.finish_current_chunk().unwrap();
+        }
+        if i == 3 {
+            packer.finish_current_chunk().unwrap();
             packer.finish_current_chunk().unwrap();
         }
     }
