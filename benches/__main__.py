@@ -97,19 +97,22 @@ def suite(measured: Frame, options: argparse.Namespace) -> Table:
         "the defaults": ldls.Params(threads=options.threads),
     }
 
-    def times_ms(frame: Frame) -> list[float]:
-        inputs = (frame.points, frame.masks, frame.camera)
-        sides = {name: partial(ldls.segment, *inputs, params=params) for name, params in methods.items()}
-        return [1e3 * seconds for seconds in medians(sides, runs=min(options.runs, 5)).values()]
-
-    one = times_ms(measured)
-    times = [times_ms(frame) for frame in suite_frames(options.frames)]
+    frames = [measured, *suite_frames(options.frames)]
+    # round after round over all frames, so that slow minutes of the machine fall on all of them alike
+    calls = {
+        (name, at): partial(ldls.segment, frame.points, frame.masks, frame.camera, params=params)
+        for name, params in methods.items()
+        for at, frame in enumerate(frames)
+    }
+    runs = min(options.runs, 5)
+    seconds = medians(calls, runs=runs)
     table = _table(
-        f"ldls.segment: {len(times)} frames of the suite",
+        f"ldls.segment: {len(frames) - 1} frames of the suite",
         ["ms a frame", measured.name, "median", "90 %", "99 %", "worst", "99 % / median"],
-        f"a frame's time is the median of {min(options.runs, 5)} runs, {options.threads} threads",
+        f"a frame's time is the median of {runs} runs, {options.threads} threads",
     )
-    for name, one_ms, suite_ms in zip(methods, one, np.transpose(times), strict=True):
+    for name in methods:
+        one_ms, *suite_ms = (1e3 * seconds[name, at] for at in range(len(frames)))
         median, _, high, _ = found = np.percentile(suite_ms, [50, 90, 99, 100])
         table.add_row(name, *(f"{ms:.1f}" for ms in (one_ms, *found)), f"{high / median:.2f} x")
     return table

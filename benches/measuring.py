@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
+from typing import TypeVar
+
+Key = TypeVar("Key", bound=Hashable)
 
 
-def medians(candidates: Mapping[str, Callable[[], object]], *, runs: int = 20) -> dict[str, float]:
+def medians(candidates: Mapping[Key, Callable[[], object]], *, runs: int = 20) -> dict[Key, float]:
     """Median seconds of each candidate over `runs` rounds, after one round to warm up."""
-    seconds: dict[str, list[float]] = {name: [] for name in candidates}
+    seconds: dict[Key, list[float]] = {name: [] for name in candidates}
     for round_number in range(runs + 1):
         for name, candidate in candidates.items():
             start = time.perf_counter()

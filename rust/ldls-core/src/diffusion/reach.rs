@@ -8,6 +8,7 @@ use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{filled, push, zeros};
 use crate::{Cancel, Error, Result};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Share of the work of diffusing the whole graph from which on that is done instead.
@@ -110,29 +111,44 @@ impl Reach {
             *value = seed.map(|seed| first * seed);
         }
         for (step, &end) in steps.iter().zip(self.ends[..steps.len()].iter().rev()) {
-            let rows = next[..end]
-                .par_iter_mut()
-                .enumerate()
-                .with_min_len(ROWS_A_TASK);
-            rows.try_for_each(|(at, next)| {
+            let tasks = next[..end].par_chunks_mut(ROWS_A_TASK).enumerate();
+            tasks.try_for_each(|(task, next)| {
                 cancel.check()?;
-                let mut sum = [0.0; WIDTH_F64];
-                for (column, weight) in a.row(at) {
-                    for lane in 0..WIDTH_F64 {
-                        sum[lane] += weight * values[column][lane];
-                    }
-                }
-                for lane in 0..WIDTH_F64 {
-                    next[lane] = step.seeds * seeds[at][lane] + step.along * sum[lane]
-                        - step.stay * values[at][lane]
-                        - step.back * next[lane];
-                }
+                take_step(a, *step, &seeds, &values, task * ROWS_A_TASK, next);
                 Ok::<(), Error>(())
             })?;
             std::mem::swap(&mut values, &mut next);
         }
         values.truncate(self.ends[0]);
         Ok(values)
+    }
+}
+
+/// Takes `step` with the rows from `start` on, whose values before the last step are in `next`.
+#[multiversion(targets("x86_64+avx2"))]
+fn take_step(
+    a: &PointGraph<f64>,
+    step: Step<f64>,
+    seeds: &[[f64; WIDTH_F64]],
+    values: &[[f64; WIDTH_F64]],
+    start: usize,
+    next: &mut [[f64; WIDTH_F64]],
+) {
+    let points = next.iter_mut().zip(&seeds[start..]).zip(&values[start..]);
+    for (at, ((next, seeds), own)) in (start..).zip(points) {
+        let (columns, weights) = a.slices(at..at + 1);
+        let mut sum = [0.0; WIDTH_F64];
+        for (&column, &weight) in columns.iter().zip(weights) {
+            let values = &values[column as usize];
+            for lane in 0..WIDTH_F64 {
+                sum[lane] += weight * values[lane];
+            }
+        }
+        for lane in 0..WIDTH_F64 {
+            next[lane] = step.seeds * seeds[lane] + step.along * sum[lane]
+                - step.stay * own[lane]
+                - step.back * next[lane];
+        }
     }
 }
 
