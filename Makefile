@@ -96,10 +96,14 @@ sample: ## Make the frame of `ldls demo` anew, from its seed.
 	python tests/simulation/make_sample.py
 
 # manylinux2014: any Linux with glibc 2.17, of 2012, or newer
+# a thread that the interpreter ends is unwound by the system's library: zig's own, in its place, ends the process
+SYSTEM_UNWINDER = $(shell gcc -print-file-name=libgcc_s.so.1)
+
 .PHONY: release
 release: ## Build wheel and sdist into dist/, check both, and build the sdist again.
 	rm -rf dist build/from-sdist
-	maturin build --release --locked --zig --compatibility manylinux2014 --out dist
+	RUSTFLAGS="-C link-arg=$(SYSTEM_UNWINDER)" \
+		maturin build --release --locked --zig --compatibility manylinux2014 --out dist
 	maturin sdist --out dist
 	twine check --strict dist/*
 	auditwheel show dist/*.whl | grep '"manylinux_2_17_'

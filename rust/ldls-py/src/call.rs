@@ -4,6 +4,7 @@
 use crate::allocator::{has_ballast, take_ballast};
 use crate::errors::{out_of_memory, raise, to_python};
 use ldls_core::Cancel;
+use pyo3::intern;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::any::Any;
@@ -90,6 +91,7 @@ fn on_pool<T: Send>(
 ) -> PyResult<std::thread::Result<T>> {
     let (work, cancel) = (Mutex::new(Some(work)), Cancel::default());
     let (outcome, done) = (Mutex::new(None), Condvar::new());
+    let gets_signals = is_main_thread(py)?;
     let stopped = py.detach(|| {
         pool.in_place_scope(|scope| {
             scope.spawn_broadcast(|_, thread| {
@@ -106,7 +108,7 @@ fn on_pool<T: Send>(
                 found = waited.unwrap_or_else(PoisonError::into_inner).0;
                 if found.is_none() {
                     drop(found);
-                    if let Err(error) = look_around() {
+                    if let Err(error) = look_around(gets_signals) {
                         cancel.cancel();
                         return Err(error);
                     }
@@ -121,10 +123,21 @@ fn on_pool<T: Send>(
     Ok(outcome.expect("a pool has a first thread"))
 }
 
-/// The exception that a signal raises, or that there is next to no memory left.
-fn look_around() -> PyResult<()> {
-    let signals = |py: Python<'_>| py.check_signals();
-    Python::attach(signals)?;
+/// True in the one thread that Python calls handlers of signals in.
+fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
+    let threading = py.import(intern!(py, "threading"))?;
+    let main = threading.call_method0(intern!(py, "main_thread"))?;
+    let own = threading.call_method0(intern!(py, "get_ident"))?;
+    main.getattr(intern!(py, "ident"))?.eq(own)
+}
+
+/// The exception that a signal raises, where this thread gets them, or that there is next to no memory left. Other threads keep
+/// away from the interpreter, which may end at that moment: the process would end by a fault of memory.
+fn look_around(gets_signals: bool) -> PyResult<()> {
+    if gets_signals {
+        let signals = |py: Python<'_>| py.check_signals();
+        Python::try_attach(signals).unwrap_or(Ok(()))?;
+    }
     if has_ballast() {
         return Ok(());
     }
