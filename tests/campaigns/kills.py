@@ -21,7 +21,7 @@ KINDS = {
     "frames one by one": (layouts.many_frames, ()),
     "a drive": (drives.small_drive, ("--sweeps", 2, "--track")),
 }
-"""What makes the source, and what the command says besides."""
+"""What makes the source of each kind, and the options that its command has besides."""
 
 
 def main():
@@ -29,31 +29,32 @@ def main():
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    done = [campaign(kind, options.kills // len(KINDS), options.seed) for kind in KINDS]
-    sys.exit(not all(done))
+    kills = -(-options.kills // len(KINDS))
+    sys.exit(not all([holds(kind, kills, options.seed) for kind in KINDS]))
 
 
-def campaign(kind, kills, seed):
-    """Whether all folders of so many kills equal the undisturbed one."""
+def holds(kind, kills, seed):
+    """Kill runs of a kind so many times; whether all their folders equal the undisturbed one."""
     with tempfile.TemporaryDirectory() as folder:
-        of_kind = Campaign(Path(folder), random.Random(seed), *KINDS[kind])
-        while of_kind.n_kills < kills:
-            of_kind.disturb(kills - of_kind.n_kills)
-            print(f"\r{of_kind.n_kills} kills", end="", file=sys.stderr, flush=True)
+        campaign = Campaign(Path(folder), random.Random(seed), *KINDS[kind])
+        while campaign.n_kills < kills:
+            campaign.disturb(kills - campaign.n_kills)
+            print(f"\r{campaign.n_kills} kills", end="", file=sys.stderr, flush=True)
     print(
-        f"\n{kind}: {of_kind.n_kills} kills ({of_kind.n_at_steps} at a step of a write) of {of_kind.n_runs} runs over "
-        f"{N_FRAMES} frames; {of_kind.n_equal} of {of_kind.n_runs} folders equal the undisturbed one byte for byte"
+        f"\n{kind}: {campaign.n_kills} kills ({campaign.n_at_steps} at a step of a write) of {campaign.n_runs} runs "
+        f"over {N_FRAMES} frames; "
+        f"{campaign.n_equal} of {campaign.n_runs} folders equal the undisturbed one byte for byte"
     )
-    return of_kind.n_equal == of_kind.n_runs
+    return campaign.n_equal == campaign.n_runs
 
 
 class Campaign:
     """Runs that are killed one to four times each, at random moments and at steps of a write in turn."""
 
-    def __init__(self, folder, random_, made, said):
-        self.folder, self.random, self.said = folder, random_, said
+    def __init__(self, folder, random_, make_source, options):
+        self.folder, self.random, self.options = folder, random_, options
         self.n_kills = self.n_at_steps = self.n_runs = self.n_equal = 0
-        self.source = made(folder / "source", N_FRAMES)
+        self.source = make_source(folder / "source", N_FRAMES)
         out = folder / "undisturbed"
         start = time.monotonic()
         assert self.finish(out) == 0
@@ -72,7 +73,7 @@ class Campaign:
         return runs.finished(self.arguments(out)).returncode
 
     def arguments(self, out):
-        return runs.arguments(self.source, out, *self.said)
+        return runs.arguments(self.source, out, *self.options)
 
     def kill_at_random(self, out):
         return runs.killed_after(self.arguments(out), out, self.random.uniform(0, self.longest_s / 2))
