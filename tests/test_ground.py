@@ -78,20 +78,27 @@ def fitted(cells):
 
 
 def local_offsets(places, heights):
-    """Height (n,) of the fullest layer, 6 cm thick, around each place: in its cell of 1 m and the eight around it."""
+    """Height (n,) of the level that each place stands on: the highest not above it, else the lowest, of the levels in
+    its cell of 1 m and the eight around it."""
     cells = np.floor(places[:, :2]).astype(int)
     steps = np.floor((heights + 0.22) / 0.02)
     near = (steps >= 0) & (steps < 22)
-    offsets = {}
+    levels = {}
     for cell in {tuple(cell) for cell in cells.tolist()}:
         around = near & (np.abs(cells - cell).max(axis=1) <= 1)
         counts = np.bincount(steps[around].astype(int), minlength=22)
-        first = max(range(20), key=lambda low: (counts[low : low + 3].sum(), -low))
-        full = counts[first : first + 3].sum()
-        enough = full >= 30 and full >= 0.4 * counts.sum()
-        middles = (np.arange(first, first + 3) + 0.5) * 0.02 - 0.22
-        offsets[cell] = counts[first : first + 3] @ middles / full if enough else 0.0
-    return np.array([offsets[tuple(cell)] for cell in cells.tolist()])
+        layers = np.lib.stride_tricks.sliding_window_view(counts, 3)
+        full = layers.sum(axis=1)
+        below, above = np.append(-1, full[:-1]), np.append(full[1:], 0)
+        found = (full > below) & (full >= above) & (full >= 20) & (full >= 0.3 * counts.sum())
+        middles = (np.arange(20)[:, None] + np.arange(3) + 0.5) * 0.02 - 0.22
+        levels[cell] = ((layers * middles).sum(axis=1)[found] / full[found])[:3]
+    offsets = []
+    for cell, height in zip(cells.tolist(), heights, strict=True):
+        own = levels[tuple(cell)]
+        not_above = own[own <= height + 0.03]
+        offsets.append(not_above[-1] if len(not_above) else own[0] if len(own) else 0.0)
+    return np.array(offsets)
 
 
 def sloping_road(seed, slope=(0.05, -0.03)):
@@ -181,6 +188,21 @@ def test_the_local_ground_is_that_of_a_pavement():
     assert np.abs(local).max() < 0.03
     assert np.abs(local).mean() < 0.005
     assert np.abs(smooth).mean() > 0.01
+
+
+def test_the_edge_of_a_pavement_is_ground_and_what_stands_beside_it_is_not():
+    generator = np.random.default_rng(9)
+    xy = generator.uniform([2, -8], [30, 8], (20_000, 2))
+    kerb, wheel = np.array([14.0, 3.0]), generator.uniform([13.9, 2.5, 0.05], [14.1, 2.9, 0.5], (60, 3))
+    up = np.concatenate([np.where(xy[:, 1] > kerb[1], 0.12, 0.0), wheel[:, 2]])
+    xy = np.concatenate([xy, wheel[:, :2]])
+    points = np.column_stack([xy, 0.03 * xy[:, 0] + up - 1.7])
+    heights = ldls.stages.ground(points, CAMERA)
+    near = np.abs(xy - kerb).max(axis=1) < 0.8
+    assert np.abs(heights[near][up[near] == 0.12]).max() < 0.03
+    assert np.abs(heights[near][up[near] == 0]).max() < 0.03
+    stands = (up > 0.2) & (up < 0.5)
+    np.testing.assert_allclose(heights[stands], up[stands] - 0.12, atol=0.03)
 
 
 def test_a_slope_that_bends_is_followed():

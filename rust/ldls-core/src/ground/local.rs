@@ -1,6 +1,6 @@
 //! The local offset of the ground from its smooth surface: kerbs, lawns, ramps.
 
-use crate::memory::{with_room, zeros};
+use crate::memory::{filled, with_room, zeros};
 use crate::{Cancel, Result};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -13,9 +13,13 @@ const NEAR_M: f64 = 0.22;
 const STEP_M: f64 = 0.02;
 const STEPS: usize = (2.0 * NEAR_M / STEP_M + 0.5) as usize;
 const THICKNESS: usize = 3;
-/// Points that the ground must have, and their share of those near the surface: the foot of an object is no ground.
-const LEAST_POINTS: u32 = 30;
-const LEAST_SHARE: f64 = 0.4;
+/// Points that a level must have, and their share of those near the surface: the foot of an object is none.
+const LEAST_POINTS: u32 = 20;
+const LEAST_SHARE: f64 = 0.3;
+/// Most levels around a cell: a road, a kerb and a lawn.
+const MOST_LEVELS: usize = 3;
+/// Noise, in metres, by which a point may lie below the level that it is on.
+const NOISE_M: f64 = 0.03;
 
 /// Points between two looks at the flag.
 const POINTS_A_BLOCK: usize = 1 << 16;
@@ -23,6 +27,9 @@ const POINTS_A_BLOCK: usize = 1 << 16;
 type Cell = (i64, i64);
 type Cells = HashMap<Cell, usize, BuildHasherDefault<CellHasher>>;
 type Histogram = [u32; STEPS];
+
+/// Heights of the ground around a cell above the smooth surface, ascending; infinite where there are no more.
+type Levels = [f64; MOST_LEVELS];
 
 /// Turns `heights` of `places` above the smooth surface, in metres, into those above the ground around each.
 pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -> Result<()> {
@@ -35,12 +42,12 @@ pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -
         }
     }
     cancel.check()?;
-    let mut offsets = zeros(cells.len(), cancel)?;
+    let mut levels = filled([f64::INFINITY; MOST_LEVELS], cells.len(), cancel)?;
     for (&cell, &number) in &cells {
-        offsets[number] = offset(&around(&counts, &cells, cell));
+        levels[number] = levels_of(&around(&counts, &cells, cell));
     }
     for (height, number) in heights.iter_mut().zip(numbers) {
-        *height -= offsets[number as usize];
+        *height -= below(*height, &levels[number as usize]);
     }
     Ok(())
 }
@@ -88,24 +95,42 @@ fn around(counts: &[Histogram], cells: &Cells, (column, row): Cell) -> Histogram
     sum
 }
 
-/// The mean height of the fullest layer, the lowest of equals, where it is full enough to be the ground; 0 elsewhere.
-fn offset(histogram: &Histogram) -> f64 {
+/// The mean heights of the lowest layers that are fuller than those beside them, and full enough to be the ground.
+fn levels_of(histogram: &Histogram) -> Levels {
     let points = |layer: &[u32]| layer.iter().sum::<u32>();
-    let layers = histogram.windows(THICKNESS).enumerate();
-    let fullest = layers.rev().max_by_key(|(_, layer)| points(layer));
-    let Some((first, layer)) = fullest else {
-        return 0.0;
-    };
-    let full = points(layer);
-    if full < LEAST_POINTS || f64::from(full) < LEAST_SHARE * f64::from(points(histogram)) {
-        return 0.0;
-    }
+    let least = LEAST_SHARE * f64::from(points(histogram));
+    let full = |first: usize| histogram.get(first..first + THICKNESS).map_or(0, points);
     let height = |step: usize| (step as f64 + 0.5) * STEP_M - NEAR_M;
-    let sum: f64 = (first..)
-        .zip(layer)
-        .map(|(step, &count)| f64::from(count) * height(step))
-        .sum();
-    sum / f64::from(full)
+    let is_level = |&first: &usize| {
+        let own = full(first);
+        let fuller = own >= full(first + 1) && (first == 0 || own > full(first - 1));
+        fuller && own >= LEAST_POINTS && f64::from(own) >= least
+    };
+    let mean = |first: usize| {
+        let layer = first..first + THICKNESS;
+        let sum: f64 = layer
+            .map(|step| f64::from(histogram[step]) * height(step))
+            .sum();
+        sum / f64::from(full(first))
+    };
+    let mut levels = [f64::INFINITY; MOST_LEVELS];
+    let found = (0..=STEPS - THICKNESS).filter(is_level).map(mean);
+    levels
+        .iter_mut()
+        .zip(found)
+        .for_each(|(level, found)| *level = found);
+    levels
+}
+
+/// The level that a point at `height` stands on: the highest that is not above it, the lowest where all are; 0 where
+/// there is none.
+fn below(height: f64, levels: &Levels) -> f64 {
+    let highest = levels
+        .iter()
+        .rev()
+        .find(|level| **level <= height + NOISE_M);
+    let level = *highest.unwrap_or(&levels[0]);
+    if level.is_finite() { level } else { 0.0 }
 }
 
 /// Hashes the two numbers of a cell in a few instructions: nobody picks points to make cells collide.
