@@ -221,7 +221,11 @@ def object_interval(distances, weights, beside, params):
         else:
             chains.append([group])
     joined = [np.concatenate(chain) for chain in chains]
-    best = max(joined, key=lambda chain: weights[chain].sum() * on_mask(chain))
+
+    def weight(chain):
+        return weights[chain].sum() * on_mask(chain) ** 2 / np.sqrt(max(distances[chain[0]], 0.3))
+
+    best = max(joined, key=weight)
     return distances[best[0]] - 0.3, distances[best[-1]] + 0.3
 
 
