@@ -42,7 +42,7 @@ INGREDIENTS: dict[str, tuple[str, ...]] = {
     "depth groups": ("depth_gap",),
     "gaps bridged": ("bridged_gap",),
     "margin of masks": ("edge_margin",),
-    "parts": ("part_size",),
+    "parts": ("part_gap",),
     "clearance": ("ground_clearance",),
     "local ground": ("local_ground",),
 }
@@ -54,11 +54,11 @@ SETTINGS: dict[str, tuple[object, ...]] = {
     "window": (1, 3, 9),
     "iterations": (5, 20, 50, 200),
     "ground_edges": (0.0, 0.1, 1.0),
-    "ground_clearance": (0.0, 0.02, 0.06, 0.08),
+    "ground_clearance": (0.0, 0.01, 0.04, 0.08),
     "depth_gap": (0.4, 0.8, 1.2),
     "bridged_gap": (0.0, 1.0, 3.0),
     "edge_margin": (0.0, 0.1, 0.25),
-    "part_size": (0.05, 0.2, 1.0),
+    "part_gap": (0.0, 0.5, 1.0, 3.0),
 }
 
 Labeller = Callable[[Frame], NDArray[np.int32]]

@@ -18,13 +18,12 @@ class Expected:
     labels: np.ndarray
     likelihood: np.ndarray
     edges: coo_array
-    admitted: np.ndarray
+    xyz: np.ndarray
     heights: np.ndarray
 
     def remove_outliers(self, labels, params):
         """Step 7, and the clearance of the ground."""
-        part_size = params.part_size if params.remove_outliers else None
-        kept = labels if part_size is None else largest_components(self.edges, labels, part_size, self.admitted)
+        kept = largest_components(self.edges, labels, self.xyz, params.part_gap) if params.remove_outliers else labels
         low = (self.heights > -0.3) & (self.heights < params.ground_clearance) & (params.ground_clearance > 0)
         return np.where(low, 0, kept)
 
@@ -51,7 +50,7 @@ def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1, heights=No
     for _ in range(params.iterations):
         z = A @ z + b
     diffused = z.argmax(axis=1) if len(z) else np.zeros(0, int)
-    expected = Expected(in_view, pixels, diffused, diffused, z, edges, admitted, heights)
+    expected = Expected(in_view, pixels, diffused, diffused, z, edges, xyz, heights)
     expected.labels = expected.remove_outliers(diffused, params)
     return expected
 
@@ -69,7 +68,6 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
     if rows is not None:
         seen = pixels_taken(views, seen, groups, rows)
     labels, mass = np.zeros((len(in_view), len(groups) + 1)), np.zeros(len(in_view))
-    at_depth = np.zeros(labels.shape, bool)
     for camera, ((masks, _, _), (rows, pixels)) in enumerate(zip(views, seen, strict=True)):
         of_instance = [0] + [1 + [(camera, m) in group for group in groups].index(True) for m in range(len(masks))]
         at = np.searchsorted(in_view, rows)
@@ -80,7 +78,6 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
         own, own_mass = pixel_edges(pixels, masks, params.window, params.pixel_weight)
         for instance, label in enumerate(of_instance):
             labels[at, label] += own[:, instance] * admitted[:, instance]
-            at_depth[at, label] |= admitted[:, instance]
         mass[at] += own_mass
     edges = point_edges(xyz, params.neighbors, params.sigma, ground, params.ground_edges)
     row_sums = edges.sum(axis=1) + mass
@@ -89,7 +86,7 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
     for _ in range(params.iterations):
         z = A @ z + b
     diffused = z.argmax(axis=1)
-    expected = Expected(in_view, None, diffused, diffused, z, edges, at_depth, heights)
+    expected = Expected(in_view, None, diffused, diffused, z, edges, xyz, heights)
     whole = np.full(len(points), -1)
     whole[in_view] = expected.remove_outliers(diffused, params)
     return whole, groups
@@ -258,7 +255,7 @@ def pixel_edges(pixels, masks, window, pixel_weight):
     return labels, mass
 
 
-def largest_components(edges, labels, part_size=1.0, admitted=None):
+def largest_components(edges, labels, xyz, part_gap):
     kept = np.zeros_like(labels)
     for m in range(1, labels.max(initial=0) + 1):
         members = np.flatnonzero(labels == m)
@@ -266,9 +263,9 @@ def largest_components(edges, labels, part_size=1.0, admitted=None):
         if len(members):
             # components are numbered by their first member, and argmax takes the first of equals
             sizes = np.bincount(component)
-            stays = np.arange(len(sizes)) == sizes.argmax()
-            if part_size < 1:
-                at_depth = np.ones(len(members)) if admitted is None else admitted[members, m]
-                stays |= (sizes >= part_size * sizes.max()) & (np.bincount(component, at_depth) >= 0.8 * sizes)
-            kept[members[stays[component]]] = m
+            stays = component == sizes.argmax()
+            if part_gap > 0:
+                near = (cdist(xyz[members], xyz[members[stays]]) <= part_gap).any(axis=1)
+                stays |= np.isin(component, component[near])
+            kept[members[stays]] = m
     return kept

@@ -222,9 +222,9 @@ CALLS = {
         {
             "graph": W.A,
             "labels": W.z.argmax(axis=1),
-            "depths": W.depths,
+            "points": W.xyz,
             "heights": W.heights,
-            "part_size": 0.5,
+            "part_gap": 0.5,
             "ground_clearance": 0.1,
         },
     ),

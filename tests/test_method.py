@@ -81,7 +81,7 @@ def random_scene(generator, added=False):
             "depth_gap": generator.choice([0.0, 0.1, 0.6]),
             "bridged_gap": generator.choice([0.0, 1.5]),
             "edge_margin": generator.choice([0.0, 0.15]),
-            "part_size": generator.choice([0.1, 0.5, 1.0]),
+            "part_gap": generator.choice([0.0, 0.5, 1.5]),
         }
     own = dict(
         neighbors=int(generator.integers(1, 13)),
@@ -122,7 +122,7 @@ def test_the_stages_together_equal_the_whole(frame_571):
     graph = stages.point_graph(xyz, indices, heights=heights)
     A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, frame.masks, depths=depths))
     z = stages.diffuse(A, b)
-    labels = stages.remove_outliers(A, z.argmax(axis=1), depths=depths, heights=heights)
+    labels = stages.remove_outliers(A, z.argmax(axis=1), points=xyz, heights=heights)
     result = ldls.segment(frame.points, frame.masks, frame.camera)
     np.testing.assert_array_equal(labels, result.labels[in_view])
     confidence = stages.confidence(z, labels, frame.masks)

@@ -11,7 +11,7 @@ def test_the_papers_parameters_add_nothing_to_its_method():
     assert (params.neighbors, params.sigma, params.pixel_weight) == (10, 1.0, 0.001)
     assert (params.window, params.iterations, params.remove_outliers) == (5, 200, True)
     assert (params.ground_edges, params.ground_clearance, params.local_ground) == (1.0, 0.0, False)
-    assert (params.depth_gap, params.bridged_gap, params.edge_margin, params.part_size) == (0.0, 0.0, 0.0, 1.0)
+    assert (params.depth_gap, params.bridged_gap, params.edge_margin, params.part_gap) == (0.0, 0.0, 0.0, 0.0)
     assert ldls.Params.paper(threads=2) == replace(params, threads=2)
 
 
@@ -50,7 +50,7 @@ def test_the_papers_parameters_add_nothing_to_its_method():
         ("depth_gap", float("inf")),
         ("bridged_gap", float("nan")),
         ("edge_margin", "wide"),
-        ("part_size", 2),
+        ("part_gap", -1),
     ],
 )
 def test_values_out_of_range_are_refused_by_name(name, value):

@@ -180,7 +180,7 @@ def diffuse(
     threads: int | None,
 ) -> tuple[NDArray[np.float32], int, float | None]: ...
 def remove_outliers(
-    point_graph: _Csr, labels: NDArray[np.uint32], part_size: float, depths: _Depths | None
+    point_graph: _Csr, labels: NDArray[np.uint32], points: NDArray[np.float64], part_gap: float
 ) -> NDArray[np.int32]: ...
 def confidence(
     shares: NDArray[np.float32],

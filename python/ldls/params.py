@@ -19,7 +19,7 @@ class Params:
         pixel_weight: lambda, the weight of an edge from a pixel to a point.
         window: Side in pixels of the square window that joins pixels to a point; odd, 1 to 101.
         iterations: Number of products z <- A z + b, 1 to 100000; `None` for the converged solution.
-        remove_outliers: Whether an instance keeps only its largest connected component, and parts like it.
+        remove_outliers: Whether an instance keeps only its largest connected component, and the parts near it.
         ground_edges: Factor on the weight of an edge between a point of the ground and one that is not, 0 to 1: labels
             leak along the ground, whose points lie close together along a scan line. 1 for none of it. Needs the
             ground, which takes about 1 ms for 20,000 points in view.
@@ -37,8 +37,8 @@ class Params:
         edge_margin: Share of the shorter side of a mask by which its edge may be off, at least 3 pixels and at most 10.
             Points so near to it and as far away as its object get no label from background pixels, and their neighbours
             decide. 0 for none of it. Part of the depth groups.
-        part_size: Outlier removal also keeps components of at least this share of the largest one's points that are as
-            far away as the object: a pole splits a car, and the lines of 16 beams fall apart. 1 for the largest alone.
+        part_gap: Gap in metres across which outlier removal keeps other components of an object beside its largest: a
+            pole splits a car, and the lines of 16 beams fall apart. 0 for the largest alone.
         calibrated: Whether confidence is the probability that a label is of the right class, from the winner's share of
             the likelihoods and the score of its mask, as fitted on simulated frames of four lidars; else the share.
         abstain: Labels of less confidence become background, 0 to 1: `Segmentation.abstained` says which. 0 for none.
@@ -56,12 +56,12 @@ class Params:
     iterations: int | None = 10
     remove_outliers: bool = True
     ground_edges: float = 0.02
-    ground_clearance: float = 0.04
+    ground_clearance: float = 0.02
     local_ground: bool = True
     depth_gap: float = 0.6
     bridged_gap: float = 1.5
     edge_margin: float = 0.15
-    part_size: float = 0.1
+    part_gap: float = 1.5
     calibrated: bool = True
     abstain: float = 0.0
     threads: int | None = None
@@ -86,7 +86,7 @@ class Params:
             depth_gap=0.0,
             bridged_gap=0.0,
             edge_margin=0.0,
-            part_size=1.0,
+            part_gap=0.0,
             calibrated=False,
             threads=threads,
         )

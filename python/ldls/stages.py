@@ -8,7 +8,7 @@
     graph = stages.point_graph(xyz, indices, heights=heights)
     A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, masks, depths=depths))
     z = stages.diffuse(A, b)
-    labels = stages.remove_outliers(A, z.argmax(axis=1), depths=depths, heights=heights)
+    labels = stages.remove_outliers(A, z.argmax(axis=1), points=xyz, heights=heights)
     confidence = stages.confidence(z, labels, masks)
 
 equals `ldls.segment` on the points in view; without heights and depths, and with the options of `Params.paper()`, it is
@@ -334,9 +334,9 @@ def remove_outliers(
     graph: csr_array,
     labels: ArrayLike,
     *,
-    depths: DepthGroups | None = None,
+    points: ArrayLike | None = None,
+    part_gap: float = _BEST.part_gap,
     heights: ArrayLike | None = None,
-    part_size: float | None = None,
     ground_clearance: float = _BEST.ground_clearance,
 ) -> NDArray[np.int32]:
     """`labels` (n,) with every point outside the largest component of its label turned into background (step 7).
@@ -344,21 +344,21 @@ def remove_outliers(
     Args:
         graph: (n, n); its edges count as undirected.
         labels: (n,) 0 or more.
-        depths: Keeps other components of a label too, if four fifths of their points are as far away as its object.
+        points: (n, >= 3) in metres: keeps other components too that come within `part_gap` of the largest of a label.
+        part_gap: As in `Params`.
         heights: (n,) of `ground`: turns points nearer to the ground than `ground_clearance` into background too.
-        part_size: As in `Params`; its default with `depths`, 1 without.
         ground_clearance: As in `Params`.
     """
     array = numbers("labels", labels, np.int64, ("n",))
     if array.size and not 0 <= array.min() <= array.max() < 2**31:
         found = f"{array.min()} to {array.max()}"
         raise InputError(f"labels: got {found}, expected 0 or more; pass the points in view only")
-    groups, least = None, 1.0
-    if depths is not None:
-        groups, least = _checked(depths, len(array), int(array.max(initial=0))), _BEST.part_size
-    size = least if part_size is None else part_size
-    Params(part_size=size, ground_clearance=ground_clearance)
-    kept = _ldls.remove_outliers(_arrays("graph", graph), array.astype(np.uint32), size, groups)
+    Params(part_gap=part_gap, ground_clearance=ground_clearance)
+    xyz = np.empty((0, 3)) if points is None else _finite_xyz(points)
+    if points is not None and len(xyz) != len(array):
+        raise ShapeError(f"points: got {len(xyz)} rows, expected one a label, {len(array)}")
+    gap = 0.0 if points is None else part_gap
+    kept = _ldls.remove_outliers(_arrays("graph", graph), array.astype(np.uint32), xyz, gap)
     if heights is None:
         return kept
     above = numbers("heights", heights, np.float64, (len(kept),))

@@ -105,7 +105,7 @@ def test_a_point_near_the_ground_says_how_near(street):
     found = next(each for each in explanations if each.cleared)
     verdict, place, course, *_ = explain(found.point, path).output.splitlines()
     assert verdict.startswith(f"Point {found.point} is background: diffusion gave it to ")
-    assert verdict.endswith(" the ground, nearer than 4 cm.")
+    assert verdict.endswith(" the ground, nearer than 2 cm.")
     assert f"{abs(found.height_m):.2f} m {'above' if found.height_m >= 0 else 'below'} the ground." in place
     kept = f"{found.names[found.diffused_label]} (label {found.diffused_label})"
     assert f"After diffusion: {kept}. After outlier removal: {kept}" in course
@@ -132,17 +132,19 @@ def test_background_beside_a_mask_does_not_count(street):
     assert "background, not counted" in output
 
 
-def test_parts_are_said_to_be_kept_and_others_why_not(street):
-    path, explanations = street
-    removed = next(each for each in explanations if each.components and each.components.removed)
-    output = explain(removed.point, path).output
-    assert "less than 10 % of the largest, which has" in output.splitlines()[0]
-    assert "this point's, removed: too small" in output
+def test_parts_are_said_to_be_kept_and_others_why_not(street, tmp_path):
+    path, _ = street
     # the truck behind a pole
     course, *lines = explain(16999, path).output.splitlines()[2:]
     assert course.endswith("After outlier removal: truck (label 6), a part kept beside the largest.")
-    assert any("this point's, kept: as far away" in line for line in lines)
-    assert any("100.0 %" in line for line in lines)
+    assert any("0.92 m" in line and "this point's, kept" in line for line in lines)
+    sample = sample_frame()
+    (image,) = sample.images
+    alone = ldls.segment(sample.points, image.masks, image.camera, params=ldls.Params(part_gap=0.9))
+    ldls.save(alone, tmp_path / "alone.npz")
+    verdict, *lines = explain(16999, tmp_path / "alone.npz").output.splitlines()
+    assert verdict.endswith("it lies in a component of 71 points, 0.9 m from the largest, which has 90: removed.")
+    assert any("0.92 m" in line and "this point's, removed" in line for line in lines)
 
 
 def test_edges_that_leave_the_ground_are_said_to_be_weakened(street):

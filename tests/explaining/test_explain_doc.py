@@ -20,7 +20,7 @@ def test_commands_print_what_is_shown(own_demo, monkeypatch):
     monkeypatch.chdir(own_demo.parent)
     blocks = re.findall(r"```(sh|text)\n(.*?)```", DOC, re.DOTALL)
     commands = [line for kind, text in blocks if kind == "sh" for line in text.splitlines()]
-    assert len(commands) == 11
+    assert len(commands) == 10
     output = ""
     for kind, text in blocks:
         if kind == "text":

@@ -275,10 +275,11 @@ def explanation(**changes):
     return Explanation(**fields | changes)
 
 
-def components(*sizes, own, at_depth=None, part_size=1.0):
+def components(*sizes, own, gap_m=1.0, part_gap=0.0):
     from ldls.explaining import Components
 
-    return Components(label=1, sizes=sizes, at_depth=at_depth or sizes, own=own, removal=True, part_size=part_size)
+    gaps_m = (0.0, *(gap_m for _ in sizes[1:]))
+    return Components(label=1, sizes=sizes, gaps_m=gaps_m, own=own, removal=True, part_gap=part_gap)
 
 
 def sight(direct_label, *window, **changes):
@@ -342,21 +343,15 @@ def likelihoods(*values):
             id="nothing",
         ),
         pytest.param(
-            {"label": 0, "components": components(1200, 85, own=1, part_size=0.1)},
-            "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 85 points, less "
-            "than 10 % of the largest, which has 1,200: removed.",
-            id="too small for a part",
+            {"label": 0, "components": components(1200, 85, own=1, part_gap=1.5, gap_m=2.34)},
+            "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 85 points, 2.3 m "
+            "from the largest, which has 1,200: removed.",
+            id="too far for a part",
         ),
         pytest.param(
-            {"label": 0, "components": components(90, 90, own=1, part_size=0.1, at_depth=(90, 18))},
-            "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 90 points, of "
-            "which 20.0 % are as far away as the object: removed.",
-            id="not as far away",
-        ),
-        pytest.param(
-            {"components": components(1200, 180, own=1, part_size=0.1, at_depth=(1200, 144))},
+            {"components": components(1200, 18, own=1, part_gap=1.5, gap_m=1.5)},
             "Point 7 is car (label 1): no other label reached it.",
-            id="a part, four fifths as far away",
+            id="a part",
         ),
         pytest.param(
             {"label": 0, "height_m": 0.0396, "clearance_m": 0.04},

@@ -65,7 +65,9 @@ def test_outlier_removal_by_heights_and_depth_groups_has_the_labels_of_the_resul
     system = rebuild(result)
     diffused = result.diffused_labels[result.in_view]
     depths = system.depths[0]
-    labels = stages.remove_outliers(system.A, diffused, depths=depths, heights=system.heights)
+    labels = stages.remove_outliers(
+        system.A, diffused, points=result.points[system.in_view], part_gap=params.part_gap, heights=system.heights
+    )
     np.testing.assert_array_equal(labels, result.labels[result.in_view])
     assert (system.heights is None) == (depths is None) == (params == ldls.Params.paper())
 

@@ -112,15 +112,15 @@ def edge_table(explanation: Explanation) -> Table:
 def component_table(explanation: Explanation, components: Components) -> Table:
     """The components of the points that diffusion gave one label, the largest and that of the point."""
     table = Table(title=escape(f"components of {named(explanation, components.label)}"))
-    parts = components.removal and components.part_size < 1
+    parts = components.removal and components.part_gap > 0
     table.add_column("points", justify="right")
     if parts:
-        table.add_column("as far away", justify="right")
+        table.add_column("from the largest", justify="right")
     table.add_column("")
     listed = sorted({*range(min(SHOWN_COMPONENTS, len(components.sizes))), components.own})
     for number in listed:
-        as_far = [percent(components.at_depth[number] / components.sizes[number])] if parts else []
-        table.add_row(f"{components.sizes[number]:,}", *as_far, _component(components, number))
+        gap = [f"{components.gaps_m[number]:.2f} m" if number else ""] if parts else []
+        table.add_row(f"{components.sizes[number]:,}", *gap, _component(components, number))
     rest = sum(components.sizes) - sum(components.sizes[number] for number in listed)
     if rest:
         table.add_row(f"{rest:,}", *([""] if parts else []), f"in {len(components.sizes) - len(listed)} more")
@@ -217,7 +217,4 @@ def _component(components: Components, number: int) -> str:
     if not components.removal:
         return own
     fate = "kept" if components.keeps(number) else "removed"
-    if components.part_size < 1 and number > 0:
-        too_small = components.too_small(number)
-        fate += ": too small" if too_small else f": {'' if components.keeps(number) else 'not '}as far away"
     return f"{own}, {fate}" if own else fate

@@ -27,7 +27,7 @@ HELP = {
     "depth_gap": "Gap in metres before and behind the object of a mask; 0 for no depth groups.",
     "bridged_gap": "Gap in metres within an object that does not go on beside its mask; 0 for none of it.",
     "edge_margin": "Share of a mask's shorter side by which its edge may be off; 0 for none of it.",
-    "part_size": "Share of an object's main part that other parts need; 1 for none of it.",
+    "part_gap": "Gap in metres to the main part of an object within which other parts stay; 0 for none of it.",
     "calibrated": "Is confidence the probability that a label is right, or the winner's share of likelihoods?",
     "abstain": "Labels of less confidence become background, 0 to 1.",
 }

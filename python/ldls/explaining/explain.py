@@ -154,27 +154,20 @@ def _components(system: Rebuilt, result: Segmentation, row: int) -> Components:
     members = np.flatnonzero(diffused == diffused[row])
     component = _connected(_structure(system.graph)[members][:, members])
     sizes = np.bincount(component)
-    at_depth = np.bincount(component[_at_depth(system, result, int(diffused[row]))[members]], minlength=len(sizes))
+    xyz = result.points[system.in_view[members], :3].astype(np.float64)
     # numbers are given in the order of the first members, and a stable sort keeps it among equals
     in_order = np.argsort(-sizes, kind="stable")
     own = component[np.searchsorted(members, row)]
+    tree = require("scipy.spatial", "eval").cKDTree(xyz[component == in_order[0]])
+    gaps, _ = tree.query(xyz)
     return Components(
         label=int(diffused[row]),
         sizes=tuple(sizes[in_order].tolist()),
-        at_depth=tuple(at_depth[in_order].tolist()),
+        gaps_m=tuple(float(gaps[component == number].min()) for number in in_order),
         own=int(np.flatnonzero(in_order == own)[0]),
         removal=result.params.remove_outliers,
-        part_size=result.params.part_size,
+        part_gap=result.params.part_gap,
     )
-
-
-def _at_depth(system: Rebuilt, result: Segmentation, label: int) -> NDArray[np.bool_]:
-    """(n,) True for points as far away as an object in a view that shows both."""
-    found = np.zeros(len(system.in_view), bool)
-    for number, mask in result.instances[label - 1].sources:
-        depths, rows = system.depths[number], np.searchsorted(system.in_view, result.views[number].in_view)
-        found[rows] |= True if depths is None else depths.behind_m(mask) == 0
-    return found
 
 
 def _island(graph: csr_array, row: int) -> Island:

@@ -11,8 +11,6 @@ from ldls.explaining.sight import Sight
 from ldls.stages import GROUND_M
 
 LOWEST_M, _ = GROUND_M
-LEAST_AT_DEPTH = 0.8
-"""Share of its points that a part needs as far away as the object, to be kept."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,18 +87,18 @@ class Components:
     Attributes:
         label: The label.
         sizes: Points of each, the largest first; of equal ones the one with the lowest row of the cloud first.
-        at_depth: Points of each that are as far away as the object.
+        gaps_m: How near each comes to the largest, in metres.
         own: Which of them the point lies in, from 0.
-        removal: Whether outliers were removed, so that number 0 was kept, and parts like it.
-        part_size: Share of the largest one's points from which on a part was kept; 1 for the largest alone.
+        removal: Whether outliers were removed, so that number 0 was kept, and parts near it.
+        part_gap: Gap in metres within which a part was kept; 0 for the largest alone.
     """
 
     label: int
     sizes: tuple[int, ...]
-    at_depth: tuple[int, ...]
+    gaps_m: tuple[float, ...]
     own: int
     removal: bool
-    part_size: float
+    part_gap: float
 
     @property
     def removed(self) -> bool:
@@ -108,15 +106,10 @@ class Components:
         return not self.keeps(self.own)
 
     def keeps(self, number: int) -> bool:
-        """True if the component of that number kept its label: the largest, and parts of it as far away."""
+        """True if the component of that number kept its label: the largest, and parts near it."""
         if not self.removal or number == 0:
             return True
-        as_far = self.at_depth[number] >= LEAST_AT_DEPTH * self.sizes[number]
-        return self.part_size < 1 and not self.too_small(number) and as_far
-
-    def too_small(self, number: int) -> bool:
-        """True if the component of that number has too few points for a part of the largest."""
-        return self.sizes[number] < self.part_size * self.sizes[0]
+        return self.part_gap > 0 and self.gaps_m[number] <= self.part_gap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,15 +226,12 @@ def count_points(count: int) -> str:
 
 def _where(components: Components) -> str:
     own, largest = components.sizes[components.own], components.sizes[0]
-    if components.part_size == 1 and own == largest:
+    if components.part_gap == 0 and own == largest:
         return f"component of {count_points(own)}, as large as the one kept, which has the lowest row: removed"
-    if components.part_size == 1:
+    if components.part_gap == 0:
         return f"component of {count_points(own)}, the largest has {largest:,}: removed"
-    if components.too_small(components.own):
-        least = f"less than {100 * components.part_size:g} % of the largest, which has {largest:,}"
-        return f"component of {count_points(own)}, {least}: removed"
-    at_depth = percent(components.at_depth[components.own] / own)
-    return f"component of {count_points(own)}, of which {at_depth} are as far away as the object: removed"
+    gap = f"{components.gaps_m[components.own]:.1f} m from the largest, which has {largest:,}"
+    return f"component of {count_points(own)}, {gap}: removed"
 
 
 def _lead(explanation: Explanation) -> str:

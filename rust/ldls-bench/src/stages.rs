@@ -28,7 +28,7 @@ pub const STAGES: [(&str, Stage); 10] = [
         done(diffused(s.street, &s.in_view, &s.neighbors, &s.normalized));
     }),
     ("components", |s| {
-        done(components(&s.normalized.0, &s.diffused));
+        done(components(&s.normalized.0, &s.in_view, &s.diffused));
     }),
     ("whole frame, paper", |s| {
         done(segmentation(s.street, &Params::paper()));
@@ -134,10 +134,9 @@ fn diffused(
     diffuse(a, b, n_labels, PAPER.iterations, exact, Cancel::never()).expect("labels")
 }
 
-fn components(a: &PointGraph, diffused: &Diffused) -> Vec<u32> {
-    let everywhere = |_, _| true;
-    let labels = &diffused.labels;
-    remove_outliers(a, labels, PAPER.part_size, everywhere, Cancel::never()).expect("labels")
+fn components(a: &PointGraph, in_view: &InView, diffused: &Diffused) -> Vec<u32> {
+    let place = |row: usize| in_view.points[row];
+    remove_outliers(a, &diffused.labels, PAPER.part_gap, place, Cancel::never()).expect("labels")
 }
 
 fn segmentation(street: &Street, params: &Params) -> Segmentation {

@@ -15,7 +15,7 @@ pub struct Params {
     pub window: usize,
     /// Number of products z <- A z + b; `None` runs them until nothing changes.
     pub iterations: Option<usize>,
-    /// Set if only the largest connected component of an instance keeps its label, and parts like it.
+    /// Set if only the largest connected component of an instance keeps its label, and the parts near it.
     pub remove_outliers: bool,
     /// Factor on the weight of an edge between a point of the ground and one that is not; 1 for the paper's graph.
     pub ground_edges: f64,
@@ -29,8 +29,8 @@ pub struct Params {
     pub bridged_gap: f64,
     /// Share of the shorter side of a mask by which its edge may be off; 0 to trust it.
     pub edge_margin: f64,
-    /// Parts of an object with at least this share of its largest component stay; 1 for that component alone.
-    pub part_size: f64,
+    /// Gap, in metres, between the largest component of an object and others of it that stay too; 0 for that one alone.
+    pub part_gap: f64,
     /// Set if confidence is the probability that a label is right, not the winner's share of the likelihoods.
     pub calibrated: bool,
     /// Labels of less confidence become background; 0 for none.
@@ -43,12 +43,12 @@ impl Default for Params {
             sigma: 0.1,
             iterations: Some(10),
             ground_edges: 0.02,
-            ground_clearance: 0.04,
+            ground_clearance: 0.02,
             local_ground: true,
             depth_gap: 0.6,
             bridged_gap: 1.5,
             edge_margin: 0.15,
-            part_size: 0.1,
+            part_gap: 1.5,
             calibrated: true,
             ..Self::paper()
         }
@@ -71,7 +71,7 @@ impl Params {
             depth_gap: 0.0,
             bridged_gap: 0.0,
             edge_margin: 0.0,
-            part_size: 1.0,
+            part_gap: 0.0,
             calibrated: false,
             abstain: 0.0,
         }
@@ -138,7 +138,6 @@ impl Params {
         for (name, value) in [
             ("ground_edges", self.ground_edges),
             ("edge_margin", self.edge_margin),
-            ("part_size", self.part_size),
             ("abstain", self.abstain),
         ] {
             let share = (0.0..=1.0).contains(&value);
@@ -148,6 +147,7 @@ impl Params {
             ("ground_clearance", self.ground_clearance, 1.0, "0 to 1 m"),
             ("depth_gap", self.depth_gap, 1e3, "0 to 1000 m"),
             ("bridged_gap", self.bridged_gap, 1e3, "0 to 1000 m"),
+            ("part_gap", self.part_gap, 1e3, "0 to 1000 m"),
         ] {
             check(
                 name,

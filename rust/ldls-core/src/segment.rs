@@ -98,7 +98,8 @@ pub fn segment(
         diffuse(&a, &b, scene.n_labels(), params.iterations, exact, cancel)
     })?;
     let mut kept = timed(&mut t.components, || {
-        remove_outliers(&a, &diffused.labels, order, scene, params, cancel)
+        let place = |row: usize| cloud.xyz(in_view.indices[order[row] as usize] as usize);
+        remove_outliers(&a, &diffused.labels, order, params, place, cancel)
     })?;
     let heights = heights.iter().copied();
     clear_ground(&mut kept, heights, params.ground_clearance);
@@ -155,20 +156,19 @@ fn normalize<T: Real>(
     Ok((a, b))
 }
 
-/// The labels of the largest component of each instance and its parts, where the parameters ask for it.
+/// The labels of the largest component of each instance and the parts near it, where the parameters ask for it.
 fn remove_outliers(
     a: &PointGraph,
     labels: &[u32],
     order: &[u32],
-    images: &Images,
     params: &Params,
+    place: impl Fn(usize) -> [f64; 3],
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     if !params.remove_outliers {
         return collect(labels.iter().copied(), cancel);
     }
-    let at_depth = |row: usize, label| images.at_depth(order[row], label);
-    remove_outliers_by_index(a, labels, order, params.part_size, at_depth, cancel)
+    remove_outliers_by_index(a, labels, order, params.part_gap, place, cancel)
 }
 
 fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32], cancel: &Cancel) -> Result<Vec<i32>> {

@@ -24,7 +24,7 @@ pub struct ParamsAttributes {
     depth_gap: f64,
     bridged_gap: f64,
     edge_margin: f64,
-    part_size: f64,
+    part_gap: f64,
     calibrated: bool,
     abstain: f64,
     pub(crate) threads: Option<usize>,
@@ -45,7 +45,7 @@ impl ParamsAttributes {
             depth_gap: self.depth_gap,
             bridged_gap: self.bridged_gap,
             edge_margin: self.edge_margin,
-            part_size: self.part_size,
+            part_gap: self.part_gap,
             calibrated: self.calibrated,
             abstain: self.abstain,
         }

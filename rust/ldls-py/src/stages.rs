@@ -243,27 +243,20 @@ pub fn diffuse(
     ))
 }
 
-/// Labels without what is not in the largest component of each, nor part of its object.
+/// Labels without what is not in the largest component of each, nor within `part_gap` metres of it.
 #[pyfunction]
 pub fn remove_outliers(
     py: Python<'_>,
     point_graph: CsrArguments<'_>,
     labels: PyReadonlyArray1<'_, u32>,
-    part_size: f64,
-    depths: Option<DepthArguments<'_>>,
+    points: PyReadonlyArray2<'_, f64>,
+    part_gap: f64,
 ) -> PyResult<Py<PyArray1<i32>>> {
     let graph = graph(py, &point_graph)?;
     let labels = slice(py, "labels", &labels)?;
-    let depths = depths
-        .map(|depths| depth_groups_of(py, &depths))
-        .transpose()?;
-    let at_depth = |at: usize, label| {
-        depths
-            .as_ref()
-            .is_none_or(|depths| depths.admits(at, label))
-    };
+    let points = rows::<3>(py, "points", &points)?;
     let kept = run(py, None, |cancel| {
-        ldls_core::remove_outliers(&graph, labels, part_size, at_depth, cancel)
+        ldls_core::remove_outliers(&graph, labels, part_gap, |row| points[row], cancel)
     })?;
     signed(py, &kept)
 }

@@ -1,17 +1,19 @@
-//! Outlier removal: an instance keeps its largest connected component and what is certainly part of it (method, step 7).
+//! Outlier removal: an instance keeps its largest connected component and the parts near it (method, step 7).
 
+use super::boxes::Boxes;
 use super::point_graph::PointGraph;
-use crate::memory::{collect, filled, push};
+use crate::memory::{collect, filled, push, zeros};
 use crate::{Cancel, Error, Result};
+use std::ops::Range;
 
-/// Share of its points that a component beside the largest needs at the distance of its object.
-const LEAST_AT_DEPTH: f64 = 0.8;
+/// Points between two looks at the flag.
+const ROWS_A_BLOCK: usize = 1 << 16;
 
 /// Turns every point that is not in the largest connected component of its label into background (0). Edges are
 /// taken as undirected; of components of one size, the one with the lowest point index is kept.
 ///
-/// A smaller component stays too if it has at least the share `part_size` of the points of the largest, below 1, and
-/// four fifths of its points are `at_depth`: as far away, by their row and label, as the object.
+/// If `part_gap`, in metres, is not 0, a component that comes so near to the largest stays too; `place` is where the point
+/// of a row is.
 ///
 /// # Errors
 /// [`Error::Mismatch`] where `labels` is of another length than the graph, [`Error::OutOfMemory`] and
@@ -19,12 +21,12 @@ const LEAST_AT_DEPTH: f64 = 0.8;
 pub fn remove_outliers(
     graph: &PointGraph,
     labels: &[u32],
-    part_size: f64,
-    at_depth: impl Fn(usize, u32) -> bool,
+    part_gap: f64,
+    place: impl Fn(usize) -> [f64; 3],
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     let indices = collect(0..labels.len() as u32, cancel)?;
-    remove_outliers_by_index(graph, labels, &indices, part_size, at_depth, cancel)
+    remove_outliers_by_index(graph, labels, &indices, part_gap, place, cancel)
 }
 
 /// The same for points whose rows are not in the order of their `indices`.
@@ -32,8 +34,8 @@ pub(crate) fn remove_outliers_by_index(
     graph: &PointGraph,
     labels: &[u32],
     indices: &[u32],
-    part_size: f64,
-    at_depth: impl Fn(usize, u32) -> bool,
+    part_gap: f64,
+    place: impl Fn(usize) -> [f64; 3],
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     if labels.len() != graph.len() {
@@ -66,56 +68,62 @@ pub(crate) fn remove_outliers_by_index(
     for rows in members.chunks(ROWS_A_BLOCK) {
         cancel.check()?;
         for &row in rows {
-            let (at, root) = (row as usize, sets.root(row));
-            let counts = part_size < 1.0 && at_depth(at, labels[at]);
-            components[root as usize].add(root, indices[at], counts);
+            let root = sets.root(row);
+            components[root as usize].add(root, indices[row as usize]);
         }
     }
     cancel.check()?;
-    let largest = largest_of_each(labels, &components);
+    for component in largest_of_each(labels, &components) {
+        if component.size > 0 {
+            components[component.root as usize].stays = true;
+        }
+    }
+    if part_gap > 0.0 {
+        let rows = rows_of_each(&mut components, &members, &mut sets, cancel)?;
+        let boxes = |component: &Component| {
+            let rows = rows[component.rows()].iter();
+            let points = collect(rows.map(|&row| place(row as usize)), cancel)?;
+            Boxes::around(points, cancel)
+        };
+        keep_parts(&mut components, labels, part_gap, boxes, cancel)?;
+    }
     let mut kept = collect(labels.iter().copied(), cancel)?;
     for &row in &members {
-        let (label, root) = (&mut kept[row as usize], sets.root(row));
-        let (component, largest) = (&components[root as usize], &largest[*label as usize]);
-        let stays =
-            root == largest.root || (part_size < 1.0 && component.is_part_of(largest, part_size));
-        if !stays {
-            *label = 0;
+        if !components[sets.root(row) as usize].stays {
+            kept[row as usize] = 0;
         }
     }
     Ok(kept)
 }
 
-/// Points between two looks at the flag.
-const ROWS_A_BLOCK: usize = 1 << 16;
-
-/// One component: its root, its size, the points at the distance of its object, and the lowest index of a point in it.
+/// One component: its root, its size, the lowest index of a point in it, and the end of its rows among those of all.
 #[derive(Debug, Clone, Copy)]
 struct Component {
     root: u32,
     size: u32,
-    at_depth: u32,
     first: u32,
+    end: u32,
+    stays: bool,
 }
 
 impl Component {
     const NONE: Self = Self {
         root: u32::MAX,
         size: 0,
-        at_depth: 0,
         first: u32::MAX,
+        end: 0,
+        stays: false,
     };
 
-    fn add(&mut self, root: u32, index: u32, at_depth: bool) {
+    fn add(&mut self, root: u32, index: u32) {
         self.root = root;
         self.size += 1;
-        self.at_depth += u32::from(at_depth);
         self.first = self.first.min(index);
     }
 
-    fn is_part_of(&self, largest: &Self, part_size: f64) -> bool {
-        f64::from(self.size) >= part_size * f64::from(largest.size)
-            && f64::from(self.at_depth) >= LEAST_AT_DEPTH * f64::from(self.size)
+    /// Where its rows are among those of all.
+    fn rows(&self) -> Range<usize> {
+        (self.end - self.size) as usize..self.end as usize
     }
 }
 
@@ -130,6 +138,54 @@ fn largest_of_each(labels: &[u32], components: &[Component]) -> Vec<Component> {
         }
     }
     largest
+}
+
+/// The rows of the members, those of a component one after the other; each component then knows where.
+fn rows_of_each(
+    components: &mut [Component],
+    members: &[u32],
+    sets: &mut DisjointSets,
+    cancel: &Cancel,
+) -> Result<Vec<u32>> {
+    let mut end = 0;
+    for component in components.iter_mut().filter(|component| component.size > 0) {
+        component.end = end;
+        end += component.size;
+    }
+    let mut rows = zeros(members.len(), cancel)?;
+    for block in members.chunks(ROWS_A_BLOCK) {
+        cancel.check()?;
+        for &row in block {
+            let component = &mut components[sets.root(row) as usize];
+            rows[component.end as usize] = row;
+            component.end += 1;
+        }
+    }
+    Ok(rows)
+}
+
+/// Keeps the components that come within `gap` metres of the one of their label that stays.
+fn keep_parts(
+    components: &mut [Component],
+    labels: &[u32],
+    gap: f64,
+    boxes: impl Fn(&Component) -> Result<Boxes>,
+    cancel: &Cancel,
+) -> Result<()> {
+    let largest = largest_of_each(labels, components);
+    let mut main: Vec<Option<Boxes>> = largest.iter().map(|_| None).collect();
+    for component in components {
+        if component.size == 0 || component.stays {
+            continue;
+        }
+        let label = labels[component.root as usize] as usize;
+        let main = match &mut main[label] {
+            Some(main) => main,
+            none => none.insert(boxes(&largest[label])?),
+        };
+        component.stays = boxes(component)?.come_near(main, gap, cancel)?;
+    }
+    Ok(())
 }
 
 /// Union-find in which the root of a set is its lowest element.
@@ -172,8 +228,13 @@ mod tests {
         PointGraph::from_csr((0..=n).collect(), columns, vec![1.0; n]).unwrap()
     }
 
+    /// Those points, a metre from one to the next.
+    fn along(row: usize) -> [f64; 3] {
+        [row as f64, 0.0, 0.0]
+    }
+
     fn keep_largest(graph: &PointGraph, labels: &[u32]) -> Vec<u32> {
-        remove_outliers(graph, labels, 1.0, |_, _| true, Cancel::never()).unwrap()
+        remove_outliers(graph, labels, 0.0, along, Cancel::never()).unwrap()
     }
 
     #[test]
@@ -206,22 +267,22 @@ mod tests {
     #[test]
     fn rows_may_come_in_another_order_than_indices() {
         let (labels, indices) = ([3, 3, 0, 3, 3], [4, 3, 2, 1, 0]);
-        let (graph, everywhere) = (chain(5), |_, _| true);
         let kept =
-            remove_outliers_by_index(&graph, &labels, &indices, 1.0, everywhere, Cancel::never());
+            remove_outliers_by_index(&chain(5), &labels, &indices, 0.0, along, Cancel::never());
         assert_eq!(kept.unwrap(), [0, 0, 0, 3, 3]);
     }
 
     #[test]
-    fn a_part_stays_if_it_is_large_and_at_the_distance_of_the_object() {
-        let labels = [1, 1, 1, 1, 0, 1, 1, 0, 1];
-        let kept = |part_size, at_depth: &dyn Fn(usize, u32) -> bool| {
-            remove_outliers(&chain(9), &labels, part_size, at_depth, Cancel::never()).unwrap()
+    fn a_part_stays_if_it_is_near_the_largest() {
+        let labels = [1, 1, 1, 1, 0, 1, 1, 0, 0, 1, 2, 0, 0, 2];
+        let kept = |part_gap| {
+            remove_outliers(&chain(14), &labels, part_gap, along, Cancel::never()).unwrap()
         };
-        assert_eq!(kept(0.5, &|_, _| true), [1, 1, 1, 1, 0, 1, 1, 0, 0]);
-        assert_eq!(kept(0.5, &|i, _| i < 6), [1, 1, 1, 1, 0, 0, 0, 0, 0]);
-        assert_eq!(kept(0.25, &|_, _| true), labels);
-        assert_eq!(kept(1.0, &|_, _| true), [1, 1, 1, 1, 0, 0, 0, 0, 0]);
+        let parts = [1, 1, 1, 1, 0, 1, 1, 0, 0, 0, 2, 0, 0, 0];
+        assert_eq!(kept(2.0), parts, "2 m from the largest, 3 m from its part");
+        assert_eq!(kept(1.9)[..7], [1, 1, 1, 1, 0, 0, 0]);
+        assert_eq!(kept(6.0), labels);
+        assert_eq!(kept(0.0), keep_largest(&chain(14), &labels));
     }
 
     #[test]
@@ -229,7 +290,7 @@ mod tests {
         let empty = PointGraph::from_csr(vec![0], vec![], vec![]).unwrap();
         assert!(keep_largest(&empty, &[]).is_empty());
         assert_eq!(keep_largest(&chain(3), &[0; 3]), [0; 3]);
-        let kept = remove_outliers(&chain(3), &[0; 2], 1.0, |_, _| true, Cancel::never());
+        let kept = remove_outliers(&chain(3), &[0; 2], 0.0, along, Cancel::never());
         assert!(kept.is_err());
     }
 }

@@ -135,15 +135,6 @@ impl<'a> Images<'a> {
         depths.is_none_or(|depths| depths.admits(slot, label))
     }
 
-    /// True if a point in view is as far away as object `label` in an image that shows both.
-    pub(crate) fn at_depth(&self, point: u32, label: u32) -> bool {
-        let shows = |&(image, m): &(usize, u32)| {
-            let slot = self.slots[image][point as usize];
-            slot != UNSEEN && self.admits(image, slot as usize, m)
-        };
-        self.objects[label as usize - 1].iter().any(shows)
-    }
-
     /// Number of labels, the background counted.
     pub(crate) fn n_labels(&self) -> usize {
         self.objects.len() + 1
