@@ -4,6 +4,7 @@ import json
 import multiprocessing
 import sys
 import threading
+import types
 import warnings
 
 import numpy as np
@@ -226,6 +227,13 @@ def test_points_that_cannot_be_used_are_refused(small_scene, points, error, mess
         ldls.segment(points, masks, camera)
     assert isinstance(caught.value, ValueError)
     assert isinstance(caught.value, TypeError) == (error is ldls.DtypeError)
+
+
+def test_a_module_that_another_thread_is_importing_is_no_hindrance(small_scene, monkeypatch):
+    points, masks, camera = small_scene
+    for name in ("numpy.ma", "numpy.typing"):
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+    assert len(ldls.segment(points, masks, camera).labels) == len(points)
 
 
 def test_other_arguments_are_refused_by_name(small_scene):

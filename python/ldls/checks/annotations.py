@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import inspect
 import itertools
-import sys
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -13,7 +12,7 @@ from numbers import Real
 from os import PathLike
 from typing import Any, Literal, TypeGuard, TypeVar, Union, cast, get_args, get_origin
 
-from ldls.checks.values import is_of_numpy, is_whole, shown
+from ldls.checks.values import is_of_numpy, is_whole, loaded, shown
 from ldls.errors import InputError, ParameterError
 
 MAKERS = {
@@ -137,8 +136,7 @@ def _kind(hint: Any) -> _Kind:  # noqa: ANN401
 
 
 def _is_array_like(hint: Any) -> bool:  # noqa: ANN401
-    typing = sys.modules.get("numpy.typing")
-    return typing is not None and hint == typing.ArrayLike
+    return bool(hint == loaded("numpy.typing", "ArrayLike"))
 
 
 def _either(choices: Sequence[object]) -> str:

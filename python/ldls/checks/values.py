@@ -53,8 +53,7 @@ def as_array(name: str, values: object, error: type[InputError] | None = None) -
     """
     import numpy as np
 
-    masked = sys.modules.get("numpy.ma")  # not loaded where there are no masked arrays
-    if masked is not None and isinstance(values, masked.MaskedArray):
+    if isinstance(values, loaded("numpy.ma", "MaskedArray")):
         raise (error or DtypeError)(f"{name}: got a masked array; pass {name}.filled(...) with a value")
     try:
         array = np.asarray(values)
@@ -130,8 +129,12 @@ def is_whole(value: object) -> bool:
 
 def is_of_numpy(value: object, name: Literal["bool_", "ndarray"]) -> bool:
     """True for a bool or an array of NumPy, which is loaded where there is one and need not be for what has none."""
-    numpy = sys.modules.get("numpy")
-    return numpy is not None and isinstance(value, getattr(numpy, name))
+    return isinstance(value, loaded("numpy", name))
+
+
+def loaded(module: str, name: str) -> Any:  # noqa: ANN401
+    """The class of that name in a module; none, (), where that is not loaded yet, or half of it, by another thread."""
+    return getattr(sys.modules.get(module), name, ())
 
 
 def _fits(found: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
