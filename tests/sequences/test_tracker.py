@@ -119,6 +119,28 @@ def test_two_who_meet_do_not_swap():
     assert rows[0, 0] != rows[0, 1]
 
 
+@pytest.mark.parametrize("ends_m", [(0.6, 1.2), (1.8, 2.4)], ids=["a car", "two cars"])
+def test_tracks_of_one_object_are_joined(ends_m):
+    """A car 3 m long, of which the masks of the first sweeps show the two ends as two objects."""
+
+    def sweep(k, *ends):
+        near, far = ends_m
+        parts = [(8, y) for y in (-far, -near, 0, near, far)]
+        whole = sweep_at(0.1 * k, [(part, True) for part in parts])
+        pixels = whole.views[0].masks.to_array()
+        masks = np.array([pixels[list(end)].any(axis=0) for end in ends])
+        return replace(whole, views=[ldls.View(ldls.InstanceMasks.from_array(masks, categories=[1] * len(ends)), WIDE)])
+
+    left, right = (0, 1), (3, 4)
+    sweeps = [sweep(0, left), sweep(1, left, right), sweep(2, left, right)]
+    one = ends_m == (0.6, 1.2)
+    sweeps += [sweep(3, (*left, 2, *right)) if one else sweep(3, left)]
+    rows = tracks_of(ldls.Tracker(), [*sweeps, sweep(4, right), sweep(5, left)])
+    assert [rows[2][0], rows[2][4]] == [1, 2]
+    assert rows[4][4] == (1 if one else 2)
+    assert rows[5][0] == 1
+
+
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():
     tracker = ldls.Tracker()
     place = [((6, 0), True)]

@@ -7,7 +7,7 @@ stands still is where it was, and what moves is where its velocity takes it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -68,6 +68,14 @@ class Moment:
         each, counts = np.unique(tracks[tracks > 0], return_counts=True)
         blind = not any(instance.sources for instance in result.instances)
         return cls(sweep.stamp, xyz[order], tracks, rows, dict(zip(each.tolist(), counts.tolist(), strict=True)), blind)
+
+    def renumbered(self, number: int, other: int) -> Self:
+        """The same, where an object of a number has another, which may be there too."""
+        counts = dict(self.counts)
+        if (count := counts.pop(number, 0)) == 0:
+            return self
+        counts[other] = counts.get(other, 0) + count
+        return replace(self, tracks=np.where(self.tracks == number, other, self.tracks), counts=counts)
 
     def within(self, low: Floats, high: Floats) -> Ints:
         """Indices of the points in a box."""

@@ -2,8 +2,8 @@
 
 Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds,
 moved to the moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
-Within sweeps that were segmented together an object keeps its label, and so its number. Sweeps whose images overlook an
-object have its label too (propagation.py).
+Tracks of one object are joined. Within sweeps that were segmented together an object keeps its label, and so its
+number. Sweeps whose images overlook an object have its label too (propagation.py).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.checks import checked
@@ -28,6 +29,10 @@ LONGEST_GAP_S = 5.0
 """Time without a point after which a track ends."""
 NEAR_M = 2.0
 """Distance from above up to which an object may be a track."""
+SAME = 0.3
+"""Share of the longer of two objects, seen from above, up to which they may be apart and are one object."""
+SAME_M = 1.0
+"""The same in metres."""
 MOST_POINTS = 48
 """Points that stand for an object in a sweep; of more, some."""
 
@@ -127,12 +132,36 @@ class Tracker:
         # what cannot be is dearer than all that can be together
         dearest = NEAR_M * (len(labels) + 1)
         rows, columns = self._assign(np.where(np.isfinite(costs), costs, dearest))
-        known = {
-            labels[i]: self._tracks[j]
-            for i, j in zip(rows.tolist(), columns.tolist(), strict=True)
-            if np.isfinite(costs[i, j])
-        }
+        pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
+        lengths = [_length(sightings[label][0].points) for label in labels]
+        of_tracks = [_length(track.sightings[-1].points) for track in self._tracks]
+        same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
+        known = {labels[i]: track for i, track in self._joined(pairs, same).items()}
         return {label: known.get(label) or self._begin(instances[label]) for label in labels}
+
+    def _joined(self, pairs: Mapping[int, int], same: NDArray[np.bool_]) -> dict[int, Track]:
+        """The track of each label that is paired with one, after tracks of one object are joined.
+
+        An object that had two labels for a while has two tracks, and would go on by the one or the other. Where a label
+        and its track are the `same` as tracks that have no label now, the one that most images showed goes on, and the
+        others end.
+
+        Args:
+            pairs: The track of each label, both by their place in the order.
+            same: (labels, tracks) whether they are too near to be two objects.
+        """
+        free = set(range(len(self._tracks))) - set(pairs.values())
+        joined, ended = {}, set()
+        for i, j in pairs.items():
+            others = [other for other in sorted(free) if same[i, other]] if same[i, j] else []
+            free.difference_update(others)
+            one, *doubles = sorted((self._tracks[k] for k in (j, *others)), key=lambda track: -track.n_images)
+            joined[i] = one
+            for double in doubles:
+                ended.add(double)
+                self._moments = [moment.renumbered(double.number, one.number) for moment in self._moments]
+        self._tracks = [track for track in self._tracks if track not in ended]
+        return joined
 
     def _begin(self, instance: Instance) -> Track:
         self._count += 1
@@ -153,6 +182,11 @@ class Tracker:
             return float("inf")
         middle = np.linalg.norm(np.median(one, axis=0) - np.median(other, axis=0))
         return float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
+
+
+def _length(points: Floats) -> float:
+    """Diagonal of the box around points, in metres."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Mapping[int, int]) -> Segmentation:
