@@ -1,6 +1,7 @@
 //! Points to pixels: a general pinhole camera.
 
 use super::distortion::{Distortion, Lens};
+use super::lanes::{LANES, Lanes};
 use crate::{Error, Result};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 
@@ -24,15 +25,15 @@ pub struct Camera {
     looks_along_z: bool,
 }
 
-/// The position of a point relative to an image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Sight {
-    /// At or behind the smallest depth.
-    Behind,
-    /// In front of the camera, beside the image.
-    Outside,
-    /// At these pixels, u and v.
-    Seen([f64; 2]),
+/// What an image sees of sixteen points, a bit for each.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sights {
+    /// Those beyond the smallest depth.
+    pub(super) in_front: u32,
+    /// Those of which the nearest pixel lies in the image.
+    pub(super) seen: u32,
+    /// The pixels of these, u and v.
+    pub(super) uv: [[f64; LANES]; 2],
 }
 
 impl Camera {
@@ -106,19 +107,43 @@ impl Camera {
         })
     }
 
-    /// The position of a point of the lidar frame relative to an image of `height` x `width` pixels.
-    #[inline]
-    pub(crate) fn sight(&self, xyz: &[f64; 3], height: usize, width: usize) -> Sight {
-        let depth = self.row(2, xyz);
-        if !(depth > self.min_depth_m) {
-            return Sight::Behind;
+    /// What an image of `height` x `width` pixels sees of points of the lidar frame, of which x, y and z are given.
+    #[inline(always)]
+    pub(super) fn sights(&self, xyz: &[Lanes; 3], [height, width]: [usize; 2]) -> Sights {
+        let row = |row: usize| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|column| Lanes::all(self.matrix[(row, column)]));
+            a * xyz[0] + b * xyz[1] + c * xyz[2] + d
+        };
+        let depth = row(2);
+        let in_front = depth.above(self.min_depth_m).bits();
+        let uv = match in_front {
+            0 => [Lanes::all(f64::NAN); 2],
+            _ => self.bent([row(0) / depth, row(1) / depth], in_front),
+        };
+        // the nearest pixel lies in the image, as in `nearest_pixel`
+        let inside = |along: Lanes, size: usize| {
+            let nearest = along + Lanes::all(0.5);
+            nearest.within(0.0, size as f64)
+        };
+        Sights {
+            in_front,
+            seen: in_front & (inside(uv[0], width) & inside(uv[1], height)).bits(),
+            uv: uv.map(Lanes::to_array),
         }
-        let uv = self.pixel(xyz, depth);
-        if nearest_pixel(uv, height, width).is_some() {
-            Sight::Seen(uv)
-        } else {
-            Sight::Outside
+    }
+
+    /// Pixels of points at x and y of the plane z = 1 before the lens; without one these are the pixels.
+    #[inline(always)]
+    fn bent(&self, plane: [Lanes; 2], wanted: u32) -> [Lanes; 2] {
+        if self.lens.is_none() {
+            return plane;
         }
+        let ([x, y], mut uv) = (plane.map(Lanes::to_array), [[f64::NAN; LANES]; 2]);
+        for lane in (0..LANES).filter(|lane| wanted >> lane & 1 == 1) {
+            let [u, v] = self.bend([x[lane], y[lane]]);
+            (uv[0][lane], uv[1][lane]) = (u, v);
+        }
+        uv.map(|along| Lanes::from_array(&along))
     }
 
     /// A point of the lidar frame relative to the camera, in metres, with z upwards: that of the lidar frame, and -y where
@@ -155,12 +180,17 @@ impl Camera {
     /// u and v of a point at `depth`.
     #[inline]
     fn pixel(&self, xyz: &[f64; 3], depth: f64) -> [f64; 2] {
-        let [x, y] = [self.row(0, xyz) / depth, self.row(1, xyz) / depth];
+        let plane = [self.row(0, xyz) / depth, self.row(1, xyz) / depth];
         if self.lens.is_none() {
-            return [x, y];
+            return plane;
         }
+        self.bend(plane)
+    }
+
+    /// u and v of a point of the plane z = 1 before the lens.
+    fn bend(&self, plane: [f64; 2]) -> [f64; 2] {
         let k = &self.intrinsic;
-        self.lens.bend([x, y]).map_or([f64::NAN; 2], |[x, y]| {
+        self.lens.bend(plane).map_or([f64::NAN; 2], |[x, y]| {
             [0, 1].map(|row| k[(row, 0)] * x + k[(row, 1)] * y + k[(row, 2)])
         })
     }

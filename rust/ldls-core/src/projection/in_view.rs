@@ -1,9 +1,11 @@
 //! The part of a cloud that images see, and how many of the other points are left out for which reason.
 
-use super::camera::{Camera, Sight};
+use super::camera::{Camera, Sights};
 use super::cloud::Cloud;
+use super::lanes::{LANES, Lanes, Mask};
 use crate::memory::with_room;
 use crate::{Cancel, Error, Result};
+use multiversion::multiversion;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -110,38 +112,88 @@ fn check_points(points: usize) -> Result<()> {
     })
 }
 
+/// What images see of some rows, sixteen at a time: as many as look alike in every step.
+#[multiversion(targets("x86_64+avx2+popcnt"))]
 fn project_rows(
-    cloud: Cloud,
+    cloud: Cloud<'_>,
     rows: Range<usize>,
     images: &[(&Camera, [usize; 2])],
     keep_origin: bool,
 ) -> Result<InView> {
     let mut part = InView::empty(images.len(), 0)?;
-    for row in rows {
-        let Some(xyz) = part.counts.usable(cloud, row, keep_origin)? else {
-            continue;
-        };
-        let (mut seen, mut in_front) = (false, false);
-        for (sighting, (camera, [height, width])) in part.sightings.iter_mut().zip(images) {
-            match camera.sight(&xyz, *height, *width) {
-                Sight::Behind => {}
-                Sight::Outside => in_front = true,
-                Sight::Seen(uv) => {
-                    seen = true;
+    let mut extent =
+        [Lanes::all(f64::INFINITY), Lanes::all(f64::NEG_INFINITY)].map(|none| [none; 3]);
+    let mut sights = with_room(images.len())?;
+    for first in rows.clone().step_by(LANES) {
+        let block = Block::new(cloud, first..rows.end.min(first + LANES));
+        let usable = part.counts.usable(&block, &mut extent, keep_origin)?;
+        let of_image = |&(camera, size): &(&Camera, _)| camera.sights(&block.xyz, size);
+        sights.clear();
+        sights.extend(images.iter().map(of_image));
+        let any =
+            |bits: fn(&Sights) -> u32| usable & sights.iter().fold(0, |all, of| all | bits(of));
+        let (in_front, seen) = (any(|of| of.in_front), any(|of| of.seen));
+        part.counts.behind += (usable & !in_front).count_ones() as usize;
+        part.counts.outside += (in_front & !seen).count_ones() as usize;
+        for lane in lanes(seen) {
+            for (sighting, of) in part.sightings.iter_mut().zip(&sights) {
+                if of.seen >> lane & 1 == 1 {
                     sighting.seen.push(part.indices.len() as u32);
-                    sighting.uv.push(uv);
+                    sighting.uv.push([of.uv[0][lane], of.uv[1][lane]]);
                 }
             }
-        }
-        if seen {
-            part.indices.push(row as u32);
-            part.points.push(xyz);
-        } else {
-            part.counts.outside += usize::from(in_front);
-            part.counts.behind += usize::from(!in_front);
+            part.indices.push((first + lane) as u32);
+            part.points.push(block.point(lane));
         }
     }
+    for axis in 0..3 {
+        let [low, high] = extent.map(|of_axes| of_axes[axis].to_array().into_iter());
+        part.counts.min[axis] = low.fold(part.counts.min[axis], f64::min);
+        part.counts.max[axis] = high.fold(part.counts.max[axis], f64::max);
+    }
     Ok(part)
+}
+
+/// Some rows of a cloud, sixteen at most.
+struct Block {
+    rows: Range<usize>,
+    /// x, y and z; where there are fewer rows, those of the last one again.
+    axes: [[f64; LANES]; 3],
+    xyz: [Lanes; 3],
+}
+
+impl Block {
+    #[inline(always)]
+    fn new(cloud: Cloud, rows: Range<usize>) -> Self {
+        let axes = cloud.axes(rows.clone());
+        Self {
+            rows,
+            axes,
+            xyz: [0, 1, 2].map(|axis| Lanes::from_array(&axes[axis])),
+        }
+    }
+
+    #[inline(always)]
+    fn point(&self, lane: usize) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.axes[axis][lane])
+    }
+
+    /// Bits of the points of which each coordinate has a property.
+    #[inline(always)]
+    fn bits(&self, of_axis: impl Fn(Lanes) -> Mask) -> u32 {
+        let [x, y, z] = self.xyz.map(of_axis);
+        (x & y & z).bits() & ((1 << self.rows.len()) - 1)
+    }
+}
+
+/// The bits that are set, from the lowest on.
+#[inline(always)]
+fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize);
+        bits &= bits.wrapping_sub(1);
+        lane
+    })
 }
 
 impl InView {
@@ -200,30 +252,53 @@ impl Default for Counts {
 }
 
 impl Counts {
-    /// The point of a row, if it is usable; counts it otherwise.
-    fn usable(&mut self, cloud: Cloud, row: usize, keep_origin: bool) -> Result<Option<[f64; 3]>> {
-        let xyz = cloud.xyz(row);
-        // written so that NaN fails
-        if let Some(&value) = xyz.iter().find(|c| !(c.abs() <= COORDINATE_LIMIT_M)) {
-            if !xyz.iter().all(|c| c.is_finite()) {
-                self.nonfinite += 1;
-                return Ok(None);
+    /// Bits of the usable points; counts the others, and takes all that are finite into the extent, least and largest.
+    #[inline(always)]
+    fn usable(
+        &mut self,
+        block: &Block,
+        [min, max]: &mut [[Lanes; 3]; 2],
+        keep_origin: bool,
+    ) -> Result<u32> {
+        let near = block.bits(|axis| axis.abs().up_to(COORDINATE_LIMIT_M));
+        let usable = if near.count_ones() as usize == block.rows.len() {
+            for axis in 0..3 {
+                min[axis] = min[axis].min(block.xyz[axis]);
+                max[axis] = max[axis].max(block.xyz[axis]);
             }
-            return Err(Error::CoordinateOutOfRange {
-                row,
-                value,
-                limit: COORDINATE_LIMIT_M,
-            });
+            near
+        } else {
+            self.usable_of_some(block, near)?
+        };
+        if keep_origin {
+            return Ok(usable);
         }
-        for (axis, &c) in xyz.iter().enumerate() {
-            self.min[axis] = self.min[axis].min(c);
-            self.max[axis] = self.max[axis].max(c);
+        let origin = usable & block.bits(|axis| axis.is(0.0));
+        self.origin += origin.count_ones() as usize;
+        Ok(usable & !origin)
+    }
+
+    /// The same where only those of the bits `near` are within the limits.
+    #[cold]
+    fn usable_of_some(&mut self, block: &Block, near: u32) -> Result<u32> {
+        for lane in 0..block.rows.len() {
+            let xyz = block.point(lane);
+            if near >> lane & 1 == 1 {
+                for axis in 0..3 {
+                    self.min[axis] = self.min[axis].min(xyz[axis]);
+                    self.max[axis] = self.max[axis].max(xyz[axis]);
+                }
+            } else if !xyz.iter().all(|c| c.is_finite()) {
+                self.nonfinite += 1;
+            } else if let Some(&value) = xyz.iter().find(|c| c.abs() > COORDINATE_LIMIT_M) {
+                return Err(Error::CoordinateOutOfRange {
+                    row: block.rows.start + lane,
+                    value,
+                    limit: COORDINATE_LIMIT_M,
+                });
+            }
         }
-        if xyz == [0.0; 3] && !keep_origin {
-            self.origin += 1;
-            return Ok(None);
-        }
-        Ok(Some(xyz))
+        Ok(near)
     }
 
     fn merge(&mut self, other: &Self) {
@@ -241,6 +316,9 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Distortion;
+    use crate::projection::nearest_pixel;
+    use proptest::prelude::*;
 
     const IDENTITY: [f64; 16] = [
         1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
@@ -255,6 +333,78 @@ mod tests {
             columns: 3,
         };
         project(cloud, &[(&camera, [80, 100])], false, Cancel::never())
+    }
+
+    /// A coordinate of all kinds: near the camera and its edges, far, none.
+    fn coordinate() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            8 => -3.0..3.0_f64,
+            2 => Just(0.0),
+            1 => -1e7..1e7_f64,
+            1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(f64::NEG_INFINITY)],
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn points_are_seen_as_one_by_one(
+            rows in proptest::collection::vec(proptest::array::uniform3(coordinate()), 0..70),
+            single in any::<bool>(), columns in 3_usize..6, keep_origin in any::<bool>(), bent in any::<bool>(),
+        ) {
+            let forward = if bent {
+                let lens = Distortion::Equidistant { k: [0.1, -0.02, 0.001, 0.0] };
+                let k = [100., 0., 50., 0., 100., 40., 0., 0., 1.];
+                Camera::with_distortion(&k, lens, &IDENTITY, 0.125).unwrap()
+            } else {
+                Camera::new(&PROJECTION, &IDENTITY, 0.125).unwrap()
+            };
+            let mut turned = IDENTITY;
+            (turned[0], turned[10]) = (-1.0, -1.0);
+            let backward = Camera::new(&PROJECTION, &turned, 0.125).unwrap();
+            let images = [(&forward, [80, 100]), (&backward, [60, 90])];
+            let doubles: Vec<f64> = rows.iter().flat_map(|xyz| (0..columns).map(|c| if c < 3 { xyz[c] } else { f64::NAN })).collect();
+            let floats: Vec<f32> = doubles.iter().map(|&value| value as f32).collect();
+            let cloud = if single {
+                Cloud::F32 { values: &floats, columns }
+            } else {
+                Cloud::F64 { values: &doubles, columns }
+            };
+            let found = project(cloud, &images, keep_origin, Cancel::never()).unwrap();
+            let mut expected = InView::empty(2, 0).unwrap();
+            let counts = &mut expected.counts;
+            for row in 0..rows.len() {
+                let xyz = cloud.xyz(row);
+                if !xyz.iter().all(|c| c.is_finite()) {
+                    counts.nonfinite += 1;
+                    continue;
+                }
+                for axis in 0..3 {
+                    counts.min[axis] = counts.min[axis].min(xyz[axis]);
+                    counts.max[axis] = counts.max[axis].max(xyz[axis]);
+                }
+                if xyz == [0.0; 3] && !keep_origin {
+                    counts.origin += 1;
+                    continue;
+                }
+                let (mut in_front, mut seen) = (false, false);
+                for (sighting, (camera, [height, width])) in expected.sightings.iter_mut().zip(images) {
+                    let [u, v, depth] = camera.project(&xyz);
+                    in_front |= depth > 0.125;
+                    if depth > 0.125 && nearest_pixel([u, v], height, width).is_some() {
+                        seen = true;
+                        sighting.seen.push(expected.indices.len() as u32);
+                        sighting.uv.push([u, v]);
+                    }
+                }
+                if seen {
+                    expected.indices.push(row as u32);
+                    expected.points.push(xyz);
+                }
+                counts.outside += usize::from(in_front && !seen);
+                counts.behind += usize::from(!in_front);
+            }
+            prop_assert_eq!(found, expected);
+        }
     }
 
     #[test]

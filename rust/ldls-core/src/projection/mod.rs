@@ -4,6 +4,7 @@ mod camera;
 mod cloud;
 mod distortion;
 mod in_view;
+mod lanes;
 
 pub use camera::Camera;
 pub(crate) use camera::nearest_pixel;
