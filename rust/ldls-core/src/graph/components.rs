@@ -68,15 +68,13 @@ pub(crate) fn remove_outliers_by_index(
     for rows in members.chunks(ROWS_A_BLOCK) {
         cancel.check()?;
         for &row in rows {
-            let root = sets.root(row);
-            components[root as usize].add(root, indices[row as usize]);
+            components[sets.root(row) as usize].add(indices[row as usize]);
         }
     }
     cancel.check()?;
-    for component in largest_of_each(labels, &components) {
-        if component.size > 0 {
-            components[component.root as usize].stays = true;
-        }
+    let largest = largest_of_each(labels, &components);
+    for &root in largest.iter().flatten() {
+        components[root].stays = true;
     }
     if part_gap > 0.0 {
         let rows = rows_of_each(&mut components, &members, &mut sets, cancel)?;
@@ -85,7 +83,7 @@ pub(crate) fn remove_outliers_by_index(
             let points = collect(rows.map(|&row| place(row as usize)), cancel)?;
             Boxes::around(points, cancel)
         };
-        keep_parts(&mut components, labels, part_gap, boxes, cancel)?;
+        keep_parts(&mut components, labels, &largest, (part_gap, boxes), cancel)?;
     }
     let mut kept = collect(labels.iter().copied(), cancel)?;
     for &row in &members {
@@ -96,10 +94,10 @@ pub(crate) fn remove_outliers_by_index(
     Ok(kept)
 }
 
-/// One component: its root, its size, the lowest index of a point in it, and the end of its rows among those of all.
+/// One component, in the place of its root: its size, the lowest index of a point in it, and the end of its rows among
+/// those of all.
 #[derive(Debug, Clone, Copy)]
 struct Component {
-    root: u32,
     size: u32,
     first: u32,
     end: u32,
@@ -108,15 +106,13 @@ struct Component {
 
 impl Component {
     const NONE: Self = Self {
-        root: u32::MAX,
         size: 0,
         first: u32::MAX,
         end: 0,
         stays: false,
     };
 
-    fn add(&mut self, root: u32, index: u32) {
-        self.root = root;
+    fn add(&mut self, index: u32) {
         self.size += 1;
         self.first = self.first.min(index);
     }
@@ -127,14 +123,20 @@ impl Component {
     }
 }
 
-fn largest_of_each(labels: &[u32], components: &[Component]) -> Vec<Component> {
+/// The root of the largest component of each label.
+fn largest_of_each(labels: &[u32], components: &[Component]) -> Vec<Option<usize>> {
     let n_labels = labels.iter().max().map_or(1, |&label| label as usize + 1);
-    let mut largest = vec![Component::NONE; n_labels];
-    for &component in components.iter().filter(|component| component.size > 0) {
-        let best = &mut largest[labels[component.root as usize] as usize];
-        let larger = component.size > best.size;
-        if larger || (component.size == best.size && component.first < best.first) {
-            *best = component;
+    let mut largest = vec![None; n_labels];
+    let there = components.iter().enumerate();
+    for (root, component) in there.filter(|(_, component)| component.size > 0) {
+        let best = &mut largest[labels[root] as usize];
+        let larger = best.is_none_or(|best: usize| {
+            let best = &components[best];
+            component.size > best.size
+                || (component.size == best.size && component.first < best.first)
+        });
+        if larger {
+            *best = Some(root);
         }
     }
     largest
@@ -164,26 +166,26 @@ fn rows_of_each(
     Ok(rows)
 }
 
-/// Keeps the components that come within `gap` metres of the one of their label that stays.
+/// Keeps the components that come within `gap` metres of the largest of their label.
 fn keep_parts(
     components: &mut [Component],
     labels: &[u32],
-    gap: f64,
-    boxes: impl Fn(&Component) -> Result<Boxes>,
+    largest: &[Option<usize>],
+    (gap, boxes): (f64, impl Fn(&Component) -> Result<Boxes>),
     cancel: &Cancel,
 ) -> Result<()> {
-    let largest = largest_of_each(labels, components);
     let mut main: Vec<Option<Boxes>> = largest.iter().map(|_| None).collect();
-    for component in components {
+    for at in 0..components.len() {
+        let (component, label) = (&components[at], labels[at] as usize);
         if component.size == 0 || component.stays {
             continue;
         }
-        let label = labels[component.root as usize] as usize;
+        let Some(root) = largest[label] else { continue };
         let main = match &mut main[label] {
             Some(main) => main,
-            none => none.insert(boxes(&largest[label])?),
+            none => none.insert(boxes(&components[root])?),
         };
-        component.stays = boxes(component)?.come_near(main, gap, cancel)?;
+        components[at].stays = boxes(component)?.come_near(main, gap, cancel)?;
     }
     Ok(())
 }
