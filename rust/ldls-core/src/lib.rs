@@ -7,6 +7,7 @@
 //! Results do not depend on the number of threads, bit for bit: threads share out rows, and every sum within a row is
 //! taken by one thread in one order.
 
+mod bits;
 mod cancel;
 mod confidence;
 mod depth;

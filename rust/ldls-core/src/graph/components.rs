@@ -1,6 +1,6 @@
 //! Outlier removal: an instance keeps its largest connected component and the parts near it (method, step 7).
 
-use super::boxes::Boxes;
+use super::box_tree::BoxTree;
 use super::point_graph::PointGraph;
 use crate::memory::{collect, filled, push, zeros};
 use crate::{Cancel, Error, Result};
@@ -78,12 +78,12 @@ pub(crate) fn remove_outliers_by_index(
     }
     if part_gap > 0.0 {
         let rows = rows_of_each(&mut components, &members, &mut sets, cancel)?;
-        let boxes = |component: &Component| {
+        let tree = |component: &Component| {
             let rows = rows[component.rows()].iter();
             let points = collect(rows.map(|&row| place(row as usize)), cancel)?;
-            Boxes::around(points, cancel)
+            BoxTree::around(points, cancel)
         };
-        keep_parts(&mut components, labels, &largest, (part_gap, boxes), cancel)?;
+        keep_parts(&mut components, labels, &largest, (part_gap, tree), cancel)?;
     }
     let mut kept = collect(labels.iter().copied(), cancel)?;
     for &row in &members {
@@ -171,10 +171,10 @@ fn keep_parts(
     components: &mut [Component],
     labels: &[u32],
     largest: &[Option<usize>],
-    (gap, boxes): (f64, impl Fn(&Component) -> Result<Boxes>),
+    (gap, tree): (f64, impl Fn(&Component) -> Result<BoxTree>),
     cancel: &Cancel,
 ) -> Result<()> {
-    let mut main: Vec<Option<Boxes>> = largest.iter().map(|_| None).collect();
+    let mut main: Vec<Option<BoxTree>> = largest.iter().map(|_| None).collect();
     for at in 0..components.len() {
         let (component, label) = (&components[at], labels[at] as usize);
         if component.size == 0 || component.stays {
@@ -183,9 +183,9 @@ fn keep_parts(
         let Some(root) = largest[label] else { continue };
         let main = match &mut main[label] {
             Some(main) => main,
-            none => none.insert(boxes(&components[root])?),
+            none => none.insert(tree(&components[root])?),
         };
-        components[at].stays = boxes(component)?.come_near(main, gap, cancel)?;
+        components[at].stays = tree(component)?.come_near(main, gap, cancel)?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! The point graph, and the connected components of its labels (method, steps 3, 4 and 7).
 
-mod boxes;
+mod box_tree;
 mod components;
 mod point_graph;
 

@@ -9,6 +9,7 @@ use super::candidates::decide;
 use super::kdtree::{Boxes, FAN, KdTree, larger};
 use super::keys::{Key, key, position_of, squared_of};
 use super::lone_search::search_alone;
+use crate::bits::ones;
 use multiversion::multiversion;
 use wide::f32x8;
 
@@ -376,16 +377,6 @@ fn bits(values: &[f32; FAN], limits: &[f32; FAN]) -> u32 {
             .to_bitmask()
     };
     halves.map(bits).rev().fold(0, |all, half| all << 8 | half)
-}
-
-/// Places of the bits that are set, ascending.
-#[inline(always)]
-fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let place = (bits != 0).then(|| bits.trailing_zeros() as usize);
-        bits &= bits.wrapping_sub(1);
-        place
-    })
 }
 
 #[inline(always)]

@@ -2,6 +2,7 @@
 
 use super::distortion::{Distortion, Lens};
 use super::lanes::{LANES, Lanes};
+use crate::bits::ones;
 use crate::{Error, Result};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 
@@ -139,7 +140,7 @@ impl Camera {
             return plane;
         }
         let ([x, y], mut uv) = (plane.map(Lanes::to_array), [[f64::NAN; LANES]; 2]);
-        for lane in (0..LANES).filter(|lane| wanted >> lane & 1 == 1) {
+        for lane in ones(wanted) {
             let [u, v] = self.bend([x[lane], y[lane]]);
             (uv[0][lane], uv[1][lane]) = (u, v);
         }

@@ -3,6 +3,7 @@
 use super::camera::{Camera, Sights};
 use super::cloud::Cloud;
 use super::lanes::{LANES, Lanes, Mask};
+use crate::bits::ones;
 use crate::memory::with_room;
 use crate::{Cancel, Error, Result};
 use multiversion::multiversion;
@@ -135,7 +136,7 @@ fn project_rows(
         let (in_front, seen) = (any(|of| of.in_front), any(|of| of.seen));
         part.counts.behind += (usable & !in_front).count_ones() as usize;
         part.counts.outside += (in_front & !seen).count_ones() as usize;
-        for lane in lanes(seen) {
+        for lane in ones(seen) {
             for (sighting, of) in part.sightings.iter_mut().zip(&sights) {
                 if of.seen >> lane & 1 == 1 {
                     sighting.seen.push(part.indices.len() as u32);
@@ -184,16 +185,6 @@ impl Block {
         let [x, y, z] = self.xyz.map(of_axis);
         (x & y & z).bits() & ((1 << self.rows.len()) - 1)
     }
-}
-
-/// The bits that are set, from the lowest on.
-#[inline(always)]
-fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = (bits != 0).then(|| bits.trailing_zeros() as usize);
-        bits &= bits.wrapping_sub(1);
-        lane
-    })
 }
 
 impl InView {

@@ -9,14 +9,14 @@ const LEAF: usize = 16;
 
 /// Points, and the boxes around runs of them, each half as long as the one before. Points that follow one another should
 /// be near.
-pub(super) struct Boxes {
+pub(super) struct BoxTree {
     points: Vec<[f64; 3]>,
     /// Box i lies in box i / 2; 1 holds all points, those from `leaves` on a run of [`LEAF`] points each.
     bounds: Vec<Bounds>,
     leaves: usize,
 }
 
-impl Boxes {
+impl BoxTree {
     pub(super) fn around(points: Vec<[f64; 3]>, cancel: &Cancel) -> Result<Self> {
         let leaves = points.len().div_ceil(LEAF).next_power_of_two();
         let mut bounds = filled(Bounds::EMPTY, 2 * leaves, cancel)?;
@@ -134,7 +134,7 @@ mod tests {
         fn sets_come_near_where_two_points_do(one in points(90), other in points(40), shift in 0.0..60.0_f64, gap in 0.0..9.0_f64) {
             let other: Vec<_> = other.into_iter().map(|[x, y, z]| [x + shift, y, z]).collect();
             let expected = one.iter().any(|a| other.iter().any(|b| apart(a, b) <= gap * gap));
-            let [one, other] = [one, other].map(|points| Boxes::around(points, Cancel::never()).unwrap());
+            let [one, other] = [one, other].map(|points| BoxTree::around(points, Cancel::never()).unwrap());
             prop_assert_eq!(one.come_near(&other, gap, Cancel::never()).unwrap(), expected);
             prop_assert_eq!(other.come_near(&one, gap, Cancel::never()).unwrap(), expected);
         }

@@ -1,0 +1,11 @@
+//! Sets of small numbers, a bit for each.
+
+/// Places of the bits that are set, ascending.
+#[inline(always)]
+pub(crate) fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let place = (bits != 0).then(|| bits.trailing_zeros() as usize);
+        bits &= bits.wrapping_sub(1);
+        place
+    })
+}
