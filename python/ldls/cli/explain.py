@@ -81,7 +81,7 @@ def explain(
     The first line is the verdict. Then come what each camera sees of the point (its pixel, what masks cover the window
     around it, and which of them count for a point so far away), the likelihood of every label, the edges over which
     labels flow to it, and, for a point of an object, the connected components of which outlier removal keeps the
-    largest and parts like it. Points out of view get a reason.
+    largest and parts near it. Points out of view get a reason.
 
     The point is one of a result that ldls wrote (.npz), or of a sweep that is segmented on the spot with the best known
     parameters. Needs the extra eval.

@@ -20,7 +20,7 @@ HELP = {
     "pixel_weight": "lambda: weight of pixel edges.",
     "window": "Side of the pixel window of a point, odd.",
     "iterations": "Diffusion steps.",
-    "remove_outliers": "Take an object's label from points off its main part and parts like it?",
+    "remove_outliers": "Take an object's label from points off its main part and parts near it?",
     "ground_edges": "Factor on edges between the ground and what stands on it; 1 for none of it.",
     "ground_clearance": "Points nearer to the ground than this many metres become background; 0 for none of it.",
     "local_ground": "Does the ground follow kerbs and lawns, or is it smooth?",
