@@ -8,7 +8,7 @@ use std::ops::Range;
 const LEAF: usize = 16;
 
 /// Points, and the boxes around runs of them, each half as long as the one before. Points that follow one another should
-/// be near.
+/// be near. All in metres.
 pub(super) struct BoxTree {
     points: Vec<[f64; 3]>,
     /// Box i lies in box i / 2; 1 holds all points, those from `leaves` on a run of [`LEAF`] points each.

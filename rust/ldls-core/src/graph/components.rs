@@ -13,7 +13,7 @@ const ROWS_A_BLOCK: usize = 1 << 16;
 /// taken as undirected; of components of one size, the one with the lowest point index is kept.
 ///
 /// If `part_gap`, in metres, is not 0, a component that comes so near to the largest stays too; `place` is where the point
-/// of a row is.
+/// of a row is, x, y and z in metres.
 ///
 /// # Errors
 /// [`Error::Mismatch`] where `labels` is of another length than the graph, [`Error::OutOfMemory`] and

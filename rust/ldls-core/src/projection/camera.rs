@@ -108,7 +108,7 @@ impl Camera {
         })
     }
 
-    /// What an image of `height` x `width` pixels sees of points of the lidar frame, of which x, y and z are given.
+    /// What an image of `height` x `width` pixels sees of points of the lidar frame, by their x, y and z in metres.
     #[inline(always)]
     pub(super) fn sights(&self, xyz: &[Lanes; 3], [height, width]: [usize; 2]) -> Sights {
         let row = |row: usize| {

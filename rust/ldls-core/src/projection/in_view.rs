@@ -1,8 +1,9 @@
 //! The part of a cloud that images see, and how many of the other points are left out for which reason.
 
+use super::block::Block;
 use super::camera::{Camera, Sights};
 use super::cloud::Cloud;
-use super::lanes::{LANES, Lanes, Mask};
+use super::lanes::{LANES, Lanes};
 use crate::bits::ones;
 use crate::memory::with_room;
 use crate::{Cancel, Error, Result};
@@ -153,38 +154,6 @@ fn project_rows(
         part.counts.max[axis] = high.fold(part.counts.max[axis], f64::max);
     }
     Ok(part)
-}
-
-/// Some rows of a cloud, sixteen at most.
-struct Block {
-    rows: Range<usize>,
-    /// x, y and z; where there are fewer rows, those of the last one again.
-    axes: [[f64; LANES]; 3],
-    xyz: [Lanes; 3],
-}
-
-impl Block {
-    #[inline(always)]
-    fn new(cloud: Cloud, rows: Range<usize>) -> Self {
-        let axes = cloud.axes(rows.clone());
-        Self {
-            rows,
-            axes,
-            xyz: [0, 1, 2].map(|axis| Lanes::from_array(&axes[axis])),
-        }
-    }
-
-    #[inline(always)]
-    fn point(&self, lane: usize) -> [f64; 3] {
-        [0, 1, 2].map(|axis| self.axes[axis][lane])
-    }
-
-    /// Bits of the points of which each coordinate has a property.
-    #[inline(always)]
-    fn bits(&self, of_axis: impl Fn(Lanes) -> Mask) -> u32 {
-        let [x, y, z] = self.xyz.map(of_axis);
-        (x & y & z).bits() & ((1 << self.rows.len()) - 1)
-    }
 }
 
 impl InView {

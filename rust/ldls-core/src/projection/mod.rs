@@ -1,5 +1,6 @@
 //! From points to pixels (method, step 1).
 
+mod block;
 mod camera;
 mod cloud;
 mod distortion;
