@@ -19,13 +19,14 @@ class Expected:
     likelihood: np.ndarray
     edges: coo_array
     xyz: np.ndarray
-    heights: np.ndarray
+    in_graph: np.ndarray
 
     def remove_outliers(self, labels, params):
-        """Step 7, and the clearance of the ground."""
-        kept = largest_components(self.edges, labels, self.xyz, params.part_gap) if params.remove_outliers else labels
-        low = (self.heights > -0.3) & (self.heights < params.ground_clearance) & (params.ground_clearance > 0)
-        return np.where(low, 0, kept)
+        """Step 7, of labels of the points in view."""
+        kept, own = np.zeros_like(labels), labels[self.in_graph]
+        parts = largest_components(self.edges, own, self.xyz, params.part_gap) if params.remove_outliers else own
+        kept[self.in_graph] = parts
+        return kept
 
 
 def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1, heights=None, center=None):
@@ -36,21 +37,23 @@ def segment(points, masks, camera_matrix, params, *, min_depth_m=0.1, heights=No
     in_view, pixels = project(points, camera_matrix, masks.shape[1:], min_depth_m)
     xyz = points[in_view].astype(np.float64)
     heights = np.full(len(xyz), np.nan) if heights is None else heights
-    ground = (heights > -0.3) & (heights < 0.15)
-    edges = point_edges(xyz, params.neighbors, params.sigma, ground, params.ground_edges)
+    ground, in_graph = (heights > -0.3) & (heights < 0.15), ~cleared(heights, params)
     admitted = np.ones((len(xyz), len(masks) + 1), bool)
     if params.depth_gap > 0:
         admitted = depth_groups(np.linalg.norm(xyz - center, axis=1), pixels, masks, ~ground, params)
     labels, mass = pixel_edges(pixels, masks, params.window, params.pixel_weight)
-    labels = labels * admitted
+    labels, mass, xyz = (labels * admitted)[in_graph], mass[in_graph], xyz[in_graph]
+    edges = point_edges(xyz, params.neighbors, params.sigma, ground[in_graph], params.ground_edges)
     row_sums = edges.sum(axis=1) + mass
     A = diags_array(1 / row_sums, shape=edges.shape) @ edges
     b = labels / row_sums[:, None]
     z = np.zeros_like(b)
     for _ in range(params.iterations):
         z = A @ z + b
-    diffused = z.argmax(axis=1) if len(z) else np.zeros(0, int)
-    expected = Expected(in_view, pixels, diffused, diffused, z, edges, xyz, heights)
+    likelihood = np.zeros((len(in_view), z.shape[1]))
+    likelihood[in_graph] = z
+    diffused = likelihood.argmax(axis=1)
+    expected = Expected(in_view, pixels, diffused, diffused, likelihood, edges, xyz, in_graph)
     expected.labels = expected.remove_outliers(diffused, params)
     return expected
 
@@ -79,14 +82,17 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
         for instance, label in enumerate(of_instance):
             labels[at, label] += own[:, instance] * admitted[:, instance]
         mass[at] += own_mass
-    edges = point_edges(xyz, params.neighbors, params.sigma, ground, params.ground_edges)
+    in_graph = ~cleared(heights, params)
+    labels, mass, xyz = labels[in_graph], mass[in_graph], xyz[in_graph]
+    edges = point_edges(xyz, params.neighbors, params.sigma, ground[in_graph], params.ground_edges)
     row_sums = edges.sum(axis=1) + mass
     A, b = diags_array(1 / row_sums, shape=edges.shape) @ edges, labels / row_sums[:, None]
     z = np.zeros_like(b)
     for _ in range(params.iterations):
         z = A @ z + b
-    diffused = z.argmax(axis=1)
-    expected = Expected(in_view, None, diffused, diffused, z, edges, xyz, heights)
+    diffused = np.zeros(len(in_view), int)
+    diffused[in_graph] = z.argmax(axis=1)
+    expected = Expected(in_view, None, diffused, diffused, z, edges, xyz, in_graph)
     whole = np.full(len(points), -1)
     whole[in_view] = expected.remove_outliers(diffused, params)
     return whole, groups
@@ -149,6 +155,11 @@ def same_objects(views, seen, same_object, rows=None):
             groups[min(groups.index(a), groups.index(b))] = sorted(a + b)
             groups.remove(b if b in groups else a)
     return groups
+
+
+def cleared(heights, params):
+    """(n,) True for points nearer to the ground than the clearance, which have no part in the graph."""
+    return (heights > -0.3) & (heights < params.ground_clearance) & (params.ground_clearance > 0)
 
 
 def project(points, camera_matrix, image_size, min_depth_m):

@@ -172,6 +172,7 @@ CALLS = {
         {"points": W.points, "camera": W.camera, "image_size": (60, 80), "keep_origin": False, "threads": None},
     ),
     "stages.ground": (stages.ground, {"points": W.xyz, "camera": W.camera, "local_ground": True, "threads": None}),
+    "stages.in_graph": (stages.in_graph, {"heights": W.heights, "ground_clearance": 0.1}),
     "stages.depth_groups": (
         stages.depth_groups,
         {
@@ -190,6 +191,7 @@ CALLS = {
         stages.DepthGroups,
         {"intervals": W.depths.intervals, "distances": W.depths.distances, "unsure": W.depths.unsure},
     ),
+    "stages.DepthGroups.of_points": (W.depths.of_points, {"rows": [0, 1]}),
     "stages.neighbors": (stages.neighbors, {"points": W.xyz, "k": 3, "threads": None}),
     "stages.point_graph": (
         stages.point_graph,
@@ -219,14 +221,7 @@ CALLS = {
     ),
     "stages.remove_outliers": (
         stages.remove_outliers,
-        {
-            "graph": W.A,
-            "labels": W.z.argmax(axis=1),
-            "points": W.xyz,
-            "heights": W.heights,
-            "part_gap": 0.5,
-            "ground_clearance": 0.1,
-        },
+        {"graph": W.A, "labels": W.z.argmax(axis=1), "points": W.xyz, "part_gap": 0.5},
     ),
     "stages.confidence": (stages.confidence, {"z": W.z, "labels": W.z.argmax(axis=1), "masks": W.masks}),
     "Sweep": (

@@ -115,18 +115,23 @@ def test_results_are_the_same_bits_for_any_number_of_threads(frame_571):
 def test_the_stages_together_equal_the_whole(frame_571):
     frame = frame_571
     in_view, pixels = stages.project(frame.points, frame.camera, image_size=frame.masks.image_size)
-    xyz = frame.points[in_view]
-    heights = stages.ground(xyz, frame.camera)
-    depths = stages.depth_groups(xyz, pixels, frame.masks, frame.camera, heights)
+    heights = stages.ground(frame.points[in_view], frame.camera)
+    depths = stages.depth_groups(frame.points[in_view], pixels, frame.masks, frame.camera, heights)
+    rows = stages.in_graph(heights)
+    assert 0.2 < len(rows) / len(in_view) < 0.9
+    xyz, heights, pixels, depths = frame.points[in_view][rows], heights[rows], pixels[rows], depths.of_points(rows)
     indices, _ = stages.neighbors(xyz)
     graph = stages.point_graph(xyz, indices, heights=heights)
     A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, frame.masks, depths=depths))
     z = stages.diffuse(A, b)
-    labels = stages.remove_outliers(A, z.argmax(axis=1), points=xyz, heights=heights)
+    labels = stages.remove_outliers(A, z.argmax(axis=1), points=xyz)
     result = ldls.segment(frame.points, frame.masks, frame.camera)
-    np.testing.assert_array_equal(labels, result.labels[in_view])
+    np.testing.assert_array_equal(labels, result.labels[in_view[rows]])
     confidence = stages.confidence(z, labels, frame.masks)
-    np.testing.assert_allclose(confidence, result.confidence[in_view], atol=1e-5)
+    np.testing.assert_allclose(confidence, result.confidence[in_view[rows]], atol=1e-5)
+    others = np.delete(in_view, rows)
+    assert not result.labels[others].any() and not result.diffused_labels[others].any()
+    assert (result.confidence[others] > 0.99).all()
 
 
 def test_the_stages_of_the_paper_equal_the_reference(frame_571):

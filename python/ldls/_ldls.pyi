@@ -20,13 +20,13 @@ __all__ = [
     "SegmentationArrays",
     "__version__",
     "check_params",
-    "clear_ground",
     "confidence",
     "default_threads",
     "depth_groups",
     "diffuse",
     "direct_labels",
     "ground",
+    "in_graph",
     "neighbors",
     "normalize_rows",
     "panic_in_worker",
@@ -143,6 +143,7 @@ def neighbors(
     points: NDArray[np.float64], k: int, threads: int | None
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
 def ground(points: NDArray[np.float64], camera: Camera, local: bool, threads: int | None) -> NDArray[np.float64]: ...
+def in_graph(heights: NDArray[np.float64], clearance: float) -> NDArray[np.int64]: ...
 def depth_groups(
     points: NDArray[np.float64],
     pixels: NDArray[np.float64],
@@ -188,7 +189,6 @@ def confidence(
     labels: NDArray[np.uint32],
     scores: NDArray[np.float32],
 ) -> NDArray[np.float32]: ...
-def clear_ground(labels: NDArray[np.uint32], heights: NDArray[np.float64], clearance: float) -> NDArray[np.int32]: ...
 def unpack_laz(
     file: bytes, offset: int, laszip: bytes, n_points: int
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16]]: ...

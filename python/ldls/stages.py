@@ -1,18 +1,20 @@
 """The steps of the method one by one, arrays in and arrays out, with SciPy's sparse matrices for the graph.
 
     in_view, pixels = stages.project(points, camera, image_size=masks.image_size)
-    xyz = points[in_view]
-    heights = stages.ground(xyz, camera)
-    depths = stages.depth_groups(xyz, pixels, masks, camera, heights)
+    heights = stages.ground(points[in_view], camera)
+    depths = stages.depth_groups(points[in_view], pixels, masks, camera, heights)
+    rows = stages.in_graph(heights)
+    xyz, heights, pixels, depths = points[in_view][rows], heights[rows], pixels[rows], depths.of_points(rows)
     indices, squared_distances = stages.neighbors(xyz)
     graph = stages.point_graph(xyz, indices, heights=heights)
     A, b = stages.normalize_rows(graph, stages.pixel_labels(pixels, masks, depths=depths))
     z = stages.diffuse(A, b)
-    labels = stages.remove_outliers(A, z.argmax(axis=1), points=xyz, heights=heights)
+    labels = stages.remove_outliers(A, z.argmax(axis=1), points=xyz)
     confidence = stages.confidence(z, labels, masks)
 
-equals `ldls.segment` on the points in view; without heights and depths, and with the options of `Params.paper()`, it is
-the paper's method. Options stand for the same as in `ldls.Params`. Needs the extra `eval`.
+equals `ldls.segment` on `in_view[rows]`; the other points in view are background. Without heights, depths and rows, and
+with the options of `Params.paper()`, it is the paper's method. Options stand for the same as in `ldls.Params`. Needs
+the extra `eval`.
 """
 
 from __future__ import annotations
@@ -85,9 +87,13 @@ class DepthGroups:
         """The arrays as the core takes them."""
         return self.intervals, self.distances, self.unsure
 
-    def of_point(self, row: int) -> DepthGroups:
-        """The depth groups of one of the points alone."""
-        return DepthGroups(self.intervals, self.distances[row : row + 1], self.unsure[row : row + 1])
+    def of_points(self, rows: ArrayLike) -> DepthGroups:
+        """The depth groups of some of the points alone: rows (m,) of the n, whole numbers."""
+        chosen = numbers("rows", rows, np.int64, ("m",))
+        if chosen.size and not 0 <= chosen.min() <= chosen.max() < len(self.distances):
+            found = f"{chosen.min()} to {chosen.max()}"
+            raise InputError(f"rows: got {found}, expected rows of the {len(self.distances)} points")
+        return DepthGroups(self.intervals, self.distances[chosen], self.unsure[chosen])
 
     def behind_m(self, mask: int) -> NDArray[np.float64]:
         """How far behind the object of a mask, numbered from 0, each point (n,) is, in metres; negative before it.
@@ -146,6 +152,18 @@ def ground(
     """
     Params(threads=threads)
     return _ldls.ground(_finite_xyz(points), camera.core, local_ground, threads)
+
+
+@checked
+def in_graph(heights: ArrayLike, *, ground_clearance: float = _BEST.ground_clearance) -> NDArray[np.int64]:
+    """Rows (m,) of the points that the graph has, ascending; the others are cleared: background, for they are so low.
+
+    Args:
+        heights: (n,) of `ground`.
+        ground_clearance: As in `Params`.
+    """
+    Params(ground_clearance=ground_clearance, threads=1)
+    return _ldls.in_graph(numbers("heights", heights, np.float64, ("n",)), ground_clearance)
 
 
 @checked
@@ -336,8 +354,6 @@ def remove_outliers(
     *,
     points: ArrayLike | None = None,
     part_gap: float = _BEST.part_gap,
-    heights: ArrayLike | None = None,
-    ground_clearance: float = _BEST.ground_clearance,
 ) -> NDArray[np.int32]:
     """`labels` (n,) with every point outside the largest component of its label turned into background (step 7).
 
@@ -346,23 +362,17 @@ def remove_outliers(
         labels: (n,) 0 or more.
         points: (n, >= 3) in metres: keeps other components too that come within `part_gap` of the largest of a label.
         part_gap: As in `Params`.
-        heights: (n,) of `ground`: turns points nearer to the ground than `ground_clearance` into background too.
-        ground_clearance: As in `Params`.
     """
     array = numbers("labels", labels, np.int64, ("n",))
     if array.size and not 0 <= array.min() <= array.max() < 2**31:
         found = f"{array.min()} to {array.max()}"
         raise InputError(f"labels: got {found}, expected 0 or more; pass the points in view only")
-    Params(part_gap=part_gap, ground_clearance=ground_clearance)
+    Params(part_gap=part_gap)
     xyz = np.empty((0, 3)) if points is None else _finite_xyz(points)
     if points is not None and len(xyz) != len(array):
         raise ShapeError(f"points: got {len(xyz)} rows, expected one a label, {len(array)}")
     gap = 0.0 if points is None else part_gap
-    kept = _ldls.remove_outliers(_arrays("graph", graph), array.astype(np.uint32), xyz, gap)
-    if heights is None:
-        return kept
-    above = numbers("heights", heights, np.float64, (len(kept),))
-    return _ldls.clear_ground(kept.astype(np.uint32), above, ground_clearance)
+    return _ldls.remove_outliers(_arrays("graph", graph), array.astype(np.uint32), xyz, gap)
 
 
 @checked

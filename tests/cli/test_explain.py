@@ -104,12 +104,12 @@ def test_a_point_near_the_ground_says_how_near(street):
     path, explanations = street
     found = next(each for each in explanations if each.cleared)
     verdict, place, course, *_ = explain(found.point, path).output.splitlines()
-    assert verdict.startswith(f"Point {found.point} is background: diffusion gave it to ")
+    assert verdict.startswith(f"Point {found.point} is background: it is ")
     assert verdict.endswith(" the ground, nearer than 2 cm.")
     assert f"{abs(found.height_m):.2f} m {'above' if found.height_m >= 0 else 'below'} the ground." in place
-    kept = f"{found.names[found.diffused_label]} (label {found.diffused_label})"
-    assert f"After diffusion: {kept}. After outlier removal: {kept}" in course
+    assert course.startswith("Direct projection: ")
     assert course.endswith(". Near the ground: background.")
+    assert "After diffusion" not in course
 
 
 def test_a_mask_that_does_not_count_says_how_far_its_object_is(street):
@@ -143,7 +143,7 @@ def test_parts_are_said_to_be_kept_and_others_why_not(street, tmp_path):
     alone = ldls.segment(sample.points, image.masks, image.camera, params=ldls.Params(part_gap=0.9))
     ldls.save(alone, tmp_path / "alone.npz")
     verdict, *lines = explain(16999, tmp_path / "alone.npz").output.splitlines()
-    assert verdict.endswith("it lies in a component of 71 points, 0.9 m from the largest, which has 90: removed.")
+    assert verdict.endswith("it lies in a component of 71 points, 0.92 m from the largest, which has 85: removed.")
     assert any("0.92 m" in line and "this point's, removed" in line for line in lines)
 
 
@@ -192,7 +192,7 @@ def test_json_is_one_object_with_the_same(frame):
 def test_files_without_a_result_give_the_same(frame_571, tmp_path):
     files = ["--points", frame_571.points_path, "--calib", frame_571.calib_path, "--masks", frame_571.masks_path]
     result = ldls.segment(frame_571.points, frame_571.masks, frame_571.camera)
-    point = first(result.labels < result.diffused_labels)
+    point = first(result.labels > result.direct_labels)
     outcome = explain(point, *files)
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.splitlines()[0] == ldls.explain(result, point).verdict

@@ -344,8 +344,8 @@ def likelihoods(*values):
         ),
         pytest.param(
             {"label": 0, "components": components(1200, 85, own=1, part_gap=1.5, gap_m=2.34)},
-            "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 85 points, 2.3 m "
-            "from the largest, which has 1,200: removed.",
+            "Point 7 is background: diffusion gave it to car (label 1), but it lies in a component of 85 points, "
+            "2.34 m from the largest, which has 1,200: removed.",
             id="too far for a part",
         ),
         pytest.param(
@@ -354,15 +354,13 @@ def likelihoods(*values):
             id="a part",
         ),
         pytest.param(
-            {"label": 0, "height_m": 0.0396, "clearance_m": 0.04},
-            "Point 7 is background: diffusion gave it to car (label 1), but it is 3.9 cm above the ground, nearer than "
-            "4 cm.",
+            {"label": 0, "diffused_label": 0, "components": None, "height_m": 0.0396, "clearance_m": 0.04},
+            "Point 7 is background: it is 3.9 cm above the ground, nearer than 4 cm.",
             id="near the ground",
         ),
         pytest.param(
-            {"label": 0, "height_m": -0.12, "clearance_m": 0.055},
-            "Point 7 is background: diffusion gave it to car (label 1), but it is 12 cm below the ground, nearer than "
-            "5.5 cm.",
+            {"label": 0, "diffused_label": 0, "components": None, "height_m": -0.12, "clearance_m": 0.055},
+            "Point 7 is background: it is 12 cm below the ground, nearer than 5.5 cm.",
             id="below the ground",
         ),
         pytest.param(

@@ -14,7 +14,7 @@ from ring_samples import as_views, random_ring, street_ring
 def winners(result):
     system = rebuild(result)
     z = stages.diffuse(system.A, system.b, iterations=result.params.iterations)
-    return z.argmax(axis=1)
+    return system, z.argmax(axis=1)
 
 
 def street(params=None):
@@ -42,14 +42,16 @@ def ring(seed):
 )
 def test_the_likelihoods_have_the_labels_of_the_result(result):
     result = result()
-    np.testing.assert_array_equal(winners(result), result.diffused_labels[result.in_view])
+    system, found = winners(result)
+    np.testing.assert_array_equal(found, result.diffused_labels[system.in_graph])
+    assert not result.diffused_labels[np.setdiff1d(result.in_view, system.in_graph)].any()
     assert len(np.unique(result.diffused_labels)) > 2
 
 
 def test_rows_sum_to_one_and_a_point_that_two_cameras_see_has_the_pixels_of_both():
     result = ring(3)
     system = rebuild(result)
-    seen_by = np.sum([np.isin(result.in_view, seen.in_view) for seen in result.views], axis=0)
+    seen_by = np.sum([np.isin(system.in_graph, seen.in_view) for seen in result.views], axis=0)
     assert set(seen_by.tolist()) == {1, 2}
     full = result.params.pixel_weight * result.params.window**2
     assert (system.pixel_labels.mass <= full * seen_by + 1e-6).all()
@@ -60,16 +62,15 @@ def test_rows_sum_to_one_and_a_point_that_two_cameras_see_has_the_pixels_of_both
 
 
 @pytest.mark.parametrize("params", [ldls.Params(), ldls.Params.paper()], ids=["best", "paper"])
-def test_outlier_removal_by_heights_and_depth_groups_has_the_labels_of_the_result(params):
+def test_outlier_removal_on_the_graph_has_the_labels_of_the_result(params):
     result = street(params)
     system = rebuild(result)
-    diffused = result.diffused_labels[result.in_view]
-    depths = system.depths[0]
-    labels = stages.remove_outliers(
-        system.A, diffused, points=result.points[system.in_view], part_gap=params.part_gap, heights=system.heights
-    )
-    np.testing.assert_array_equal(labels, result.labels[result.in_view])
-    assert (system.heights is None) == (depths is None) == (params == ldls.Params.paper())
+    diffused = result.diffused_labels[system.in_graph]
+    labels = stages.remove_outliers(system.A, diffused, points=result.points[system.in_graph], part_gap=params.part_gap)
+    np.testing.assert_array_equal(labels, result.labels[system.in_graph])
+    paper = params == ldls.Params.paper()
+    assert (system.heights is None) == (system.depths[0] is None) == paper
+    assert (len(system.in_graph) == len(result.in_view)) == paper
 
 
 def test_each_view_has_depth_groups_of_the_points_that_it_sees():
@@ -89,8 +90,11 @@ def test_points_before_and_behind_an_object_are_as_far_from_it_as_they_lie():
     depths = stages.DepthGroups(intervals, np.array([4.5, 5, 6, 7, 9]), np.array([0, 0, 0, 0, 1], bool))
     np.testing.assert_array_equal(depths.behind_m(0), [-0.5, 0, 0, 0, 2])
     assert np.isnan(depths.behind_m(1)).all()
-    np.testing.assert_array_equal(depths.of_point(4).behind_m(0), [2])
-    assert depths.of_point(4).unsure.tolist() == [True]
+    np.testing.assert_array_equal(depths.of_points([4, 0]).behind_m(0), [2, -0.5])
+    assert depths.of_points([4, 0]).unsure.tolist() == [True, False]
+    for rows in ([5], [-1]):
+        with pytest.raises(ldls.InputError, match="expected rows of the 5 points"):
+            depths.of_points(rows)
 
 
 @pytest.mark.parametrize("kept", [0, 1], ids=["no point in view", "one point in view"])
@@ -98,8 +102,8 @@ def test_clouds_next_to_nothing_have_systems_as_small(small_scene, kept):
     points, masks, camera = small_scene
     whole = ldls.segment(points, masks, camera)
     result = ldls.segment(points[whole.in_view[:kept]], masks, camera)
-    system = rebuild(result)
+    system, found = winners(result)
     assert isinstance(system.A, csr_array)
     assert system.A.shape == (kept, kept)
     assert system.b.shape == (kept, 3)
-    np.testing.assert_array_equal(winners(result), result.diffused_labels)
+    np.testing.assert_array_equal(found, result.diffused_labels)

@@ -18,7 +18,7 @@ UNSEEN = {"behind": "behind the camera", "outside": "outside the image", "origin
 
 
 def tables_of(explanation: Explanation) -> Iterator[Table | str]:
-    """The parts in the order in which they are printed; a point out of view has but its place and what cameras say."""
+    """The parts in the order in which they are printed; outside the graph, but the place and what cameras say."""
     yield _place(explanation)
     yield _course(explanation)
     yield sight_table(explanation)
@@ -144,12 +144,15 @@ def _course(explanation: Explanation) -> str:
     direct = (
         named(explanation, label) + (f" by {camera}" if len(labels) > 1 else "") for camera, label in labels.items()
     )
+    projected = f"Direct projection: {', '.join(direct)}."
+    if explanation.cleared:
+        return f"{projected} Near the ground: {named(explanation, 0)}."
     components, diffused = explanation.components, named(explanation, explanation.diffused_label)
-    course = f"Direct projection: {', '.join(direct)}. After diffusion: {diffused}."
+    course = f"{projected} After diffusion: {diffused}."
     if components is not None and components.removal:
         part = ", a part kept beside the largest" if components.own and not components.removed else ""
         course += f" After outlier removal: {named(explanation, 0) if components.removed else diffused}{part}."
-    return f"{course} Near the ground: {named(explanation, 0)}." if explanation.cleared else course
+    return course
 
 
 def _nearest_pixel(explanation: Explanation, sight: Sight) -> str:

@@ -51,7 +51,7 @@ def explain(result: Segmentation, point: int) -> Explanation:
     seen: dict[str, Any] = {"sights": sights_of(result, point, None)}
     row = int(np.searchsorted(result.in_view, point))
     if row < len(result.in_view) and result.in_view[row] == point:
-        seen = _in_the_graph(result, rebuild(result), row)
+        seen = _in_view(result, rebuild(result), row)
     return Explanation(
         point=point,
         xyz=(x, y, z),
@@ -71,24 +71,34 @@ def _checked_row(point: int, count: int) -> int:
     return operator.index(point)
 
 
+def _in_view(result: Segmentation, system: Rebuilt, at: int) -> dict[str, Any]:
+    """What decided the label of the point in row `at` of those in view."""
+    point = int(result.in_view[at])
+    row = int(np.searchsorted(system.in_graph, point))
+    in_the_graph = row < len(system.in_graph) and system.in_graph[row] == point
+    return {
+        "sights": sights_of(result, point, system),
+        "height_m": None if system.heights is None or np.isnan(system.heights[at]) else float(system.heights[at]),
+        "clearance_m": result.params.ground_clearance,
+        **(_in_the_graph(result, system, row) if in_the_graph else {}),
+    }
+
+
 def _in_the_graph(result: Segmentation, system: Rebuilt, row: int) -> dict[str, Any]:
-    xyz = result.points[system.in_view, :3].astype(np.float64)
+    xyz = result.points[system.in_graph, :3].astype(np.float64)
     distances = np.linalg.norm(xyz - xyz[row], axis=1)
-    diffused = result.diffused_labels[system.in_view]
+    diffused = result.diffused_labels[system.in_graph]
     weights = influences(system.A, row, result.params.iterations)
     neighbors = _neighbors(result, system, row, distances)
     own = float(_entries(system.A, row)[row])
     flowing = sum(each.share for each in neighbors)
     return {
-        "sights": sights_of(result, int(system.in_view[row]), system),
         "edges": Edges(own=own, neighbors=flowing, pixels=max(0.0, 1.0 - own - flowing)),
         "neighbors": neighbors,
         "likelihoods": _likelihoods(weights @ system.b.astype(np.float64), int(diffused[row])),
         "provenance": _provenance(weights * _column(system.b, int(diffused[row])), distances, row),
         "components": _components(system, result, row) if diffused[row] else None,
         "island": _island(system.graph, row),
-        "height_m": None if system.heights is None or np.isnan(system.heights[row]) else float(system.heights[row]),
-        "clearance_m": result.params.ground_clearance,
     }
 
 
@@ -108,13 +118,13 @@ def _neighbors(result: Segmentation, system: Rebuilt, row: int, distances: NDArr
     edges = [(j, weight) for j, weight in _entries(system.graph, row).items() if j != row]
     return tuple(
         Neighbor(
-            point=int(system.in_view[j]),
+            point=int(system.in_graph[j]),
             distance_m=float(distances[j]),
             weight=weight,
             leaves_ground=bool(ground[j] != ground[row]),
             share=shares[j],
-            label=int(result.labels[system.in_view[j]]),
-            diffused_label=int(result.diffused_labels[system.in_view[j]]),
+            label=int(result.labels[system.in_graph[j]]),
+            diffused_label=int(result.diffused_labels[system.in_graph[j]]),
         )
         for j, weight in sorted(edges, key=lambda edge: (distances[edge[0]], edge[0]))
     )
@@ -123,9 +133,11 @@ def _neighbors(result: Segmentation, system: Rebuilt, row: int, distances: NDArr
 def _ground(result: Segmentation, system: Rebuilt) -> NDArray[np.bool_]:
     """(n,) True for points of the ground, where edges that leave it are weakened."""
     if system.heights is None or result.params.ground_edges == 1:
-        return np.zeros(len(system.in_view), bool)
+        return np.zeros(len(system.in_graph), bool)
     lowest, highest = stages.GROUND_M
-    return (system.heights > lowest) & (system.heights < highest)
+    heights = system.heights[np.searchsorted(result.in_view, system.in_graph)]
+    on_ground: NDArray[np.bool_] = (heights > lowest) & (heights < highest)
+    return on_ground
 
 
 def _likelihoods(z: NDArray[np.float64], diffused_label: int) -> tuple[Likelihood, ...]:
@@ -150,11 +162,11 @@ def _provenance(parts: NDArray[np.float64], distances: NDArray[np.float64], row:
 
 
 def _components(system: Rebuilt, result: Segmentation, row: int) -> Components:
-    diffused = result.diffused_labels[result.in_view]
+    diffused = result.diffused_labels[system.in_graph]
     members = np.flatnonzero(diffused == diffused[row])
     component = _connected(_structure(system.graph)[members][:, members])
     sizes = np.bincount(component)
-    xyz = result.points[system.in_view[members], :3].astype(np.float64)
+    xyz = result.points[system.in_graph[members], :3].astype(np.float64)
     # numbers are given in the order of the first members, and a stable sort keeps it among equals
     in_order = np.argsort(-sizes, kind="stable")
     own = component[np.searchsorted(members, row)]

@@ -136,14 +136,14 @@ class Explanation:
         diffused_label: The same after diffusion.
         names: Name of every label of the result, -1 and 0 included.
         sights: What each camera has of it.
-        edges: What its edges weigh; None out of view, as all that follows.
-        neighbors: Its nearest neighbours, the nearest first; empty out of view.
-        likelihoods: Likelihoods of all labels that have any, the highest first; empty out of view.
+        edges: What its edges weigh; None out of view, and for a cleared point, which has no part in the graph.
+        neighbors: Its nearest neighbours, the nearest first; empty outside the graph.
+        likelihoods: Likelihoods of all labels that have any, the highest first; empty outside the graph.
         provenance: Where the likelihood of the diffused label comes from.
         components: Those of its diffused label, if that is an instance.
         island: The part of the graph it lies in.
         height_m: Its height above the ground in metres; None where the parameters need no ground or none was found.
-        clearance_m: Height in metres below which points became background; 0 for none.
+        clearance_m: Height in metres below which points of the ground are cleared; 0 for none.
         confidence: How sure its label is, 0 to 1.
         abstain: Confidence below which points became background; 0 for none.
     """
@@ -167,7 +167,7 @@ class Explanation:
 
     @property
     def winner(self) -> Likelihood | None:
-        """The likelihood of the diffused label; None out of view."""
+        """The likelihood of the diffused label; None outside the graph."""
         return next((each for each in self.likelihoods if each.label == self.diffused_label), None)
 
     @property
@@ -177,10 +177,10 @@ class Explanation:
 
     @property
     def cleared(self) -> bool:
-        """True if the point kept its label in outlier removal and lost it for it is near to the ground."""
-        components, height_m = self.components, self.height_m
-        kept = components is not None and not components.removed and self.label == 0
-        return kept and height_m is not None and LOWEST_M < height_m < self.clearance_m
+        """True if the point is background for it is nearer to the ground than the clearance."""
+        if self.label != 0 or self.height_m is None:
+            return False
+        return self.clearance_m > 0 and LOWEST_M < self.height_m < self.clearance_m
 
     @property
     def verdict(self) -> str:
@@ -188,13 +188,13 @@ class Explanation:
         point = f"Point {self.point}"
         if self.label < 0:
             return f"{point} is out of view: {_why_unseen(self.sights)}."
+        if self.cleared:
+            near = f"{_height(self.height_m)}, nearer than {100 * self.clearance_m:g} cm"
+            return f"{point} is background: it is {near}."
         components = self.components
         if components is not None and components.removed:
             given = named(self, components.label)
             return f"{point} is background: diffusion gave it to {given}, but it lies in a {_where(components)}."
-        if components is not None and self.cleared:
-            near = f"{_height(self.height_m)}, nearer than {100 * self.clearance_m:g} cm"
-            return f"{point} is background: diffusion gave it to {named(self, components.label)}, but it is {near}."
         if components is not None and self.label == 0:
             doubt = f"that is right with {percent(self.confidence)} only, less than {percent(self.abstain)}"
             return f"{point} is background: diffusion gave it to {named(self, components.label)}, but {doubt}."
@@ -230,7 +230,7 @@ def _where(components: Components) -> str:
         return f"component of {count_points(own)}, as large as the one kept, which has the lowest row: removed"
     if components.part_gap == 0:
         return f"component of {count_points(own)}, the largest has {largest:,}: removed"
-    gap = f"{components.gaps_m[components.own]:.1f} m from the largest, which has {largest:,}"
+    gap = f"{components.gaps_m[components.own]:.2f} m from the largest, which has {largest:,}"
     return f"component of {count_points(own)}, {gap}: removed"
 
 

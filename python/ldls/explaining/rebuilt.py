@@ -3,8 +3,8 @@
     system = rebuild(result)
     z = stages.diffuse(system.A, system.b, iterations=result.params.iterations)
 
-Rows are those of `result.in_view`, columns of b the labels 0, 1, ... of `result`, for one camera and for a ring.
-Needs the extra `eval`.
+Rows are those of `system.in_graph`, columns of b the labels 0, 1, ... of `result`, for one camera and for a ring. Needs
+the extra `eval`.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rebuilt:
-    """The graph over the n points in view and the M + 1 labels of a segmentation.
+    """The graph over n of the v points in view and the M + 1 labels of a segmentation.
 
     Attributes:
-        in_view: (n,) int64: row in the cloud of each point of the graph.
-        heights: (n,) float64 height of each point above the ground in metres; NaN where no ground is found. None where
-            the parameters need none.
+        in_graph: (n,) int64: row in the cloud of each point of the graph: all in view but cleared ones.
+        heights: (v,) float64 height of each point of `result.in_view` above the ground in metres; NaN where no ground
+            is found. None where the parameters need none.
         depths: Depth groups of each view, of the points that it sees; None where the parameters ask for none.
         graph: (n, n) sparse: weights of the point edges, 1 to the point itself; not normalised.
         pixel_labels: Weights of the pixel edges by label, those of all cameras added up; not normalised.
@@ -41,7 +41,7 @@ class Rebuilt:
         b: (n, M + 1) sparse: the pixel edges by label, normalised together with the point edges.
     """
 
-    in_view: NDArray[np.int64]
+    in_graph: NDArray[np.int64]
     heights: NDArray[np.float64] | None
     depths: tuple[stages.DepthGroups | None, ...]
     graph: csr_array
@@ -62,25 +62,30 @@ def rebuild(result: Segmentation) -> Rebuilt:
             f"result: its graph has {result.report.n_sweeps} sweeps, of which it holds one; segment the sweep alone "
             "(ldls.segment, or ldls run without --sweeps)"
         )
-    points, params = result.points[result.in_view], result.params
-    heights = _heights(result)
+    params, heights = result.params, _heights(result)
     depths = tuple(depth_groups_of(result, seen, heights) for seen in result.views)
+    rows = _in_graph(result, heights)
+    in_graph = result.in_view[rows]
+    points = result.points[in_graph]
     indices, _ = stages.neighbors(points, params.neighbors, threads=params.threads)
     graph = stages.point_graph(
         points,
         indices,
-        heights=heights,
+        heights=None if heights is None else heights[rows],
         sigma=params.sigma,
         ground_edges=params.ground_edges,
         threads=params.threads,
     )
-    labels = _pixel_labels(result, depths)
+    labels = _pixel_labels(result, in_graph, depths)
     A, b = stages.normalize_rows(graph, labels)
-    return Rebuilt(in_view=result.in_view, heights=heights, depths=depths, graph=graph, pixel_labels=labels, A=A, b=b)
+    return Rebuilt(in_graph=in_graph, heights=heights, depths=depths, graph=graph, pixel_labels=labels, A=A, b=b)
 
 
 def refused_labels(result: Segmentation) -> NDArray[np.int32]:
-    """(N,) int32: label of the object that direct projection gives each point to and depth does not; 0 where none."""
+    """(N,) int32: label of the object that direct projection gives each point to and depth does not; 0 where none.
+
+    0 too for cleared points, whose depth does not matter.
+    """
     labels, heights = np.zeros(len(result.labels), np.int32), _heights(result)
     for seen in result.views:
         depths = depth_groups_of(result, seen, heights)
@@ -90,7 +95,15 @@ def refused_labels(result: Segmentation) -> NDArray[np.int32]:
         for mask, label in enumerate(seen.labels.tolist()):
             refused = (direct == mask + 1) & (depths.behind_m(mask) != 0)
             labels[seen.in_view[refused]] = label
+    labels[np.delete(result.in_view, _in_graph(result, heights))] = 0
     return labels
+
+
+def _in_graph(result: Segmentation, heights: NDArray[np.float64] | None) -> NDArray[np.int64]:
+    """Rows of the points in view that the graph has."""
+    if heights is None:
+        return np.arange(len(result.in_view))
+    return stages.in_graph(heights, ground_clearance=result.params.ground_clearance)
 
 
 def _heights(result: Segmentation) -> NDArray[np.float64] | None:
@@ -122,13 +135,16 @@ def depth_groups_of(
     )
 
 
-def _pixel_labels(result: Segmentation, depths: tuple[stages.DepthGroups | None, ...]) -> stages.PixelLabels:
+def _pixel_labels(
+    result: Segmentation, in_graph: NDArray[np.int64], depths: tuple[stages.DepthGroups | None, ...]
+) -> stages.PixelLabels:
     sparse = require("scipy.sparse", "eval")
-    shape = (len(result.in_view), len(result.instances) + 1)
+    shape = (len(in_graph), len(result.instances) + 1)
     weights, mass = sparse.csr_array(shape, dtype=np.float32), np.zeros(shape[0], np.float32)
     for seen, groups in zip(result.views, depths, strict=True):
-        own = _pixel_labels_of(seen, groups, result)
-        rows = np.searchsorted(result.in_view, seen.in_view)
+        slots = np.flatnonzero(np.isin(seen.in_view, in_graph))
+        own = _pixel_labels_of(seen, slots, groups, result)
+        rows = np.searchsorted(in_graph, seen.in_view[slots])
         entries = own.weights.tocoo()
         place = (rows[entries.row], np.array([0, *seen.labels])[entries.col])
         weights = weights + sparse.csr_array((entries.data, place), shape=shape)
@@ -136,13 +152,16 @@ def _pixel_labels(result: Segmentation, depths: tuple[stages.DepthGroups | None,
     return stages.PixelLabels(weights, mass)
 
 
-def _pixel_labels_of(seen: SeenView, depths: stages.DepthGroups | None, result: Segmentation) -> stages.PixelLabels:
+def _pixel_labels_of(
+    seen: SeenView, slots: NDArray[np.int64], depths: stages.DepthGroups | None, result: Segmentation
+) -> stages.PixelLabels:
+    """The pixel edges of some of the points that a view sees, at `slots` of it."""
     params = result.params
     return stages.pixel_labels(
-        seen.pixels,
+        seen.pixels[slots],
         seen.view.masks,
         window=params.window,
-        depths=depths,
+        depths=None if depths is None else depths.of_points(slots),
         pixel_weight=params.pixel_weight,
         threads=params.threads,
     )

@@ -108,7 +108,7 @@ def _window(
     uv_px, masks = seen.pixels[at : at + 1], seen.view.masks
     # edges of weight 1 count pixels
     every = stages.pixel_labels(uv_px, masks, window=result.params.window, pixel_weight=1.0)
-    own = None if depths is None else depths.of_point(at)
+    own = None if depths is None else depths.of_points([at])
     counting = stages.pixel_labels(uv_px, masks, window=result.params.window, pixel_weight=1.0, depths=own)
     counted = counting.weights.indices.tolist()
     labels = [0, *seen.labels.tolist()]

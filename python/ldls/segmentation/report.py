@@ -16,8 +16,8 @@ class Report:
         n_origin: Points at exactly (0, 0, 0), taken for missing returns; left out.
         n_behind: Points behind the camera or nearer than its smallest depth.
         n_outside: Points in front of the camera but beside the image.
-        n_duplicates: Points in view that share their place with another point in view.
-        k_effective: Neighbours that each point has: K, or one less than the points in view.
+        n_duplicates: Points of the graph that share their place with another of them.
+        k_effective: Neighbours that each point has: K, or one less than the points of the graph.
         n_refined: Points at which two labels were so near that double precision had to decide.
         sweeps: Sweeps over the graph that were computed; a series saves most of the products.
         residual: Largest change of any likelihood that one more product would make; None where the number of

@@ -8,11 +8,13 @@ use crate::memory::{collect, tabulate};
 use crate::{Cancel, Params, Result};
 
 /// Constant, and the slope of the share and of the score, for points of objects.
-const OBJECT: [f64; 3] = [-2.30, 0.23, 2.47];
+const OBJECT: [f64; 3] = [-2.15, 0.24, 2.33];
 /// Constant and the slope of the share for points that diffusion gave to the background.
-const BACKGROUND: [f64; 2] = [2.20, 0.24];
-/// The same for points that outlier removal or the ground made background: the surer diffusion was, the less sure.
-const REMOVED: [f64; 2] = [1.93, -0.20];
+const BACKGROUND: [f64; 2] = [1.45, 0.26];
+/// Share of the points that outlier removal made background that are; that of the winner says nothing of it.
+const REMOVED: f32 = 0.48;
+/// The same for points that are nearer to the ground than the clearance.
+const CLEARED: f32 = 0.999;
 /// Shares and scores beyond these say no more.
 const SHARES: [f64; 2] = [0.01, 0.999];
 const SCORES: [f64; 2] = [0.05, 0.95];
@@ -37,7 +39,7 @@ pub fn calibrated_confidence(
         let share = log_odds(share, SHARES);
         let odds = match (diffused, label) {
             (0, _) => BACKGROUND[0] + BACKGROUND[1] * share,
-            (_, 0) => REMOVED[0] + REMOVED[1] * share,
+            (_, 0) => return REMOVED,
             (_, label) => OBJECT[0] + OBJECT[1] * share + OBJECT[2] * scores[label as usize - 1],
         };
         (1.0 / (1.0 + (-odds).exp())) as f32
@@ -54,6 +56,11 @@ pub fn calibrated_confidence(
 fn log_odds(probability: f32, [low, high]: [f64; 2]) -> f64 {
     let clamped = f64::from(probability).clamp(low, high);
     (clamped / (1.0 - clamped)).ln()
+}
+
+/// The confidence of points that are nearer to the ground than the clearance.
+pub(crate) fn of_cleared(params: &Params) -> f32 {
+    if params.calibrated { CLEARED } else { 1.0 }
 }
 
 /// The confidence of each of `labels`, which is the share of the winner where the parameters ask for no more. Labels of
@@ -91,7 +98,7 @@ mod tests {
         assert!(confidence(0.9, 1, 1, 0.9) > confidence(0.6, 1, 1, 0.9));
         assert!(confidence(0.9, 1, 1, 0.9) > confidence(0.9, 1, 1, 0.6));
         assert!(confidence(0.9, 0, 0, 0.5) > confidence(0.6, 0, 0, 0.5));
-        assert!(confidence(0.9, 1, 0, 0.5) < confidence(0.6, 1, 0, 0.5));
+        assert_eq!(confidence(0.9, 1, 0, 0.5), confidence(0.6, 1, 0, 0.5));
     }
 
     #[test]

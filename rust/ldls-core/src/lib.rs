@@ -33,7 +33,7 @@ pub use depth::DepthGroups;
 pub use diffusion::{Convergence, Diffused, Products, diffuse, likelihoods};
 pub use error::Error;
 pub use graph::{PointGraph, remove_outliers};
-pub use ground::{GROUND_M, clear_ground, ground_heights, is_ground};
+pub use ground::{GROUND_M, ground_heights, is_cleared, is_ground};
 pub use masks::{InstanceMasks, PixelLabels, Rle};
 pub use neighbors::Neighbors;
 pub use params::Params;

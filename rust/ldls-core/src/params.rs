@@ -19,7 +19,7 @@ pub struct Params {
     pub remove_outliers: bool,
     /// Factor on the weight of an edge between a point of the ground and one that is not; 1 for the paper's graph.
     pub ground_edges: f64,
-    /// Points nearer to the ground than this, in metres, become background; 0 for none.
+    /// Points nearer to the ground than this, in metres, are background and have no part in the graph; 0 for none.
     pub ground_clearance: f64,
     /// Set if the ground follows kerbs and lawns, and not a smooth surface only.
     pub local_ground: bool,

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 pub struct Report {
     /// Points left out, by reason.
     pub counts: Counts,
-    /// Points in view that share their place with another one in view.
+    /// Points of the graph that share their place with another one of it.
     pub duplicates: usize,
     /// Set if every point has more than K copies, so that the graph falls into islands.
     pub only_islands: bool,

@@ -1,17 +1,19 @@
 //! The method on one screen: points, masks and cameras in, one label a point out.
 
-use crate::confidence::judge;
+use crate::confidence::{judge, of_cleared};
 use crate::diffusion::diffuse;
 use crate::graph::{PointGraph, remove_outliers_by_index};
-use crate::ground::{clear_ground, is_ground};
+use crate::ground::{is_cleared, is_ground};
 use crate::masks::PixelLabels;
-use crate::memory::{collect, filled};
+use crate::memory::{collect, filled, push};
 use crate::neighbors::{self, Adjacency, arrange};
 use crate::projection::{Cloud, Sighting};
 use crate::report::{Report, Timings, timed};
 use crate::ring::{Images, Objects, View};
 use crate::{Cancel, Error, Params, Real, Result};
+use std::iter::repeat;
 use std::mem::take;
+use std::time::Duration;
 
 /// Label of points that no image sees.
 const OUT_OF_VIEW: i32 = -1;
@@ -66,14 +68,18 @@ pub fn segment(
         Images::project(cloud, views, same_object, keep_origin, cancel)
     })?;
     let points = take(&mut in_view.points);
-    let mut depth = || timed(&mut t.depth, || images.see_depth(&points, params, cancel));
-    let search = || neighbors::search(&points, params.neighbors, cancel);
+    timed(&mut t.depth, || images.see_ground(&points, params, cancel))?;
+    let in_graph = in_graph(&images.heights, params, cancel)?;
+    let mut beside = Duration::ZERO;
+    let search = || nearest_of(&points, in_graph, params, cancel);
+    let mut depth = || timed(&mut beside, || images.see_depth(&points, params, cancel));
     let (seen, nearest) = timed(&mut t.neighbors, || match points.len() {
         // parts of each are for one thread alone
         ..=MOST_SIDE_BY_SIDE => rayon::join(depth, search),
         _ => (depth(), search()),
     });
-    t.neighbors -= t.depth;
+    t.neighbors -= beside;
+    t.depth += beside;
     drop(points);
     seen?;
     let (scene, nearest) = (&images, &nearest?);
@@ -101,17 +107,18 @@ pub fn segment(
         let place = |row: usize| cloud.xyz(in_view.indices[order[row] as usize] as usize);
         remove_outliers(&a, &diffused.labels, order, params, place, cancel)
     })?;
-    let heights = heights.iter().copied();
-    clear_ground(&mut kept, heights, params.ground_clearance);
     let confidence = judge(&mut kept, &diffused, &scene.scores(), params, cancel)?;
 
     let (sightings, objects) = images.into_parts();
-    // back to the rows of the cloud
-    let rows = arrange(order, &in_view.indices, cancel)?;
+    let rows = Rows {
+        cloud: cloud.len(),
+        in_view: &in_view.indices,
+        of_graph: arrange(order, &in_view.indices, cancel)?,
+    };
     Ok(Segmentation {
-        labels: labels_of_cloud(cloud.len(), &rows, &kept, cancel)?,
-        diffused_labels: labels_of_cloud(cloud.len(), &rows, &diffused.labels, cancel)?,
-        confidence: scatter(cloud.len(), &rows, 0.0, confidence, cancel)?,
+        labels: rows.labels(&kept, cancel)?,
+        diffused_labels: rows.labels(&diffused.labels, cancel)?,
+        confidence: rows.scatter([0.0, of_cleared(params)], confidence, cancel)?,
         report: Report::new(in_view.counts, nearest, diffused.convergence),
         in_view: in_view.indices,
         sightings,
@@ -137,6 +144,40 @@ fn check_edges(points: usize, neighbors: usize) -> Result<()> {
         limit: MAX_EDGES,
         of: "edges",
     })
+}
+
+/// The points in view that the graph has, by their heights: all but the cleared ones, or none named where that is all.
+fn in_graph(heights: &[f64], params: &Params, cancel: &Cancel) -> Result<Option<Vec<u32>>> {
+    let cleared = |height| is_cleared(height, params.ground_clearance);
+    if !heights.iter().any(|&height| cleared(height)) {
+        return Ok(None);
+    }
+    let mut in_graph = Vec::new();
+    for (point, &height) in heights.iter().enumerate() {
+        if point % POINTS_A_BLOCK == 0 {
+            cancel.check()?;
+        }
+        if !cleared(height) {
+            push(&mut in_graph, point as u32)?;
+        }
+    }
+    Ok(Some(in_graph))
+}
+
+/// The neighbours of the points of the graph among each other, in an order that names them by their place in view.
+fn nearest_of(
+    points: &[[f64; 3]],
+    in_graph: Option<Vec<u32>>,
+    params: &Params,
+    cancel: &Cancel,
+) -> Result<Adjacency> {
+    let Some(in_graph) = in_graph else {
+        return neighbors::search(points, params.neighbors, cancel);
+    };
+    let own = arrange(&in_graph, points, cancel)?;
+    let mut nearest = neighbors::search(&own, params.neighbors, cancel)?;
+    nearest.order = arrange(&nearest.order, &in_graph, cancel)?;
+    Ok(nearest)
 }
 
 /// A and b of the method: the weights of point edges and of pixel edges, in rows that sum to 1 together.
@@ -171,20 +212,43 @@ fn remove_outliers(
     remove_outliers_by_index(a, labels, order, params.part_gap, place, cancel)
 }
 
-fn labels_of_cloud(n: usize, rows: &[u32], labels: &[u32], cancel: &Cancel) -> Result<Vec<i32>> {
-    let signed = labels.iter().map(|&label| label as i32);
-    scatter(n, rows, OUT_OF_VIEW, signed, cancel)
+/// Where in the cloud the points of a result lie.
+struct Rows<'a> {
+    /// Number of points of the cloud.
+    cloud: usize,
+    in_view: &'a [u32],
+    /// Those that the graph has, in the order of the values to lay out; the others in view are cleared.
+    of_graph: Vec<u32>,
 }
 
-/// `values` laid out over a cloud of `n` points, each in its row.
-fn scatter<T: Copy + Send + Sync>(
-    n: usize,
+impl Rows<'_> {
+    fn labels(&self, labels: &[u32], cancel: &Cancel) -> Result<Vec<i32>> {
+        let signed = labels.iter().map(|&label| label as i32);
+        self.scatter([OUT_OF_VIEW, 0], signed, cancel)
+    }
+
+    /// `values` laid out over the cloud, each in its row, and what stands elsewhere: out of view, and at cleared points.
+    fn scatter<T: Copy + Send + Sync>(
+        &self,
+        [out_of_view, cleared]: [T; 2],
+        values: impl IntoIterator<Item = T>,
+        cancel: &Cancel,
+    ) -> Result<Vec<T>> {
+        let mut all = filled(out_of_view, self.cloud, cancel)?;
+        if self.of_graph.len() < self.in_view.len() {
+            put(&mut all, self.in_view, repeat(cleared), cancel)?;
+        }
+        put(&mut all, &self.of_graph, values, cancel)?;
+        Ok(all)
+    }
+}
+
+fn put<T>(
+    all: &mut [T],
     rows: &[u32],
-    elsewhere: T,
     values: impl IntoIterator<Item = T>,
     cancel: &Cancel,
-) -> Result<Vec<T>> {
-    let mut all = filled(elsewhere, n, cancel)?;
+) -> Result<()> {
     let mut values = values.into_iter();
     for rows in rows.chunks(POINTS_A_BLOCK) {
         cancel.check()?;
@@ -192,7 +256,7 @@ fn scatter<T: Copy + Send + Sync>(
             all[row as usize] = value;
         }
     }
-    Ok(all)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ mod _ldls {
     use crate::segment::{SegmentationArrays, check_params, segment};
     #[pymodule_export]
     use crate::stages::{
-        clear_ground, confidence, depth_groups, diffuse, direct_labels, ground, neighbors,
+        confidence, depth_groups, diffuse, direct_labels, ground, in_graph, neighbors,
         normalize_rows, pixel_labels, point_graph, project, remove_outliers,
     };
 

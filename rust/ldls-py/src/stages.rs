@@ -68,6 +68,24 @@ pub fn ground(
     Ok(heights.into_pyarray(py).unbind())
 }
 
+/// Rows of the points that the graph has, by their heights.
+#[pyfunction]
+pub fn in_graph(
+    py: Python<'_>,
+    heights: PyReadonlyArray1<'_, f64>,
+    clearance: f64,
+) -> PyResult<Py<PyArray1<i64>>> {
+    let heights = slice(py, "heights", &heights)?;
+    let rows = (0..)
+        .zip(heights)
+        .filter(|(_, height)| !ldls_core::is_cleared(**height, clearance));
+    Ok(rows
+        .map(|(row, _)| row)
+        .collect::<Vec<i64>>()
+        .into_pyarray(py)
+        .unbind())
+}
+
 /// Distances of the objects of the masks, those of the points, and which points the masks are not sure of.
 #[pyfunction]
 pub fn depth_groups(
@@ -259,20 +277,6 @@ pub fn remove_outliers(
         ldls_core::remove_outliers(&graph, labels, part_gap, |row| points[row], cancel)
     })?;
     signed(py, &kept)
-}
-
-/// Labels with points nearer to the ground than `clearance` turned into background.
-#[pyfunction]
-pub fn clear_ground(
-    py: Python<'_>,
-    labels: PyReadonlyArray1<'_, u32>,
-    heights: PyReadonlyArray1<'_, f64>,
-    clearance: f64,
-) -> PyResult<Py<PyArray1<i32>>> {
-    let mut cleared = copied(py, slice(py, "labels", &labels)?)?;
-    let heights = slice(py, "heights", &heights)?;
-    ldls_core::clear_ground(&mut cleared, heights.iter().copied(), clearance);
-    signed(py, &cleared)
 }
 
 /// Confidence of labels from the likelihoods' shares.

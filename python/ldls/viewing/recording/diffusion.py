@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import ldls.stages as stages
 from ldls._optional import require
 from ldls.errors import ParameterError
-from ldls.explaining import rebuild
+from ldls.explaining import Rebuilt, rebuild
 from ldls.palette import BACKGROUND, label_colours
 from ldls.segmentation import Segmentation
 from ldls.viewing.recording.contexts import Names, fields_of_points
@@ -35,18 +35,18 @@ def log_diffusion(root: Entity, names: Names, result: Segmentation, every: int) 
     names.log(root, names.of_points)
     points, stream = root / "points", root.stream.rerun
     stream.set_time(TIMELINE, sequence=0)
-    log_points(points, result.points[result.in_view])
-    for iteration, z in _steps(result, every):
+    system = rebuild(result)
+    log_points(points, result.points[system.in_graph])
+    for iteration, z in _steps(system, result, every):
         stream.set_time(TIMELINE, sequence=iteration)
         fields = fields_of_points(result, z.argmax(axis=1).astype(np.int32))
         points.log(rr.Points3D.from_fields(**fields | {"colors": _blended(z, label_colours(result.instances))}))
     stream.disable_timeline(TIMELINE)
 
 
-def _steps(result: Segmentation, every: int) -> Iterator[tuple[int, NDArray[np.float32]]]:
+def _steps(system: Rebuilt, result: Segmentation, every: int) -> Iterator[tuple[int, NDArray[np.float32]]]:
     """Number of products and the likelihoods (n, M + 1) after them: 0, `every`, 2 `every`, ..., and the last."""
-    yield 0, np.zeros((len(result.in_view), len(result.instances) + 1), np.float32)
-    system = rebuild(result)
+    yield 0, np.zeros(system.b.shape, np.float32)
     iterations = result.params.iterations or OF_CONVERGED
     each = stages.diffuse(system.A, system.b, iterations=iterations, every=every, threads=result.params.threads)
     yield from zip([*range(every, iterations, every), iterations], each, strict=True)

@@ -42,16 +42,9 @@ pub fn is_ground(height: f64) -> bool {
     GROUND_M[0] < height && height < GROUND_M[1]
 }
 
-/// Turns labels of points nearer to the ground than `clearance`, in metres, into background; at 0 none.
-pub fn clear_ground(labels: &mut [u32], heights: impl IntoIterator<Item = f64>, clearance: f64) {
-    if clearance <= 0.0 {
-        return;
-    }
-    let low = |height: f64| GROUND_M[0] < height && height < clearance;
-    let labelled = labels.iter_mut().zip(heights);
-    labelled
-        .filter(|(_, height)| low(*height))
-        .for_each(|(label, _)| *label = 0);
+/// True for a point of the ground that lies lower above it than `clearance`, both in metres; at 0 for none.
+pub fn is_cleared(height: f64, clearance: f64) -> bool {
+    clearance > 0.0 && GROUND_M[0] < height && height < clearance
 }
 
 #[cfg(test)]
@@ -140,10 +133,10 @@ mod tests {
     fn pits_are_not_ground() {
         assert!(is_ground(0.1) && is_ground(-0.2));
         assert!(!is_ground(0.2) && !is_ground(-0.4) && !is_ground(f64::NAN));
-        let mut labels = [1, 2, 3, 4];
-        clear_ground(&mut labels, [0.01, 0.05, -1.0, f64::NAN], 0.04);
-        assert_eq!(labels, [0, 2, 3, 4]);
-        clear_ground(&mut labels, [-0.1; 4], 0.0);
-        assert_eq!(labels, [0, 2, 3, 4]);
+        let cleared = |clearance| {
+            [0.01, 0.05, -1.0, -0.1, f64::NAN].map(|height| is_cleared(height, clearance))
+        };
+        assert_eq!(cleared(0.04), [true, false, false, true, false]);
+        assert_eq!(cleared(0.0), [false; 5]);
     }
 }

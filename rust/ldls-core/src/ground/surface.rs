@@ -3,6 +3,7 @@
 
 use crate::memory::tabulate;
 use crate::{Cancel, Result};
+use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
 /// Degree of the surface in x and y, and how many terms that is.
@@ -43,6 +44,7 @@ const ABOVE_COUNTS: f64 = 2.5;
 const RIDGE: [f64; DEGREE + 1] = [0.0, 1e-5, 1e-4, 5e-4, 1e-3, 2e-3];
 
 type Terms = SVector<f64, TERMS>;
+type Normal = SMatrix<f64, TERMS, TERMS>;
 /// The lowest place of a cell and its terms.
 type Cell = ([f64; 3], Terms);
 
@@ -70,8 +72,8 @@ impl Surface {
             .collect();
         let mut surface = Self::weighted(&cells, 1, |_| 1.0)?;
         for _ in 0..FIRST_ROUNDS {
-            surface = Self::weighted(&cells, 1, |place| {
-                if surface.height(place) > 0.0 {
+            surface = Self::weighted(&cells, 1, |cell| {
+                if surface.height_of(cell) > 0.0 {
                     ABOVE
                 } else {
                     1.0 - ABOVE
@@ -79,8 +81,8 @@ impl Surface {
             })?;
         }
         for (degree, scale) in ROUNDS {
-            surface = Self::weighted(&cells, degree, |place| {
-                let height = surface.height(place);
+            surface = Self::weighted(&cells, degree, |cell| {
+                let height = surface.height_of(cell);
                 let counts = if height > 0.0 { ABOVE_COUNTS } else { 1.0 };
                 let relative = counts * height / scale;
                 (1.0 + relative * relative).powi(-2)
@@ -88,7 +90,7 @@ impl Surface {
         }
         let on_it = cells
             .iter()
-            .filter(|(place, _)| surface.height(place).abs() < ON_SURFACE_M);
+            .filter(|cell| surface.height_of(cell).abs() < ON_SURFACE_M);
         let below = surface.height(&[0.0; 3]) > 0.0;
         (below && on_it.count() >= LEAST_CELLS).then_some(surface)
     }
@@ -108,11 +110,15 @@ impl Surface {
         place[2] - z
     }
 
+    /// Height of a cell above the surface, in metres.
+    fn height_of(&self, (place, terms): &Cell) -> f64 {
+        place[2] - self.coefficients.dot(terms)
+    }
+
     /// The surface of a degree with the least sum of weighted squares.
-    fn weighted(cells: &[Cell], degree: usize, weight: impl Fn(&[f64; 3]) -> f64) -> Option<Self> {
+    fn weighted(cells: &[Cell], degree: usize, weight: impl Fn(&Cell) -> f64) -> Option<Self> {
         let terms = terms(degree);
-        let mut normal = SMatrix::<f64, TERMS, TERMS>::identity();
-        let mut right = Terms::zeros();
+        let (mut normal, mut right) = (Normal::identity(), Terms::zeros());
         let ridges = RIDGE
             .iter()
             .enumerate()
@@ -120,23 +126,29 @@ impl Surface {
         for (term, ridge) in ridges.take(terms).enumerate() {
             normal[(term, term)] = ridge * cells.len() as f64;
         }
-        for (place, values) in cells {
-            let weight = weight(place);
-            for across in 0..terms {
-                let weighted = weight * values[across];
-                right[across] += weighted * place[2];
-                // the decomposition reads the lower half only
-                let below = across * (TERMS + 1)..across * TERMS + terms;
-                let sums = normal.as_mut_slice()[below].iter_mut();
-                sums.zip(&values.as_slice()[across..terms])
-                    .for_each(|(sum, value)| *sum += weighted * value);
-            }
-        }
+        let weights: Vec<f64> = cells.iter().map(weight).collect();
+        add_up(cells, &weights, terms, &mut normal, &mut right);
         let coefficients = normal.cholesky()?.solve(&right);
         let finite = coefficients
             .iter()
             .all(|coefficient| coefficient.is_finite());
         finite.then_some(Self { coefficients })
+    }
+}
+
+/// Adds the first `terms` of weighted cells to the normal equations: to the lower half of `normal`, which is all that is
+/// read of it.
+#[multiversion(targets("x86_64+avx2"))]
+fn add_up(cells: &[Cell], weights: &[f64], terms: usize, normal: &mut Normal, right: &mut Terms) {
+    for ((place, values), weight) in cells.iter().zip(weights) {
+        for across in 0..terms {
+            let weighted = weight * values[across];
+            right[across] += weighted * place[2];
+            let below = across * (TERMS + 1)..across * TERMS + terms;
+            let sums = normal.as_mut_slice()[below].iter_mut();
+            sums.zip(&values.as_slice()[across..terms])
+                .for_each(|(sum, value)| *sum += weighted * value);
+        }
     }
 }
 

@@ -97,18 +97,26 @@ impl<'a> Images<'a> {
         (self.seen.unwrap_or(self.sightings), self.objects)
     }
 
-    /// Finds the ground below `points` in view, by the first camera, and the object of each mask by depth, where the
-    /// parameters ask for them.
+    /// Finds the ground below `points` in view, by the first camera, where the parameters ask for it.
+    pub(crate) fn see_ground(
+        &mut self,
+        points: &[[f64; 3]],
+        params: &Params,
+        cancel: &Cancel,
+    ) -> Result<()> {
+        if let Some(first) = self.views.first().filter(|_| params.need_ground()) {
+            self.heights = ground_heights(points, first.camera, params.local_ground, cancel)?;
+        }
+        Ok(())
+    }
+
+    /// Finds the object of each mask among `points` in view by depth, where the parameters ask for it.
     pub(crate) fn see_depth(
         &mut self,
         points: &[[f64; 3]],
         params: &Params,
         cancel: &Cancel,
     ) -> Result<()> {
-        let Some(first) = self.views.first().filter(|_| params.need_ground()) else {
-            return Ok(());
-        };
-        self.heights = ground_heights(points, first.camera, params.local_ground, cancel)?;
         if !params.need_depth() {
             return Ok(());
         }
