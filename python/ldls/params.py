@@ -25,7 +25,7 @@ class Params:
             ground, which takes about 1 ms for 20,000 points in view.
         ground_clearance: Points nearer to the ground than this, in metres, are background and have no part in the
             graph: what touches the ground cannot be told from it, and labels would run along it; 0 to 1, 0 for none
-            of it. Saves the time of those points: a third to a half of those of 64 beams.
+            of it. Saves the time of those points, a third to two thirds of all in view.
         local_ground: Whether the ground follows kerbs and lawns where enough of it is seen, and not a smooth surface
             only. Costs about as much again as the surface.
         depth_gap: Gap in metres between the object of a mask and what is seen before and behind it: of the mask's
