@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import ldls._ldls as _ldls
 from ldls.checks import numbers
+from ldls.cloud import Points, as_points
 from ldls.errors import CalibrationError, LdlsError
 
 Matrix = NDArray[np.float64]
@@ -66,6 +70,22 @@ def from_parts(rotation: Matrix, translation: Matrix | None = None) -> Matrix:
 def inverse(matrix: Matrix) -> Matrix:
     """The transform back."""
     return from_parts(matrix[:3, :3].T, -matrix[:3, :3].T @ matrix[:3, 3])
+
+
+def transformed(points: Points, matrix: Matrix) -> Matrix:
+    """(N, 3) float64: x, y and z of `points` (N, >= 3), float32 or float64, after a transform."""
+    return brought_together([points], [matrix], keep_origin=True)
+
+
+def brought_together(clouds: Sequence[Points], matrices: Sequence[Matrix], *, keep_origin: bool) -> Matrix:
+    """(N, 3) float64: the points of all clouds, one cloud after the other, each after its transform.
+
+    Points at exactly (0, 0, 0) are missing returns and stay there, unless `keep_origin` is set. The core does it: after
+    a product of matrices the threads of NumPy wait for more, for some 20 ms, on the cores that labels need next, and
+    its last digits are the processor's.
+    """
+    each = [as_points(points) for points in clouds]
+    return _ldls.transformed(each, [matrix.tolist() for matrix in matrices], keep_origin)
 
 
 def from_quaternion(place: str, wxyz: Matrix) -> Matrix:

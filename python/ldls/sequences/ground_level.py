@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import from_parts, from_quaternion
+from ldls.camera.rigid import from_parts, from_quaternion, transformed
 from ldls.sequences.grid import cell_keys
 
 CELL_M = 1.0
@@ -66,7 +66,7 @@ def levelled(
 
 def _cell_means(low: Points, pose: NDArray[np.float64]) -> tuple[NDArray[np.int64], Points]:
     """The cells of the world in which points lie, ascending, and the mean of those in each."""
-    world = low @ pose[:3, :3].T + pose[:3, 3]
+    world = transformed(low, pose)
     keys, cells, counts = np.unique(cell_keys(world[:, :2], CELL_M), return_inverse=True, return_counts=True)
     return keys, np.stack([np.bincount(cells, axis) / counts for axis in world.T], axis=1)
 

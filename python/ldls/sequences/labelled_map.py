@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.camera.rigid import from_parts, transformed
 from ldls.checks import checked
 from ldls.errors import InputError, LimitError, ParameterError, ShapeError
 from ldls.segmentation import Segmentation
@@ -147,7 +148,7 @@ class LabelledMap:
         labels = result.labels[rows]
         _check_tracked(result, labels)
         origin = _origin(sweep.pose, self.voxel_m) if self._origin is None else self._origin
-        xyz = sweep.points[rows, :3].astype(np.float64) @ sweep.pose[:3, :3].T + (sweep.pose[:3, 3] - origin)
+        xyz = transformed(sweep.points[rows], from_parts(sweep.pose[:3, :3], sweep.pose[:3, 3] - origin))
         keys = cell_keys(xyz, self.voxel_m)
         objects = self._objects(result)[labels]
         ones = np.ones_like(keys)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls._optional import require
-from ldls.camera.rigid import inverse
+from ldls.camera.rigid import inverse, transformed
 from ldls.checks import checked, shown
 from ldls.cloud import Points, as_points, finite_rows
 from ldls.errors import InputError, PoseError, within
@@ -121,7 +121,7 @@ class _Way:
         return Trajectory(np.array([stamp - period_s, stamp]), np.array([back, np.eye(4)]))
 
     def _check_common(self, stamp: float, standing: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
-        places = np.unique(cell_keys(standing @ pose[:3, :3].T + pose[:3, 3], PLACE_M))
+        places = np.unique(cell_keys(transformed(standing, pose), PLACE_M))
         common = len(np.intersect1d(places, self._places, assume_unique=True))
         if self.stamps and common < LEAST_SHARE * min(len(places), len(self._places)):
             raise PoseError(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls._optional import require
+from ldls.camera.rigid import transformed
 from ldls.segmentation import Segmentation
 from ldls.sequences.sweeps import Sweep
 from ldls.sequences.track import Floats, Track
@@ -59,7 +60,7 @@ class Moment:
     @classmethod
     def of(cls, sweep: Sweep, result: Segmentation, numbers: Mapping[int, int]) -> Self:
         """The moment of a sweep whose labels stand for objects of these `numbers`."""
-        xyz = result.points[result.in_view, :3].astype(np.float64) @ sweep.pose[:3, :3].T + sweep.pose[:3, 3]
+        xyz = transformed(result.points[result.in_view], sweep.pose)
         order = np.argsort(xyz[:, 0], kind="stable")
         rows = result.in_view[order]
         of_label = np.zeros(len(result.instances) + 1, np.int64)

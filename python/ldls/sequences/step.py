@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import from_parts, from_quaternion, to_quaternion
+from ldls.camera.rigid import from_parts, from_quaternion, to_quaternion, transformed
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Step:
         x, y, z = self.axis
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         turn = self.pose[:3, :3]
-        moved: Floats = xyz @ turn.T + (self.pose[:3, 3] + shares[:, None] * self.shift)
-        moved += np.sin(angles) * (xyz @ (turn @ cross).T)
-        moved += (1 - np.cos(angles)) * (xyz @ (turn @ cross @ cross).T)
+        moved = transformed(xyz, self.pose) + shares[:, None] * self.shift
+        moved += np.sin(angles) * transformed(xyz, from_parts(turn @ cross))
+        moved += (1 - np.cos(angles)) * transformed(xyz, from_parts(turn @ cross @ cross))
         return moved

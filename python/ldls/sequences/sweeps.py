@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import as_transform, inverse, rigid
+from ldls.camera.rigid import as_transform, brought_together, inverse, rigid
 from ldls.checks import checked
 from ldls.cloud import Points, as_points
 from ldls.errors import InputError
@@ -100,8 +100,7 @@ def segment_sweeps(
     params = params or Params()
     here = inverse(sweeps[len(sweeps) // 2].pose)
     to_here = [here @ sweep.pose for sweep in sweeps]
-    clouds = [_moved(sweep.points, transform, keep_origin) for sweep, transform in zip(sweeps, to_here, strict=True)]
-    rows = list(pairwise(np.cumsum([0, *map(len, clouds)]).tolist()))
+    rows = list(pairwise(np.cumsum([0, *(len(sweep.points) for sweep in sweeps)]).tolist()))
     views = [
         replace(view, camera=replace(view.camera, T_camera_lidar=view.camera.T_camera_lidar @ inverse(transform)))
         for sweep, transform in zip(sweeps, to_here, strict=True)
@@ -109,7 +108,7 @@ def segment_sweeps(
     ]
     neighbors = round(params.neighbors * max(1.0, SHARE_OF_NEIGHBORS * len(sweeps)))
     arrays = diffuse_labels(
-        np.concatenate(clouds),
+        brought_together([sweep.points for sweep in sweeps], to_here, keep_origin=keep_origin),
         views,
         [own for sweep, own in zip(sweeps, rows, strict=True) for _ in sweep.views] if len(sweeps) > 1 else None,
         replace(params, neighbors=neighbors),
@@ -125,13 +124,3 @@ def segment_sweeps(
         seen = tuple(replace(seen, view=view) for seen, view in given)
         results.append(replace(result, views=seen, report=replace(result.report, n_sweeps=len(sweeps))))
     return tuple(results)
-
-
-def _moved(points: Points, transform: NDArray[np.float64], keep_origin: bool) -> NDArray[np.float64]:
-    xyz = points[:, :3].astype(np.float64)
-    with np.errstate(invalid="ignore"):  # of infinite coordinates
-        moved: NDArray[np.float64] = xyz @ transform[:3, :3].T + transform[:3, 3]
-    if not keep_origin:
-        # missing returns stay what they are
-        moved[(xyz == 0).all(axis=1)] = 0
-    return moved

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,17 +25,49 @@ standing object moves too, but its points stay where they are."""
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """The points of an object from above.
+
+    Attributes:
+        points: (n, 2) x y in the world, in metres.
+    """
+
+    points: Floats
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """Least x and y, and largest, in metres."""
+        (left, below), (right, above) = self.points.min(axis=0).tolist(), self.points.max(axis=0).tolist()
+        return left, below, right, above
+
+    @cached_property
+    def middle(self) -> Floats:
+        """(2,) median x and y, in metres."""
+        return np.median(self.points, axis=0)
+
+    @cached_property
+    def length(self) -> float:
+        """Diagonal of the box, in metres."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    def gap(self, other: Footprint) -> float:
+        """How far apart the boxes are along one axis at least, in metres; below 0 where they overlap."""
+        (left, below, right, above), (left_of, below_of, right_of, above_of) = self.box, other.box
+        return max(left - right_of, left_of - right, below - above_of, below_of - above)
+
+
 class Sighting(NamedTuple):
-    """The points of an object at a moment.
+    """An object at a moment.
 
     Attributes:
         stamp: When, in seconds.
-        points: (n, 2) x y in the world, in metres.
+        footprint: Where.
         shown: Whether an image has a mask of it.
     """
 
     stamp: float
-    points: Floats
+    footprint: Footprint
     shown: bool
 
 
@@ -74,9 +107,10 @@ class Track:
         x, y = self.velocity.tolist()
         return replace(instance, track=self.number, velocity=(x, y))
 
-    def at(self, stamp: float) -> Floats:
-        """(n, 2) where the points of all its sightings are at a moment, in metres."""
-        return np.concatenate([points + self.velocity * (stamp - then) for then, points, _ in self.sightings])
+    def at(self, stamp: float) -> Footprint:
+        """Where the points of all its sightings are at a moment."""
+        moved = [own.points + self.velocity * (stamp - then) for then, own, _ in self.sightings]
+        return Footprint(np.concatenate(moved))
 
 
 def _velocity(sightings: Sequence[Sighting]) -> Floats:
@@ -86,10 +120,11 @@ def _velocity(sightings: Sequence[Sighting]) -> Floats:
     spread = float(since @ since)
     if spread == 0:
         return np.zeros(2)
-    slope: Floats = since @ np.array([np.median(each.points, axis=0) for each in sightings]) / spread
+    slope: Floats = since @ np.array([each.footprint.middle for each in sightings]) / spread
     first, last = sightings[0], sightings[-1]
     way = slope * (last.stamp - first.stamp)
-    moves = _apart(first.points + way, last.points) < MOVES * _apart(first.points, last.points)
+    begin, end = first.footprint.points, last.footprint.points
+    moves = _apart(begin + way, end) < MOVES * _apart(begin, end)
     return slope if moves and SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
 
 

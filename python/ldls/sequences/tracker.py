@@ -23,7 +23,7 @@ from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, Ints, Moment, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import Floats, Sighting, Track
+from ldls.sequences.track import Footprint, Sighting, Track
 
 LONGEST_GAP_S = 5.0
 """Time without a point after which a track ends."""
@@ -128,13 +128,13 @@ class Tracker:
             for i, label in enumerate(labels):
                 first = sightings[label][0]
                 if instances[label].category == track.instance.category:
-                    costs[i, j] = self._apart(first.points, at(first.stamp))
+                    costs[i, j] = self._apart(first.footprint, at(first.stamp))
         # what cannot be is dearer than all that can be together
         dearest = NEAR_M * (len(labels) + 1)
         rows, columns = self._assign(np.where(np.isfinite(costs), costs, dearest))
         pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
-        lengths = [_length(sightings[label][0].points) for label in labels]
-        of_tracks = [_length(track.sightings[-1].points) for track in self._tracks]
+        lengths = [sightings[label][0].footprint.length for label in labels]
+        of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
         same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
         known = {labels[i]: track for i, track in self._joined(pairs, same).items()}
         return {label: known.get(label) or self._begin(instances[label]) for label in labels}
@@ -168,25 +168,19 @@ class Tracker:
         self._tracks.append(Track(self._count, instance))
         return self._tracks[-1]
 
-    def _apart(self, one: Floats, other: Floats) -> float:
+    def _apart(self, one: Footprint, other: Footprint) -> float:
         """How far apart objects are in metres, infinite beyond `NEAR_M`.
 
         It is the mean of two distances: of the points of the smaller to the nearest of the other, and of the middles.
         """
-        gap = np.maximum(one.min(axis=0) - other.max(axis=0), other.min(axis=0) - one.max(axis=0)).max()
-        if gap > NEAR_M:
+        if one.gap(other) > NEAR_M:
             return float("inf")
-        few, many = sorted((one, other), key=len)
+        few, many = sorted((one.points, other.points), key=len)
         distances, _ = self._tree(many).query(few)
         if distances.min() > NEAR_M:
             return float("inf")
-        middle = np.linalg.norm(np.median(one, axis=0) - np.median(other, axis=0))
+        middle = np.linalg.norm(one.middle - other.middle)
         return float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
-
-
-def _length(points: Floats) -> float:
-    """Diagonal of the box around points, in metres."""
-    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Mapping[int, int]) -> Segmentation:
@@ -211,5 +205,6 @@ def _sightings(sweeps: Sequence[Sweep], results: Sequence[Segmentation]) -> dict
             some = rows[:: -(-len(rows) // MOST_POINTS)]
             xyz = result.points[some, :3].astype(np.float64)
             xy = xyz @ sweep.pose[:2, :3].T + sweep.pose[:2, 3]
-            sightings[label].append(Sighting(sweep.stamp, xy, shown=bool(result.instances[label - 1].sources)))
+            shown = bool(result.instances[label - 1].sources)
+            sightings[label].append(Sighting(sweep.stamp, Footprint(xy), shown))
     return sightings

@@ -2,8 +2,8 @@
 
 use crate::street::{HEIGHT, Street, WIDTH};
 use ldls_core::{
-    Cancel, DepthGroups, Diffused, InView, Neighbors, Params, PixelLabels, PointGraph, Real,
-    Segmentation, diffuse, ground_heights, is_ground, project, remove_outliers, segment,
+    Cancel, DepthGroups, Diffused, InView, LabelImage, Neighbors, Params, PixelLabels, PointGraph,
+    Real, Segmentation, diffuse, ground_heights, is_ground, project, remove_outliers, segment,
 };
 use std::hint::black_box;
 
@@ -92,7 +92,8 @@ fn depth_groups(street: &Street, in_view: &InView, heights: &[f64]) -> DepthGrou
 
 fn pixel_labels<T: Real>(street: &Street, in_view: &InView) -> PixelLabels<T> {
     let (uv, window, weight) = (&in_view.sightings[0].uv, PAPER.window, PAPER.pixel_weight);
-    let labels = (street.masks).pixel_labels(uv, window, weight, |_, _| true, Cancel::never());
+    let image = LabelImage::paint(&street.masks, Cancel::never()).expect("an image");
+    let labels = image.pixel_labels(uv, window, weight, |_, _| true, Cancel::never());
     labels.expect("labels")
 }
 

@@ -51,10 +51,10 @@ pub struct Timings {
     pub components: Duration,
 }
 
-/// Runs `step` and stores its time in `time`.
+/// Runs `step` and adds its time to `time`.
 pub(crate) fn timed<T>(time: &mut Duration, step: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let outcome = step();
-    *time = start.elapsed();
+    *time += start.elapsed();
     outcome
 }

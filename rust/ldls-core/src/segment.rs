@@ -4,13 +4,14 @@ use crate::confidence::{judge, of_cleared};
 use crate::diffusion::diffuse;
 use crate::graph::{PointGraph, remove_outliers_by_index};
 use crate::ground::{is_cleared, is_ground};
-use crate::masks::PixelLabels;
+use crate::masks::{LabelImage, PixelLabels};
 use crate::memory::{collect, filled, push};
 use crate::neighbors::{self, Adjacency, arrange};
 use crate::projection::{Cloud, Sighting};
 use crate::report::{Report, Timings, timed};
 use crate::ring::{Images, Objects, View};
 use crate::{Cancel, Error, Params, Real, Result};
+use rayon::prelude::*;
 use std::iter::repeat;
 use std::mem::take;
 use std::time::Duration;
@@ -64,8 +65,11 @@ pub fn segment(
 ) -> Result<Segmentation> {
     check(cloud, views, params)?;
     let mut t = Timings::default();
+    let paint = |view: &View| LabelImage::paint(view.masks, cancel);
+    let paint = || views.par_iter().map(paint).collect::<Result<_>>();
+    let painted = timed(&mut t.pixel_labels, paint)?;
     let (mut in_view, mut images) = timed(&mut t.project, || {
-        Images::project(cloud, views, same_object, keep_origin, cancel)
+        Images::project(cloud, views, painted, same_object, keep_origin, cancel)
     })?;
     let points = take(&mut in_view.points);
     timed(&mut t.depth, || images.see_ground(&points, params, cancel))?;

@@ -16,6 +16,7 @@ mod masks;
 mod products;
 mod segment;
 mod stages;
+mod transformed;
 
 /// Core of `ldls`; private, use `ldls`.
 #[pyo3::pymodule]
@@ -37,6 +38,8 @@ mod _ldls {
         confidence, depth_groups, diffuse, direct_labels, ground, in_graph, neighbors,
         normalize_rows, pixel_labels, point_graph, project, remove_outliers,
     };
+    #[pymodule_export]
+    use crate::transformed::transformed;
 
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {

@@ -8,7 +8,7 @@ use crate::call::run;
 use crate::camera::Camera;
 use crate::masks::Masks;
 use crate::segment::ParamsAttributes;
-use ldls_core::{DepthGroups, PointGraph, memory};
+use ldls_core::{DepthGroups, LabelImage, PointGraph, memory};
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
@@ -199,9 +199,8 @@ pub fn pixel_labels(
             .is_none_or(|depths| depths.admits(at, label))
     };
     let labels = run(py, threads, |cancel| {
-        masks
-            .0
-            .pixel_labels(&pixels, window, pixel_weight, admitted, cancel)
+        let image = LabelImage::paint(&masks.0, cancel)?;
+        image.pixel_labels(&pixels, window, pixel_weight, admitted, cancel)
     })?;
     label_arrays(py, labels)
 }
@@ -214,7 +213,9 @@ pub fn direct_labels(
     masks: &Masks,
 ) -> PyResult<Py<PyArray1<i32>>> {
     let pixels = rows::<2>(py, "pixels", &pixels)?;
-    let labels = run(py, None, |cancel| masks.0.direct_labels(&pixels, cancel))?;
+    let labels = run(py, None, |cancel| {
+        LabelImage::paint(&masks.0, cancel)?.direct_labels(&pixels, cancel)
+    })?;
     signed(py, &labels)
 }
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
+from ldls.camera.rigid import transformed
 from ldls.cloud import as_points
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
 from ldls.io.files import read_lines, whole_file
@@ -155,12 +156,8 @@ def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Ca
 
 def in_camera_frame(points: ArrayLike, camera: Camera) -> NDArray[np.float64]:
     """(N, 3) `points` of the lidar frame in the rectified camera frame, in metres: x right, y down, z forward."""
-    xyz = np.asarray(points)[:, :3].astype(np.float64)
-    transform = camera.T_camera_lidar
     # infinite coordinates become NaN, which lies in no box
-    with np.errstate(invalid="ignore"):
-        placed: NDArray[np.float64] = xyz @ transform[:3, :3].T + transform[:3, 3]
-    return placed
+    return transformed(np.asarray(points), camera.T_camera_lidar)
 
 
 def write(path: Path, result: Segmentation) -> None:

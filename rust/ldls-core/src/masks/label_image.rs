@@ -9,10 +9,11 @@ use std::collections::HashMap;
 
 /// The labels of every pixel, column by column. Pixels hold the number of a set of labels: a set for each combination
 /// of masks that occurs, so that one image is enough whatever overlaps.
-pub(crate) struct LabelImage {
-    height: usize,
-    width: usize,
-    pub(crate) pixels: Vec<u32>,
+#[derive(Debug)]
+pub struct LabelImage {
+    pub(crate) height: usize,
+    pub(crate) width: usize,
+    pixels: Vec<u32>,
     /// Set 0 is empty: the background.
     sets: Vec<LabelSet>,
 }
@@ -36,7 +37,11 @@ pub(crate) struct WindowCounts {
 }
 
 impl LabelImage {
-    pub(crate) fn paint(masks: &InstanceMasks, cancel: &Cancel) -> Result<Self> {
+    /// Paints masks of which none hides another.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+    pub fn paint(masks: &InstanceMasks, cancel: &Cancel) -> Result<Self> {
         let mut image = Self {
             height: masks.height(),
             width: masks.width(),
@@ -71,6 +76,7 @@ impl LabelImage {
         }
     }
 
+    /// Number of the set of labels of a pixel of the image.
     pub(crate) fn set_at(&self, [column, row]: [usize; 2]) -> u32 {
         self.pixels[column * self.height + row]
     }

@@ -9,5 +9,6 @@ mod polygon;
 mod rle;
 
 pub use instance_masks::InstanceMasks;
+pub use label_image::LabelImage;
 pub use pixel_labels::PixelLabels;
 pub use rle::Rle;

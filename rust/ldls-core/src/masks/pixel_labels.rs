@@ -1,6 +1,5 @@
 //! The weights b that the pixels around points give them (method, steps 2 and 4).
 
-use super::instance_masks::InstanceMasks;
 use super::label_image::{LabelImage, WindowCounts};
 use crate::memory::with_room;
 use crate::projection::nearest_pixel;
@@ -24,7 +23,7 @@ pub struct PixelLabels<T = f32> {
     pub mass: Vec<T>,
 }
 
-impl InstanceMasks {
+impl LabelImage {
     /// The pixel edges of points that fall on the pixels `uv`: each point is joined to the pixels of the `window` x
     /// `window` square centred on its nearest pixel that lie in the image, each with weight `pixel_weight`. Only the labels
     /// that are `admitted` for a point, given by its row, come in; the weight of the others counts in the mass alone.
@@ -40,7 +39,6 @@ impl InstanceMasks {
         admitted: impl Fn(usize, u32) -> bool + Sync,
         cancel: &Cancel,
     ) -> Result<PixelLabels<T>> {
-        let image = LabelImage::paint(self, cancel)?;
         let parts: Vec<Result<PixelLabels<T>>> = uv
             .par_chunks(POINTS_A_TASK)
             .enumerate()
@@ -49,7 +47,7 @@ impl InstanceMasks {
                 let mut labels = PixelLabels::default();
                 let mut counts = WindowCounts::default();
                 for (i, &uv) in (task * POINTS_A_TASK..).zip(uv) {
-                    image.count(self.nearest_pixel(i, uv)?, window / 2, &mut counts);
+                    self.count(self.nearest_pixel(i, uv)?, window / 2, &mut counts);
                     counts.labels.retain(|&(label, _)| admitted(i, label));
                     labels.push(&counts, pixel_weight);
                 }
@@ -63,12 +61,11 @@ impl InstanceMasks {
     /// Direct projection: the label of the pixel nearest to each of `uv`; of several masks, the first.
     ///
     /// # Errors
-    /// As [`InstanceMasks::pixel_labels`].
+    /// As [`LabelImage::pixel_labels`].
     pub fn direct_labels(&self, uv: &[[f64; 2]], cancel: &Cancel) -> Result<Vec<u32>> {
-        let image = LabelImage::paint(self, cancel)?;
         let label = |(i, &uv): (usize, &[f64; 2])| {
-            let set = image.set_at(self.nearest_pixel(i, uv)?);
-            Ok(image.labels_of(set).last().unwrap_or(0))
+            let set = self.set_at(self.nearest_pixel(i, uv)?);
+            Ok(self.labels_of(set).last().unwrap_or(0))
         };
         let mut labels = with_room(uv.len())?;
         for (task, uv) in uv.chunks(POINTS_A_TASK).enumerate() {
@@ -82,13 +79,10 @@ impl InstanceMasks {
 
     /// The pixel nearest to `uv`, that of point `i`.
     fn nearest_pixel(&self, i: usize, uv: [f64; 2]) -> Result<[usize; 2]> {
-        nearest_pixel(uv, self.height(), self.width()).ok_or_else(|| {
+        nearest_pixel(uv, self.height, self.width).ok_or_else(|| {
             let problem = format!(
                 "row {i} is at ({}, {}), outside the image of {} x {}",
-                uv[0],
-                uv[1],
-                self.height(),
-                self.width()
+                uv[0], uv[1], self.height, self.width
             );
             Error::Mismatch {
                 name: "pixels",
@@ -240,20 +234,21 @@ impl<T: Real> PixelLabels<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::masks::Rle;
+    use crate::masks::{InstanceMasks, Rle};
     use proptest::prelude::*;
 
-    fn masks(height: usize, width: usize, pixels: &[Vec<bool>]) -> InstanceMasks {
+    fn painted(height: usize, width: usize, pixels: &[Vec<bool>]) -> LabelImage {
         let rles = pixels
             .iter()
             .map(|p| Rle::from_pixels(height, width, p).unwrap())
             .collect();
-        InstanceMasks::new(height, width, rles).unwrap()
+        let masks = InstanceMasks::new(height, width, rles).unwrap();
+        LabelImage::paint(&masks, Cancel::never()).unwrap()
     }
 
     #[test]
     fn a_window_at_the_corner_has_fewer_pixels() {
-        let labels = masks(6, 6, &[vec![true; 36]])
+        let labels = painted(6, 6, &[vec![true; 36]])
             .pixel_labels::<f32>(&[[0.0, 0.0]], 5, 1.0, |_, _| true, Cancel::never())
             .unwrap();
         assert_eq!(
@@ -268,7 +263,7 @@ mod tests {
             pixels in proptest::collection::vec(proptest::collection::vec(any::<bool>(), 63), 0..4),
             u in -0.5..8.49_f64, v in -0.5..6.49_f64, reach in 0_usize..4,
         ) {
-            let found = masks(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, |_, _| true, Cancel::never()).unwrap();
+            let found = painted(7, 9, &pixels).pixel_labels::<f32>(&[[u, v]], 2 * reach + 1, 1.0, |_, _| true, Cancel::never()).unwrap();
             let mut expected = vec![0.0_f32; pixels.len() + 1];
             let mut mass = 0.0;
             for row in 0..7_usize {

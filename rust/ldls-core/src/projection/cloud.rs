@@ -1,5 +1,7 @@
 //! A point cloud as it lies in memory: rows of three or more columns, x y z first, single or double precision.
 
+use crate::memory::{tabulate, with_room};
+use crate::{Cancel, Result};
 use std::array::from_fn;
 use std::ops::Range;
 
@@ -66,6 +68,30 @@ impl Cloud<'_> {
     }
 }
 
+/// x, y and z of the points of `clouds`, one cloud after the other, each after its transform: the first three rows of its
+/// matrix, for column vectors. Points at exactly (0, 0, 0) are missing returns and stay there, unless `keep_origin` is set.
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+pub fn transformed(
+    clouds: &[(Cloud, [[f64; 4]; 3])],
+    keep_origin: bool,
+    cancel: &Cancel,
+) -> Result<Vec<[f64; 3]>> {
+    let mut all = with_room(clouds.iter().map(|(cloud, _)| cloud.len()).sum())?;
+    for (cloud, matrix) in clouds {
+        let place = |row: usize| {
+            let xyz = cloud.xyz(row);
+            if xyz == [0.0; 3] && !keep_origin {
+                return xyz;
+            }
+            matrix.map(|[x, y, z, shift]| x * xyz[0] + y * xyz[1] + z * xyz[2] + shift)
+        };
+        all.extend(tabulate(cloud.len(), place, cancel)?);
+    }
+    Ok(all)
+}
+
 #[inline(always)]
 fn axes_of<T: Copy + Into<f64>, const LEN: usize>(values: &[T], columns: usize) -> [[f64; LEN]; 3] {
     // most clouds have intensities too; of rows of a known length the instructions are known
@@ -77,4 +103,28 @@ fn axes_of<T: Copy + Into<f64>, const LEN: usize>(values: &[T], columns: usize) 
     let last = values.len() / columns - 1;
     let row = |lane: usize| lane.min(last) * columns;
     [0, 1, 2].map(|axis| from_fn(|lane| values[row(lane) + axis].into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clouds_come_one_after_the_other_each_after_its_transform() {
+        let single = Cloud::F32 {
+            values: &[1.0, 2.0, 3.0, 9.0, 0.0, 0.0, 0.0, 9.0],
+            columns: 4,
+        };
+        let double = Cloud::F64 {
+            values: &[1.0, 2.0, 3.0],
+            columns: 3,
+        };
+        let quarter_turn = [[0., -1., 0., 10.], [1., 0., 0., 20.], [0., 0., 1., 30.]];
+        let still = [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.]];
+        let clouds = [(single, quarter_turn), (double, still)];
+        let placed = |keep_origin| transformed(&clouds, keep_origin, Cancel::never()).unwrap();
+        let (moved, there) = ([8., 21., 33.], [1., 2., 3.]);
+        assert_eq!(placed(false), [moved, [0.; 3], there]);
+        assert_eq!(placed(true), [moved, [10., 20., 30.], there]);
+    }
 }

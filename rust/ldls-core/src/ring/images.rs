@@ -1,18 +1,19 @@
 //! The pixel edges of all images, added up by object.
 
 use super::moments::Moments;
-use super::same_objects::{Objects, instances_of, same_objects};
+use super::same_objects::{Objects, same_objects};
+use super::shown::Shown;
+use super::slots::Slots;
 use super::view::View;
 use crate::depth::DepthGroups;
 use crate::ground::{ground_heights, is_ground};
-use crate::masks::PixelLabels;
+use crate::masks::{LabelImage, PixelLabels};
 use crate::memory::{collect, filled, push, tabulate, with_room};
 use crate::neighbors::arrange;
 use crate::projection::{Cloud, InView, Sighting, project};
 use crate::{Cancel, Params, Real, Result};
+use rayon::prelude::*;
 
-/// Slot of points that an image does not see.
-const UNSEEN: u32 = u32::MAX;
 /// Fewest points for a task of the thread pool.
 const POINTS_A_TASK: usize = 4096;
 
@@ -23,8 +24,10 @@ pub(crate) struct Images<'a> {
     sightings: Vec<Sighting>,
     /// Those that it sees of its own moment, where that is not the same.
     seen: Option<Vec<Sighting>>,
-    /// Position of each point in view in the sighting of each image.
-    slots: Vec<Vec<u32>>,
+    /// Where points stand in the sighting of each image.
+    slots: Vec<Slots>,
+    /// The masks of each image, painted.
+    painted: Vec<LabelImage>,
     /// Label of each instance of each image, at the number of the instance; entry 0 is the background.
     labels: Vec<Vec<u32>>,
     pub(crate) objects: Objects,
@@ -35,11 +38,12 @@ pub(crate) struct Images<'a> {
 }
 
 impl<'a> Images<'a> {
-    /// The points of `cloud` in view, less their sightings, and the images that see them. Arguments as in
-    /// [`crate::segment()`].
+    /// The points of `cloud` in view, less their sightings, and the images that see them, given their masks `painted`.
+    /// Other arguments as in [`crate::segment()`].
     pub(crate) fn project(
         cloud: Cloud,
         views: &'a [View<'a>],
+        painted: Vec<LabelImage>,
         same_object: f64,
         keep_origin: bool,
         cancel: &Cancel,
@@ -49,32 +53,34 @@ impl<'a> Images<'a> {
         let mut in_view = project(cloud, &images, keep_origin, cancel)?;
         let mut sightings = std::mem::take(&mut in_view.sightings);
         let points = in_view.indices.len();
-        let mut slots = slots_of(&sightings, points, cancel)?;
-        let shared = |one: usize, other: usize| {
-            let places = slots[one].iter().zip(&slots[other]);
-            let places = places.map(|(&at, &also_at)| [at, also_at]);
-            places.filter(|places| !places.contains(&UNSEEN))
+        let mut slots = Slots::of_images(&sightings, points, cancel)?;
+        let of_moments = views.iter().any(|view| view.rows != View::ALL_ROWS);
+        // what a single image of the whole cloud shows, nobody asks
+        let asked = if views.len() > 1 || of_moments {
+            &sightings[..]
+        } else {
+            &[]
         };
-        let instances = instances_of(views, &sightings);
-        let objects = same_objects(views, &instances, shared, same_object);
+        let asked = asked.par_iter().zip(&slots).zip(&painted);
+        let shown =
+            asked.map(|((sighting, slots), image)| Shown::new(sighting, slots, image, cancel));
+        let shown: Vec<Shown> = shown.collect::<Result<_>>()?;
+        let objects = same_objects(views, &shown, same_object);
         let labels = labels_of(views, &objects);
         let mut seen = None;
-        if views.iter().any(|view| view.rows != View::ALL_ROWS) {
+        if of_moments {
             let own = views
                 .iter()
                 .map(|view| view.rows.map(|row| in_view.place(row)));
             let own: Vec<_> = own.collect();
             let moments = Moments {
                 views,
-                sightings: &sightings,
-                slots: &slots,
-                unseen: UNSEEN,
-                instances: &instances,
+                shown: &shown,
                 labels: &labels,
                 objects: &objects,
             };
             let taken = moments.sightings(&own)?;
-            slots = slots_of(&taken, points, cancel)?;
+            slots = Slots::of_images(&taken, points, cancel)?;
             let within = |(all, [start, end]): (Sighting, [usize; 2])| all.within(start..end);
             seen = Some(sightings.into_iter().zip(own).map(within).collect());
             sightings = taken;
@@ -83,6 +89,7 @@ impl<'a> Images<'a> {
             views,
             labels,
             slots,
+            painted,
             sightings,
             seen,
             objects,
@@ -164,21 +171,18 @@ impl<'a> Images<'a> {
         params: &Params,
         cancel: &Cancel,
     ) -> Result<PixelLabels<T>> {
-        let parts = self.views.iter().enumerate().map(|(image, view)| {
+        let parts = self.painted.iter().enumerate().map(|(image, painted)| {
             cancel.check()?;
             let mut seen = with_room(self.sightings[image].seen.len())?;
             for points in order.chunks(POINTS_A_TASK) {
                 cancel.check()?;
-                let slots = points
-                    .iter()
-                    .map(|&point| self.slots[image][point as usize]);
-                seen.extend(slots.filter(|&slot| slot != UNSEEN));
+                let slots = &self.slots[image];
+                seen.extend(points.iter().filter_map(|&point| slots.of(point)));
             }
             let uv = arrange(&seen, &self.sightings[image].uv, cancel)?;
             let admitted = |at: usize, label| self.admits(image, seen[at] as usize, label);
             let (window, weight) = (params.window, params.pixel_weight);
-            view.masks
-                .pixel_labels(&uv, window, weight, admitted, cancel)
+            painted.pixel_labels(&uv, window, weight, admitted, cancel)
         });
         let mut parts = parts.collect::<Result<Vec<_>>>()?;
         if parts.len() == 1 && parts[0].rows() == order.len() {
@@ -205,7 +209,7 @@ impl<'a> Images<'a> {
             row.clear();
             let mut mass = T::default();
             for (image, part) in parts.iter().enumerate() {
-                if self.slots[image][point as usize] == UNSEEN {
+                if self.slots[image].of(point).is_none() {
                     continue;
                 }
                 let at = next[image];
@@ -229,18 +233,6 @@ impl<'a> Images<'a> {
         }
         Ok(all)
     }
-}
-
-/// Position of each of `n` points in view in each of `sightings`.
-fn slots_of(sightings: &[Sighting], n: usize, cancel: &Cancel) -> Result<Vec<Vec<u32>>> {
-    let of_sighting = |sighting: &Sighting| {
-        let mut slots = filled(UNSEEN, n, cancel)?;
-        for (slot, &point) in sighting.seen.iter().enumerate() {
-            slots[point as usize] = slot as u32;
-        }
-        Ok(slots)
-    };
-    sightings.iter().map(of_sighting).collect()
 }
 
 /// Label of each instance of each view: the number of its object.

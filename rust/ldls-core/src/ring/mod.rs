@@ -7,6 +7,8 @@
 mod images;
 mod moments;
 mod same_objects;
+mod shown;
+mod slots;
 mod view;
 
 pub(crate) use images::Images;

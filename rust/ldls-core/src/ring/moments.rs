@@ -6,6 +6,7 @@
 //! before and some after; a single mask may be a segmenter's mistake, and what is not seen again may have left.
 
 use super::same_objects::Objects;
+use super::shown::Shown;
 use super::view::View;
 use crate::Result;
 use crate::memory::push;
@@ -18,13 +19,8 @@ const MASKS_OF_AN_OBJECT: usize = 2;
 /// What is known of the points in view before each has its images.
 pub(super) struct Moments<'a> {
     pub(super) views: &'a [View<'a>],
-    /// All points that each image would see, if all were swept at its moment.
-    pub(super) sightings: &'a [Sighting],
-    /// Position of each point in view in each of them, or `unseen`.
-    pub(super) slots: &'a [Vec<u32>],
-    pub(super) unseen: u32,
-    /// Instances of the image at each point of each sighting.
-    pub(super) instances: &'a [Vec<Vec<u32>>],
+    /// What each image shows of all points that it would see, if all were swept at its moment.
+    pub(super) shown: &'a [Shown<'a>],
     /// Label of each instance of each image.
     pub(super) labels: &'a [Vec<u32>],
     pub(super) objects: &'a Objects,
@@ -37,18 +33,18 @@ impl Moments<'_> {
         let moments = self.numbers();
         for (image, &[start, end]) in own.iter().enumerate() {
             let (lenders, objects) = self.lenders(moments[image], &moments);
-            for (slot, &point) in (0..).zip(&self.sightings[image].seen) {
-                if !(start..end).contains(&(point as usize)) {
-                    continue;
-                }
+            let shown = &self.shown[image];
+            let seen = &shown.sighting.seen;
+            let slot = |place: usize| seen.partition_point(|&point| (point as usize) < place);
+            for slot in slot(start)..slot(end) {
+                let (point, slot) = (seen[slot], slot as u32);
                 // a mask of its own moment knows better
-                let free = !lenders.is_empty() && self.instances[image][slot as usize].is_empty();
+                let free = !lenders.is_empty() && shown.is_background(slot);
                 let lends = |&lender: &usize| {
-                    let slot = self.slots[lender][point as usize];
-                    let shows = |&m: &u32| objects[self.labels[lender][m as usize] as usize];
-                    let there = slot != self.unseen
-                        && self.instances[lender][slot as usize].iter().any(shows);
-                    there.then_some((lender, slot))
+                    let slot = self.shown[lender].slot(point)?;
+                    let shows = |m: u32| objects[self.labels[lender][m as usize] as usize];
+                    let mut instances = self.shown[lender].instances(slot);
+                    instances.any(shows).then_some((lender, slot))
                 };
                 let (image, slot) = lenders
                     .iter()
@@ -58,17 +54,17 @@ impl Moments<'_> {
                 push(&mut taken[image], (point, slot))?;
             }
         }
-        let sighting = |(all, mut taken): (&Sighting, Vec<(u32, u32)>)| {
+        let sighting = |(shown, mut taken): (&Shown, Vec<(u32, u32)>)| {
             taken.sort_unstable();
             Sighting {
                 seen: taken.iter().map(|&(point, _)| point).collect(),
                 uv: taken
                     .iter()
-                    .map(|&(_, slot)| all.uv[slot as usize])
+                    .map(|&(_, slot)| shown.sighting.uv[slot as usize])
                     .collect(),
             }
         };
-        Ok(self.sightings.iter().zip(taken).map(sighting).collect())
+        Ok(self.shown.iter().zip(taken).map(sighting).collect())
     }
 
     /// Number of the moment of each image, from 0 in the order of their rows.

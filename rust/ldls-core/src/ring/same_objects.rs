@@ -1,35 +1,19 @@
 //! The instances of several images that show one object: those on which the points agree that both images see.
 
+use super::shown::Shown;
 use super::view::View;
-use crate::masks::InstanceMasks;
-use crate::projection::{Sighting, nearest_pixel};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// The instances that object l = 1, 2, ... consists of, at position l - 1: image and instance, the latter from 1.
 pub type Objects = Vec<Vec<(usize, u32)>>;
 
-/// The instances on whose masks each point falls that each image sees; none of an image that is alone.
-pub(super) fn instances_of(views: &[View], sightings: &[Sighting]) -> Vec<Vec<Vec<u32>>> {
-    if views.len() == 1 {
-        return vec![Vec::new()];
-    }
-    let images = views.iter().zip(sightings);
-    let of_image = |(view, sighting): (&View, &Sighting)| instances_at(view.masks, &sighting.uv);
-    images.map(of_image).collect()
-}
-
 /// Least share of common points of instances of two categories: an object has one category, but a segmenter that takes a
 /// van for a lorry at one moment does not at the next.
 const SAME_OBJECT_OF_OTHER_CATEGORY: f64 = 0.5;
 
-/// The instances of all views, those that show one object together. `instances` are those at the points that each image
-/// sees, and `shared` yields where, among these, the points are that two images see.
-pub(super) fn same_objects<Shared: IntoIterator<Item = [u32; 2]>>(
-    views: &[View],
-    instances: &[Vec<Vec<u32>>],
-    shared: impl Fn(usize, usize) -> Shared,
-    same_object: f64,
-) -> Objects {
+/// The instances of all views, those that show one object together.
+pub(super) fn same_objects(views: &[View], shown: &[Shown], same_object: f64) -> Objects {
     let mut groups: Objects = Vec::new();
     let mut group_of: Vec<Vec<usize>> = Vec::new();
     for (image, view) in views.iter().enumerate() {
@@ -37,7 +21,7 @@ pub(super) fn same_objects<Shared: IntoIterator<Item = [u32; 2]>>(
         groups.extend((1..=view.masks.len() as u32).map(|m| vec![(image, m)]));
         group_of.push((first..groups.len()).collect());
     }
-    for pair in best_first(agreements(views, instances, shared), same_object) {
+    for pair in best_first(agreements(views, shown), same_object) {
         let mut pair = pair.map(|(image, m)| group_of[image][m as usize - 1]);
         pair.sort_unstable();
         let [kept, joined] = pair;
@@ -92,77 +76,70 @@ fn best_first(agreements: BTreeMap<Pair, Agreement>, same_object: f64) -> Vec<Pa
 
 /// Agreement of each two instances in two images on which a point falls that both images see; those of two categories
 /// in images of two moments alone.
-fn agreements<Shared: IntoIterator<Item = [u32; 2]>>(
-    views: &[View],
-    instances: &[Vec<Vec<u32>>],
-    shared: impl Fn(usize, usize) -> Shared,
-) -> BTreeMap<Pair, Agreement> {
-    let mut agreements = BTreeMap::new();
-    for one in 0..views.len() {
-        for other in one + 1..views.len() {
-            let [here, there] = [one, other].map(|image| views[image].masks.len() + 1);
-            let (mut either, mut both) = ([vec![0; here], vec![0; there]], vec![0; here * there]);
-            for [at, also_at] in shared(one, other) {
-                let [here, others] =
-                    [(one, at), (other, also_at)].map(|(image, at)| &instances[image][at as usize]);
-                for (counts, instances) in either.iter_mut().zip([here, others]) {
-                    for &m in instances {
-                        counts[m as usize] += 1;
-                    }
-                }
-                for &m in here {
-                    for &k in others {
-                        both[m as usize * there + k as usize] += 1;
-                    }
-                }
-            }
-            for (at, both) in both.into_iter().enumerate().filter(|(_, both)| *both > 0) {
-                let (m, k) = (at / there, at % there);
-                let other_category = views[one].categories[m - 1] != views[other].categories[k - 1];
-                if !other_category || views[one].rows != views[other].rows {
-                    let agreement = Agreement {
-                        other_category,
-                        both,
-                        either: either[0][m] + either[1][k] - both,
-                    };
-                    agreements.insert([(one, m as u32), (other, k as u32)], agreement);
-                }
-            }
-        }
-    }
-    agreements
+fn agreements(views: &[View], shown: &[Shown]) -> BTreeMap<Pair, Agreement> {
+    let images = 0..views.len();
+    let pairs = images.flat_map(|one| (one + 1..views.len()).map(move |other| [one, other]));
+    let pairs = pairs.collect::<Vec<_>>().into_par_iter();
+    let of_pair = |pair| agreements_of(views, shown, pair);
+    pairs.flat_map_iter(of_pair).collect()
 }
 
-/// The instances on whose masks each of `uv` falls.
-fn instances_at(masks: &InstanceMasks, uv: &[[f64; 2]]) -> Vec<Vec<u32>> {
-    let pixel = |uv: &[f64; 2]| nearest_pixel(*uv, masks.height(), masks.width());
-    let pixels: Vec<[usize; 2]> = uv.iter().filter_map(pixel).collect();
-    let mut instances_of = vec![Vec::new(); pixels.len()];
-    for (m, mask) in (1..).zip(masks.masks()) {
-        let [top, left, height, width] = mask.bounding_box();
-        let ends: Vec<usize> = mask
-            .runs()
-            .iter()
-            .scan(0, |end, &run| {
-                *end += run as usize;
-                Some(*end)
-            })
-            .collect();
-        for ([column, row], instances) in pixels.iter().zip(&mut instances_of) {
-            let near = (left..left + width).contains(column) && (top..top + height).contains(row);
-            let at = column * masks.height() + row;
-            // runs of ones have odd numbers
-            if near && ends.partition_point(|&end| end <= at) % 2 == 1 {
-                instances.push(m);
+/// Those of the instances of two images.
+fn agreements_of(
+    views: &[View],
+    shown: &[Shown],
+    [one, other]: [usize; 2],
+) -> Vec<(Pair, Agreement)> {
+    let counts = |image: usize| vec![0_usize; views[image].masks.len() + 1];
+    let (mut here, mut there) = (counts(one), counts(other));
+    let width = there.len();
+    let mut both = vec![0; here.len() * width];
+    for &(slot, point) in &shown[one].on_masks {
+        let Some(also_at) = shown[other].slot(point) else {
+            continue;
+        };
+        for m in shown[one].instances(slot) {
+            here[m as usize] += 1;
+            for k in shown[other].instances(also_at) {
+                both[m as usize * width + k as usize] += 1;
             }
         }
     }
-    instances_of
+    for &(slot, point) in &shown[other].on_masks {
+        if shown[one].slot(point).is_some() {
+            shown[other]
+                .instances(slot)
+                .for_each(|k| there[k as usize] += 1);
+        }
+    }
+    let common = both.into_iter().enumerate().filter(|(_, both)| *both > 0);
+    let agreement = |(at, both)| {
+        let (m, k) = (at / width, at % width);
+        let other_category = views[one].categories[m - 1] != views[other].categories[k - 1];
+        let compared = !other_category || views[one].rows != views[other].rows;
+        compared.then(|| {
+            let either = here[m] + there[k] - both;
+            let pair = [(one, m as u32), (other, k as u32)];
+            (
+                pair,
+                Agreement {
+                    other_category,
+                    both,
+                    either,
+                },
+            )
+        })
+    };
+    common.filter_map(agreement).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::slots::Slots;
     use super::*;
+    use crate::Cancel;
+    use crate::masks::LabelImage;
+    use crate::projection::Sighting;
     use crate::test_support::{camera, masks, segment};
     use proptest::prelude::*;
 
@@ -213,9 +190,13 @@ mod tests {
             seen: (0..8).collect(),
             uv: (8..16).map(|u| [f64::from(u), 7.0]).collect(),
         };
-        let instances = instances_of(&views, &[sighting.clone(), sighting]);
-        let shared = |_, _| (0..8).map(|at| [at, at]);
-        let objects = |same_object| same_objects(&views, &instances, shared, same_object).len();
+        let never = Cancel::never();
+        let slots = &Slots::of_images(std::slice::from_ref(&sighting), 8, never).unwrap()[0];
+        let painted = [&first, &second].map(|masks| LabelImage::paint(masks, never).unwrap());
+        let shown = painted
+            .each_ref()
+            .map(|image| Shown::new(&sighting, slots, image, never).unwrap());
+        let objects = |same_object| same_objects(&views, &shown, same_object).len();
         assert_eq!((objects(0.5), objects(0.5_f64.next_up())), (1, 2));
     }
 

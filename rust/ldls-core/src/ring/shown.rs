@@ -1,0 +1,61 @@
+//! The instances that an image shows at the points that it sees.
+
+use super::slots::Slots;
+use crate::masks::LabelImage;
+use crate::memory::{collect, push};
+use crate::projection::{Sighting, nearest_pixel};
+use crate::{Cancel, Result};
+
+/// The points that an image sees, and on which instances each of them falls.
+pub(super) struct Shown<'a> {
+    pub(super) sighting: &'a Sighting,
+    slots: &'a Slots,
+    image: &'a LabelImage,
+    /// Set of labels of `image` at each point of the sighting; 0 is on no mask.
+    sets: Vec<u32>,
+    /// Slots and points that fall on any mask.
+    pub(super) on_masks: Vec<(u32, u32)>,
+}
+
+impl<'a> Shown<'a> {
+    pub(super) fn new(
+        sighting: &'a Sighting,
+        slots: &'a Slots,
+        image: &'a LabelImage,
+        cancel: &Cancel,
+    ) -> Result<Self> {
+        let set = |uv: &[f64; 2]| {
+            let pixel = nearest_pixel(*uv, image.height, image.width);
+            pixel.map_or(0, |pixel| image.set_at(pixel))
+        };
+        let sets = collect(sighting.uv.iter().map(set), cancel)?;
+        let mut on_masks = Vec::new();
+        for ((slot, &point), &set) in (0..).zip(&sighting.seen).zip(&sets) {
+            if set > 0 {
+                push(&mut on_masks, (slot, point))?;
+            }
+        }
+        Ok(Self {
+            sighting,
+            slots,
+            image,
+            sets,
+            on_masks,
+        })
+    }
+
+    /// Position of a point in the sighting, if the image sees it.
+    pub(super) fn slot(&self, point: u32) -> Option<u32> {
+        self.slots.of(point)
+    }
+
+    /// The instances, from 1, on whose masks the point of a slot falls.
+    pub(super) fn instances(&self, slot: u32) -> impl Iterator<Item = u32> {
+        self.image.labels_of(self.sets[slot as usize])
+    }
+
+    /// True if the point of a slot falls on no mask.
+    pub(super) fn is_background(&self, slot: u32) -> bool {
+        self.sets[slot as usize] == 0
+    }
+}
