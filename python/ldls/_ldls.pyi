@@ -35,6 +35,7 @@ __all__ = [
     "project",
     "remove_outliers",
     "segment",
+    "transformed",
     "unpack_laz",
 ]
 
