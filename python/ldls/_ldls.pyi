@@ -19,6 +19,7 @@ __all__ = [
     "Rle",
     "SegmentationArrays",
     "__version__",
+    "brought_together",
     "check_params",
     "confidence",
     "default_threads",
@@ -35,7 +36,6 @@ __all__ = [
     "project",
     "remove_outliers",
     "segment",
-    "transformed",
     "unpack_laz",
 ]
 
@@ -132,7 +132,9 @@ def segment(
 def check_params(params: Params) -> None: ...
 def default_threads() -> int: ...
 def panic_in_worker() -> None: ...
-def transformed(clouds: list[_Points], matrices: list[list[list[float]]], keep_origin: bool) -> NDArray[np.float64]: ...
+def brought_together(
+    clouds: list[_Points], matrices: list[list[list[float]]], keep_origin: bool
+) -> NDArray[np.float64]: ...
 def project(
     points: _Points,
     camera: Camera,

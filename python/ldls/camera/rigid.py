@@ -73,19 +73,19 @@ def inverse(matrix: Matrix) -> Matrix:
 
 
 def transformed(points: Points, matrix: Matrix) -> Matrix:
-    """(N, 3) float64: x, y and z of `points` (N, >= 3), float32 or float64, after a transform."""
+    """(N, 3) float64: x, y and z of `points` (N, >= 3), float32 or float64, after a transform (4, 4); metres."""
     return brought_together([points], [matrix], keep_origin=True)
 
 
 def brought_together(clouds: Sequence[Points], matrices: Sequence[Matrix], *, keep_origin: bool) -> Matrix:
     """(N, 3) float64: the points of all clouds, one cloud after the other, each after its transform.
 
-    Points at exactly (0, 0, 0) are missing returns and stay there, unless `keep_origin` is set. The core does it: after
-    a product of matrices the threads of NumPy wait for more, for some 20 ms, on the cores that labels need next, and
-    its last digits are the processor's.
+    Clouds are (n, >= 3) float32 or float64, matrices (4, 4); all in metres. Points at exactly (0, 0, 0) are missing
+    returns and stay there, unless `keep_origin` is set. The core does it: after a product of matrices the threads of
+    NumPy wait for more, for some 20 ms, on the cores that labels need next, and its last digits are the processor's.
     """
     each = [as_points(points) for points in clouds]
-    return _ldls.transformed(each, [matrix.tolist() for matrix in matrices], keep_origin)
+    return _ldls.brought_together(each, [matrix.tolist() for matrix in matrices], keep_origin)
 
 
 def from_quaternion(place: str, wxyz: Matrix) -> Matrix:

@@ -37,7 +37,9 @@ pub use ground::{GROUND_M, ground_heights, is_cleared, is_ground};
 pub use masks::{InstanceMasks, LabelImage, PixelLabels, Rle};
 pub use neighbors::Neighbors;
 pub use params::Params;
-pub use projection::{Camera, Cloud, Counts, Distortion, InView, Sighting, project, transformed};
+pub use projection::{
+    Camera, Cloud, Counts, Distortion, InView, Sighting, brought_together, project,
+};
 pub use real::Real;
 pub use report::{Report, Timings};
 pub use ring::{Objects, View};

@@ -65,9 +65,11 @@ pub fn segment(
 ) -> Result<Segmentation> {
     check(cloud, views, params)?;
     let mut t = Timings::default();
-    let paint = |view: &View| LabelImage::paint(view.masks, cancel);
-    let paint = || views.par_iter().map(paint).collect::<Result<_>>();
-    let painted = timed(&mut t.pixel_labels, paint)?;
+    let painted = timed(&mut t.pixel_labels, || {
+        let images = views.par_iter();
+        let painted = images.map(|view| LabelImage::paint(view.masks, cancel));
+        painted.collect::<Result<_>>()
+    })?;
     let (mut in_view, mut images) = timed(&mut t.project, || {
         Images::project(cloud, views, painted, same_object, keep_origin, cancel)
     })?;

@@ -10,13 +10,13 @@ mod allocator;
 mod arrays;
 mod call;
 mod camera;
+mod clouds;
 mod errors;
 mod laz;
 mod masks;
 mod products;
 mod segment;
 mod stages;
-mod transformed;
 
 /// Core of `ldls`; private, use `ldls`.
 #[pyo3::pymodule]
@@ -25,6 +25,8 @@ mod _ldls {
     use crate::call::{default_threads, panic_in_worker};
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::clouds::brought_together;
     #[pymodule_export]
     use crate::laz::unpack_laz;
     #[pymodule_export]
@@ -38,8 +40,6 @@ mod _ldls {
         confidence, depth_groups, diffuse, direct_labels, ground, in_graph, neighbors,
         normalize_rows, pixel_labels, point_graph, project, remove_outliers,
     };
-    #[pymodule_export]
-    use crate::transformed::transformed;
 
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {

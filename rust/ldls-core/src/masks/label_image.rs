@@ -37,7 +37,7 @@ pub(crate) struct WindowCounts {
 }
 
 impl LabelImage {
-    /// Paints masks of which none hides another.
+    /// Paints all masks; where several lie, the pixel has the labels of all of them.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].

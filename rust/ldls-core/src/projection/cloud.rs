@@ -68,12 +68,12 @@ impl Cloud<'_> {
     }
 }
 
-/// x, y and z of the points of `clouds`, one cloud after the other, each after its transform: the first three rows of its
+/// x, y and z, in metres, of the points of `clouds`, one cloud after the other, each after its transform: the first three rows of its
 /// matrix, for column vectors. Points at exactly (0, 0, 0) are missing returns and stay there, unless `keep_origin` is set.
 ///
 /// # Errors
 /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
-pub fn transformed(
+pub fn brought_together(
     clouds: &[(Cloud, [[f64; 4]; 3])],
     keep_origin: bool,
     cancel: &Cancel,
@@ -122,7 +122,7 @@ mod tests {
         let quarter_turn = [[0., -1., 0., 10.], [1., 0., 0., 20.], [0., 0., 1., 30.]];
         let still = [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.]];
         let clouds = [(single, quarter_turn), (double, still)];
-        let placed = |keep_origin| transformed(&clouds, keep_origin, Cancel::never()).unwrap();
+        let placed = |keep_origin| brought_together(&clouds, keep_origin, Cancel::never()).unwrap();
         let (moved, there) = ([8., 21., 33.], [1., 2., 3.]);
         assert_eq!(placed(false), [moved, [0.; 3], there]);
         assert_eq!(placed(true), [moved, [10., 20., 30.], there]);

@@ -9,6 +9,6 @@ mod lanes;
 
 pub use camera::Camera;
 pub(crate) use camera::nearest_pixel;
-pub use cloud::{Cloud, transformed};
+pub use cloud::{Cloud, brought_together};
 pub use distortion::Distortion;
 pub use in_view::{Counts, InView, Sighting, project};

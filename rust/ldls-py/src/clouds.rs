@@ -1,4 +1,4 @@
-//! Clouds moved from one frame of reference to another.
+//! Clouds brought together in one frame of reference.
 
 use crate::arrays::{Points, matrix};
 use crate::call::run;
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 /// Points of all clouds, one after the other, each after its transform.
 #[pyfunction]
-pub fn transformed(
+pub fn brought_together(
     py: Python<'_>,
     clouds: Vec<Points<'_>>,
     matrices: Vec<[[f64; 4]; 4]>,
@@ -17,7 +17,7 @@ pub fn transformed(
     let clouds = clouds.map(|(cloud, &[x, y, z, _])| Ok((cloud.cloud(py)?, [x, y, z])));
     let clouds: Vec<_> = clouds.collect::<PyResult<_>>()?;
     let points = run(py, None, |cancel| {
-        ldls_core::transformed(&clouds, keep_origin, cancel)
+        ldls_core::brought_together(&clouds, keep_origin, cancel)
     })?;
     matrix(py, points.into_flattened(), 3)
 }
