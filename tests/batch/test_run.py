@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from batch import runs
 from datasets import layouts, ros_samples
 from ldls import batch
 from ldls.batch import lock
+from ldls.batch.journal import Journal
 from ldls.batch.plan import check_names, parse_frames
 from ldls.cli import app
 from ldls.datasets import open_source
@@ -359,6 +361,21 @@ def test_disk_trouble_of_every_kind(source, undisturbed, tmp_path, monkeypatch, 
     assert all(content == undisturbed[name] for name, content in runs.without_journal(tmp_path).items())
     run(source, tmp_path)
     assert runs.contents(tmp_path) == undisturbed
+
+
+def test_nothing_is_at_work_once_a_run_has_failed(source, tmp_path, monkeypatch):
+    """Whoever keeps the error keeps the frames of its stack, and all that waits in them to go on."""
+
+    def failing(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Journal, "add", failing)
+    monkeypatch.setattr(sys.modules["ldls.batch.run"], "GROUP_S", 0.0)
+    before = threading.enumerate()
+    with pytest.raises(OSError, match=os.strerror(errno.ENOSPC)) as kept:
+        run(source, tmp_path)
+    assert threading.enumerate() == before
+    assert kept.tb is not None
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -15,8 +15,10 @@ from ldls.errors import ParameterError
 
 MAX_WORKERS = 1024
 
-Engine = Callable[[FrameWork, Sequence[Frames]], Iterator[Outcome]]
-"""Yields what becomes of windows, frames given as number and name, in the order in which they are finished."""
+Engine = Callable[[FrameWork, Sequence[Frames]], Generator[Outcome]]
+"""Yields what becomes of windows, frames given as number and name, in the order in which they are finished.
+
+It is closed when the run ends, however it does, and is at work no more then."""
 
 
 @dataclass(frozen=True, kw_only=True)

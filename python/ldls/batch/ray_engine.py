@@ -15,7 +15,7 @@ import secrets
 import socket
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,7 +91,7 @@ def run_ray(
     cluster: RayCluster,
     workers: int | None,
     gpus: float,
-) -> Iterator[Outcome]:
+) -> Generator[Outcome]:
     """Yield the outcome of each of `windows`, in the order in which they are finished.
 
     Args:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -130,10 +131,10 @@ def run(
             start = time.perf_counter()
             seconds: Counter[str] = Counter()
             n_finished, n_failed = n_earlier, 0
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), closing(_recorded(runner(work, pending), journal)) as outcomes:
                 # said of all frames at once, below
                 warnings.simplefilter("ignore", NothingInView)
-                for outcome in _recorded(runner(work, pending), journal):
+                for outcome in outcomes:
                     seconds.update(outcome.seconds)
                     n_finished += len(outcome.records)
                     n_failed += sum("error" in record for record in outcome.records)
@@ -221,19 +222,21 @@ def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> li
     return [window for window in windows if any(name not in done for _, name in window)]
 
 
-def _recorded(outcomes: Iterator[Outcome], journal: Journal) -> Iterator[Outcome]:
+def _recorded(outcomes: Generator[Outcome], journal: Journal) -> Generator[Outcome]:
     """The outcomes, their records in the journal within `GROUP_S` or by the end, however it comes."""
     waiting: list[Record] = []
     since = time.monotonic()
-    try:
-        for outcome in outcomes:
-            waiting.extend(outcome.records)
-            if time.monotonic() - since > GROUP_S:
-                _flush(journal, waiting)
-                since = time.monotonic()
-            yield outcome
-    finally:
-        _flush(journal, waiting)
+    # whoever keeps an error of the journal would keep the engine at work
+    with closing(outcomes):
+        try:
+            for outcome in outcomes:
+                waiting.extend(outcome.records)
+                if time.monotonic() - since > GROUP_S:
+                    _flush(journal, waiting)
+                    since = time.monotonic()
+                yield outcome
+        finally:
+            _flush(journal, waiting)
 
 
 def _flush(journal: Journal, waiting: list[Record]) -> None:
