@@ -11,7 +11,7 @@ install: ## Install the package, optimised, with what the tests and linters need
 
 .PHONY: develop
 develop: ## Build the extension into the source tree, for working on it.
-	maturin develop --release --extras dev
+	pip install --editable '.[dev]'
 
 .PHONY: test
 test: ## Run the tests of Python and Rust.
