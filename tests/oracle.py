@@ -67,9 +67,17 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
     xyz = points[in_view, :3].astype(np.float64)
     heights = np.full(len(xyz), np.nan) if heights is None else heights
     ground = (heights > -0.3) & (heights < 0.15)
-    groups = same_objects(views, seen, same_object, rows)
+    shown = points_shown(views, seen)
+    if rows is not None and params.depth_gap > 0:
+        # masks show the points of other moments that are as far away as what they show of their own
+        for camera, ((masks, _, _), (own_rows, pixels), (start, end)) in enumerate(zip(views, seen, rows, strict=True)):
+            at = np.searchsorted(in_view, own_rows)
+            distances = np.linalg.norm(xyz[at] - centers[camera], axis=1)
+            own = ~ground[at] & (own_rows >= start) & (own_rows < end)
+            shown[camera] &= depth_groups(distances, pixels, masks, own, params, moved_m=1.0)[:, 1:].T
+    groups = same_objects(views, seen, shown, same_object, rows)
     if rows is not None:
-        seen = pixels_taken(views, seen, groups, rows)
+        seen = pixels_taken(views, seen, shown, groups, rows)
     labels, mass = np.zeros((len(in_view), len(groups) + 1)), np.zeros(len(in_view))
     for camera, ((masks, _, _), (rows, pixels)) in enumerate(zip(views, seen, strict=True)):
         of_instance = [0] + [1 + [(camera, m) in group for group in groups].index(True) for m in range(len(masks))]
@@ -98,7 +106,16 @@ def segment_ring(points, views, params, *, same_object=0.5, min_depth_m=0.1, hei
     return whole, groups
 
 
-def pixels_taken(views, seen, groups, rows):
+def points_shown(views, seen):
+    """For each view, (M, n) whether the pixel of each point that it sees is on each mask."""
+    found = []
+    for (masks, _, _), (_, pixels) in zip(views, seen, strict=True):
+        column, row = np.floor(pixels + 0.5).astype(int).reshape(-1, 2).T
+        found.append(masks[:, row, column])
+    return found
+
+
+def pixels_taken(views, seen, shown, groups, rows):
     """Rows and pixels of the points that take their pixels from each view: those of its moment, but for points where it
     has no mask and the nearest view of another moment shows an object that its moment overlooks."""
     times = sorted(set(rows))
@@ -112,8 +129,9 @@ def pixels_taken(views, seen, groups, rows):
     def lends(other, view, row):
         if row not in seen[other][0]:
             return False
-        shown = [next(g for g in groups if (other, m) in g) for m in masks_at(other, row)]
-        return any(overlooked([moment[member] - moment[view] for member, _ in group]) for group in shown)
+        (at,) = np.flatnonzero(seen[other][0] == row)
+        there = [next(g for g in groups if (other, m) in g) for m in np.flatnonzero(shown[other][:, at])]
+        return any(overlooked([moment[member] - moment[view] for member, _ in group]) for group in there)
 
     def overlooked(later):
         around = min(later) < 0 < max(later)
@@ -130,19 +148,15 @@ def pixels_taken(views, seen, groups, rows):
     return [(own_rows[part], pixels[part]) for (own_rows, pixels), part in zip(seen, parts, strict=True)]
 
 
-def same_objects(views, seen, same_object, rows=None):
+def same_objects(views, seen, shown, same_object, rows=None):
     """Groups of instances, the pairs that agree best joined first; one instance a camera. Those of two categories come
     last, must agree on half, and are of views of two moments."""
     pairs = []
     for one in range(len(views)):
         for other in range(one + 1, len(views)):
             _, here, there = np.intersect1d(seen[one][0], seen[other][0], return_indices=True)
-            covers = []
-            for camera, at in ((one, here), (other, there)):
-                column, row = np.floor(seen[camera][1][at] + 0.5).astype(int).reshape(-1, 2).T
-                covers.append(views[camera][0][:, row, column])
-            for m, first in enumerate(covers[0]):
-                for k, second in enumerate(covers[1]):
+            for m, first in enumerate(shown[one][:, here]):
+                for k, second in enumerate(shown[other][:, there]):
                     both, either = (first & second).sum(), (first | second).sum()
                     differ = views[one][1][m] != views[other][1][k]
                     possible = not differ or (rows is not None and rows[one] != rows[other])
@@ -176,12 +190,14 @@ def project(points, camera_matrix, image_size, min_depth_m):
     return rows[inside], pixels[inside]
 
 
-def depth_groups(distances, pixels, masks, standing, params):
-    """(n, M + 1) whether each point takes each label from pixels: the background and the masks."""
+def depth_groups(distances, pixels, masks, standing, params, moved_m=0.0):
+    """(n, M + 1) whether each point takes each label from pixels: the background and the masks.
+
+    An object may have moved so far; then one that no point stands on is at any distance."""
     admitted = np.ones((len(distances), len(masks) + 1), bool)
     column, row = np.floor(pixels + 0.5).astype(int).reshape(-1, 2).T
     for m, mask in enumerate(masks):
-        admitted[:, m + 1] = False
+        admitted[:, m + 1] = moved_m > 0
         if not mask.any():
             continue
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
@@ -196,7 +212,7 @@ def depth_groups(distances, pixels, masks, standing, params):
         if not len(on_it):
             continue
         near, far = object_interval(distances[on_it], depth[on_it], distances[near_it], params)
-        inside = (near <= distances) & (distances <= far)
+        inside = (near - moved_m <= distances) & (distances <= far + moved_m)
         admitted[:, m + 1] = inside
         if params.edge_margin > 0:
             admitted[near_it & inside, 0] = False

@@ -69,7 +69,7 @@ def test_labels_equal_those_of_plain_double_precision(seed, base):
     plain = [(pixels, categories, camera.projection @ camera.T_camera_lidar) for pixels, categories, camera in views]
     rows = list(pairwise(ends.tolist()))
     labels, groups = oracle.segment_ring(
-        points, plain, replace(params, neighbors=9), same_object=0.2, rows=rows, **asked
+        points, plain, replace(params, neighbors=9), same_object=0.1, rows=rows, **asked
     )
     np.testing.assert_array_equal(np.concatenate([result.labels for result in results]), labels)
     for moment, result in enumerate(results):
@@ -86,8 +86,9 @@ def test_some_of_these_points_take_pixels_of_another_moment():
         plain = [(pixels, kinds, camera.projection @ camera.T_camera_lidar) for pixels, kinds, camera in views]
         seen = [oracle.project(points, matrix, pixels.shape[1:], 0.1) for pixels, _, matrix in plain]
         rows = list(pairwise(ends))
-        groups = oracle.same_objects(plain, seen, 0.2, rows)
-        taken = oracle.pixels_taken(plain, seen, groups, rows)
+        shown = oracle.points_shown(plain, seen)
+        groups = oracle.same_objects(plain, seen, shown, 0.1, rows)
+        taken = oracle.pixels_taken(plain, seen, shown, groups, rows)
         lent += sum(
             int(((own < start) | (own >= end)).sum()) for (own, _), (start, end) in zip(taken, rows, strict=True)
         )

@@ -72,6 +72,15 @@ def test_an_object_is_itself_after_a_second_without_a_mask_though_it_moves():
     assert rows[6, 0] == 0 and rows[10].tolist() == [1, 2]
 
 
+def test_an_object_too_fast_for_one_label_is_itself_by_one_after_the_other():
+    # masks of two moments have no points in common
+    sweeps = [sweep_at(0.1 * k, [((8, -4 + 1.2 * k), True), ((8, 6), True)]) for k in range(8)]
+    labels = {tuple(result.labels[:125]) for result in ldls.segment_sweeps(sweeps[:4], params=PARAMS)}
+    assert len(labels) == 4
+    rows = np.array(tracks_of(ldls.Tracker(), sweeps, together=4))
+    assert [len(set(column)) for column in rows.T] == [1, 1] and rows[0, 0] != rows[0, 1]
+
+
 def test_velocities_are_those_of_the_world():
     tracker, speed = ldls.Tracker(), 1.2
     for k in range(12):

@@ -25,7 +25,7 @@ from ldls.params import Params
 from ldls.segmentation import Segmentation
 from ldls.view import View
 
-SAME_OBJECT = 0.2
+SAME_OBJECT = 0.1
 """Share of common points from which on instances of two images are one object: less than of one moment, for it may
 have moved."""
 SHARE_OF_NEIGHBORS = 0.5

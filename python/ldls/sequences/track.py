@@ -94,12 +94,12 @@ class Track:
         """When it was seen last, in seconds."""
         return self.sightings[-1].stamp
 
-    def advance(self, instance: Instance, sightings: Sequence[Sighting]) -> None:
+    def advance(self, instance: Instance, sighting: Sighting) -> None:
         """Note that it was seen again."""
         self.instance = instance
-        self.n_images += sum(each.shown for each in sightings)
-        first = sightings[-1].stamp - MEMORY_S
-        self.sightings = [each for each in (*self.sightings, *sightings) if each.stamp >= first]
+        self.n_images += sighting.shown
+        first = sighting.stamp - MEMORY_S
+        self.sightings = [*(each for each in self.sightings if each.stamp >= first), sighting]
         self.velocity = _velocity(self.sightings)
 
     def as_instance(self, instance: Instance) -> Instance:

@@ -3,15 +3,14 @@
 Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds,
 moved to the moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
 Tracks of one object are joined. Within sweeps that were segmented together an object keeps its label, and so its
-number. Sweeps whose images overlook an object have its label too (propagation.py).
+number; a label that begins later goes on with a track that has none then. Sweeps whose images overlook an object have
+its label too (propagation.py).
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -86,10 +85,15 @@ class Tracker:
             raise InputError("results: their instances differ, expected those of one call of segment_sweeps")
         self._stamp = sweeps[-1].stamp
         instances = {instance.label: instance for instance in results[0].instances}
-        sightings = _sightings(sweeps, results)
-        by_label = self._matched(instances, sightings, sweeps[0].stamp)
-        for label, track in by_label.items():
-            track.advance(instances[label], sightings[label])
+        seen = [_sightings(sweep, result) for sweep, result in zip(sweeps, results, strict=True)]
+        last = {label: at for at, labels in enumerate(seen) for label in labels}
+        by_label: dict[int, Track] = {}
+        for at, own in enumerate(seen):
+            taken = {track for label, track in by_label.items() if last[label] >= at}
+            new = {label: sighting for label, sighting in own.items() if label not in by_label}
+            by_label |= self._matched(instances, new, sweeps[at].stamp, taken)
+            for label, sighting in own.items():
+                by_label[label].advance(instances[label], sighting)
         numbers = {label: track.number for label, track in by_label.items()}
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
         self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
@@ -98,8 +102,8 @@ class Tracker:
         added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
         tracked = []
         for result, moment, rows in zip(results, moments, found, strict=True):
-            own = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
-            tracked.append(replace(_completed(result, moment, rows, of_number), instances=(*own, *added)))
+            known = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
+            tracked.append(replace(_completed(result, moment, rows, of_number), instances=(*known, *added)))
         return tuple(tracked)
 
     def _added(self, found: Ints, of_number: dict[int, int], known: int) -> list[Instance]:
@@ -117,23 +121,23 @@ class Tracker:
         return added
 
     def _matched(
-        self, instances: Mapping[int, Instance], sightings: Mapping[int, Sequence[Sighting]], stamp: float
+        self, instances: Mapping[int, Instance], sightings: Mapping[int, Sighting], stamp: float, taken: Set[Track]
     ) -> dict[int, Track]:
-        """The track of each label that has points in sweeps from `stamp` on: a known one, or a new one."""
+        """The track of each label that is first seen at a moment: a known one that is not `taken`, or a new one."""
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
         labels = list(sightings)
         costs = np.full((len(labels), len(self._tracks)), np.inf)
         for j, track in enumerate(self._tracks):
-            at = cache(track.at)
-            for i, label in enumerate(labels):
-                first = sightings[label][0]
-                if instances[label].category == track.instance.category:
-                    costs[i, j] = self._apart(first.footprint, at(first.stamp))
-        # what cannot be is dearer than all that can be together
-        dearest = NEAR_M * (len(labels) + 1)
-        rows, columns = self._assign(np.where(np.isfinite(costs), costs, dearest))
+            like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
+            if track in taken or not like:
+                continue
+            there = track.at(stamp)
+            for i in like:
+                costs[i, j] = self._apart(sightings[labels[i]].footprint, there)
+        # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
+        rows, columns = self._assign(np.minimum(costs, NEAR_M))
         pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
-        lengths = [sightings[label][0].footprint.length for label in labels]
+        lengths = [sightings[label].footprint.length for label in labels]
         of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
         same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
         known = {labels[i]: track for i, track in self._joined(pairs, same).items()}
@@ -194,17 +198,16 @@ def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Map
     return replace(result, labels=labels, confidence=confidence)
 
 
-def _sightings(sweeps: Sequence[Sweep], results: Sequence[Segmentation]) -> dict[int, list[Sighting]]:
-    """Those of each label that has points."""
-    sightings: dict[int, list[Sighting]] = defaultdict(list)
-    for sweep, result in zip(sweeps, results, strict=True):
-        labelled = np.flatnonzero(result.labels > 0)
-        labelled = labelled[np.argsort(result.labels[labelled], kind="stable")]
-        labels, starts = np.unique(result.labels[labelled], return_index=True)
-        for label, rows in zip(labels.tolist(), np.split(labelled, starts)[1:], strict=True):
-            some = rows[:: -(-len(rows) // MOST_POINTS)]
-            xyz = result.points[some, :3].astype(np.float64)
-            xy = xyz @ sweep.pose[:2, :3].T + sweep.pose[:2, 3]
-            shown = bool(result.instances[label - 1].sources)
-            sightings[label].append(Sighting(sweep.stamp, Footprint(xy), shown))
+def _sightings(sweep: Sweep, result: Segmentation) -> dict[int, Sighting]:
+    """That of each label that has points."""
+    sightings: dict[int, Sighting] = {}
+    labelled = np.flatnonzero(result.labels > 0)
+    labelled = labelled[np.argsort(result.labels[labelled], kind="stable")]
+    labels, starts = np.unique(result.labels[labelled], return_index=True)
+    for label, rows in zip(labels.tolist(), np.split(labelled, starts)[1:], strict=True):
+        some = rows[:: -(-len(rows) // MOST_POINTS)]
+        xyz = result.points[some, :3].astype(np.float64)
+        xy = xyz @ sweep.pose[:2, :3].T + sweep.pose[:2, 3]
+        shown = bool(result.instances[label - 1].sources)
+        sightings[label] = Sighting(sweep.stamp, Footprint(xy), shown)
     return sightings

@@ -71,10 +71,13 @@ pub fn segment(
         painted.collect::<Result<_>>()
     })?;
     let (mut in_view, mut images) = timed(&mut t.project, || {
-        Images::project(cloud, views, painted, same_object, keep_origin, cancel)
+        Images::project(cloud, views, painted, keep_origin, cancel)
     })?;
     let points = take(&mut in_view.points);
     timed(&mut t.depth, || images.see_ground(&points, params, cancel))?;
+    timed(&mut t.project, || {
+        images.find_objects(&points, same_object, params, cancel)
+    })?;
     let in_graph = in_graph(&images.heights, params, cancel)?;
     let mut beside = Duration::ZERO;
     let search = || nearest_of(&points, in_graph, params, cancel);

@@ -15,6 +15,8 @@ use groups::{Member, object_of};
 use pixels::Pixels;
 use rayon::prelude::*;
 
+/// Distance, in metres, by which an object may be nearer or farther at another moment: it may move, and poses are off.
+const MOVED_M: f64 = 1.0;
 /// Values above which the two halves are sorted by two threads.
 const PARALLEL: usize = 1 << 16;
 
@@ -40,6 +42,20 @@ impl DepthGroups {
             None => !self.unsure[point],
             Some(m) => self.intervals[m as usize]
                 .is_some_and(|[near, far]| near <= distance && distance <= far),
+        }
+    }
+
+    /// The same objects, and points of other moments at `distances` from the camera in metres. An object that no point of
+    /// its own moment falls on is at any distance.
+    pub(crate) fn at_other_moments(&self, distances: Vec<f64>) -> Self {
+        let moved = |interval: &Option<[f64; 2]>| {
+            let [near, far] = interval.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+            Some([near - MOVED_M, far + MOVED_M])
+        };
+        Self {
+            intervals: self.intervals.iter().map(moved).collect(),
+            distances,
+            unsure: Vec::new(),
         }
     }
 }

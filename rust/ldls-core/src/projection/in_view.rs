@@ -5,7 +5,7 @@ use super::camera::{Camera, Sights};
 use super::cloud::Cloud;
 use super::lanes::{LANES, Lanes};
 use crate::bits::ones;
-use crate::memory::with_room;
+use crate::memory::{collect, with_room};
 use crate::{Cancel, Error, Result};
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -40,14 +40,16 @@ pub struct Sighting {
 
 impl Sighting {
     /// The part of the points at some positions in the list of those in view.
-    pub(crate) fn within(mut self, positions: Range<usize>) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+    pub(crate) fn within(&self, positions: Range<usize>, cancel: &Cancel) -> Result<Self> {
         let place = |position: usize| self.seen.partition_point(|&at| (at as usize) < position);
         let kept = place(positions.start)..place(positions.end);
-        self.uv.truncate(kept.end);
-        self.uv.drain(..kept.start);
-        self.seen.truncate(kept.end);
-        self.seen.drain(..kept.start);
-        self
+        Ok(Self {
+            seen: collect(self.seen[kept.clone()].iter().copied(), cancel)?,
+            uv: collect(self.uv[kept].iter().copied(), cancel)?,
+        })
     }
 }
 

@@ -20,6 +20,8 @@ const POINTS_A_TASK: usize = 4096;
 /// The images of one moment or of several, the points in view that each of them sees and the objects that they show.
 pub(crate) struct Images<'a> {
     views: &'a [View<'a>],
+    /// Positions of the points of each image's own moment among those in view: the first, and one after the last.
+    own: Vec<[usize; 2]>,
     /// The points that take their pixels from each image.
     sightings: Vec<Sighting>,
     /// Those that it sees of its own moment, where that is not the same.
@@ -44,59 +46,86 @@ impl<'a> Images<'a> {
         cloud: Cloud,
         views: &'a [View<'a>],
         painted: Vec<LabelImage>,
-        same_object: f64,
         keep_origin: bool,
         cancel: &Cancel,
     ) -> Result<(InView, Self)> {
         let size = |view: &View| [view.masks.height(), view.masks.width()];
         let images: Vec<_> = views.iter().map(|view| (view.camera, size(view))).collect();
         let mut in_view = project(cloud, &images, keep_origin, cancel)?;
-        let mut sightings = std::mem::take(&mut in_view.sightings);
+        let sightings = std::mem::take(&mut in_view.sightings);
         let points = in_view.indices.len();
-        let mut slots = Slots::of_images(&sightings, points, cancel)?;
-        let of_moments = views.iter().any(|view| view.rows != View::ALL_ROWS);
-        // what a single image of the whole cloud shows, nobody asks
-        let asked = if views.len() > 1 || of_moments {
-            &sightings[..]
-        } else {
-            &[]
-        };
-        let asked = asked.par_iter().zip(&slots).zip(&painted);
-        let shown =
-            asked.map(|((sighting, slots), image)| Shown::new(sighting, slots, image, cancel));
-        let shown: Vec<Shown> = shown.collect::<Result<_>>()?;
-        let objects = same_objects(views, &shown, same_object);
-        let labels = labels_of(views, &objects);
-        let mut seen = None;
-        if of_moments {
-            let own = views
-                .iter()
-                .map(|view| view.rows.map(|row| in_view.place(row)));
-            let own: Vec<_> = own.collect();
-            let moments = Moments {
-                views,
-                shown: &shown,
-                labels: &labels,
-                objects: &objects,
-            };
-            let taken = moments.sightings(&own)?;
-            slots = Slots::of_images(&taken, points, cancel)?;
-            let within = |(all, [start, end]): (Sighting, [usize; 2])| all.within(start..end);
-            seen = Some(sightings.into_iter().zip(own).map(within).collect());
-            sightings = taken;
-        }
+        let own = views
+            .iter()
+            .map(|view| view.rows.map(|row| in_view.place(row)));
         let images = Self {
             views,
-            labels,
-            slots,
+            own: own.collect(),
+            slots: Slots::of_images(&sightings, points, cancel)?,
             painted,
             sightings,
-            seen,
-            objects,
+            seen: None,
+            labels: Vec::new(),
+            objects: Objects::new(),
             heights: filled(f64::NAN, points, cancel)?,
             depths: Vec::new(),
         };
         Ok((in_view, images))
+    }
+
+    /// Finds out which instances of the images show one object, and where there are several moments, which image each of
+    /// `points` in view takes its pixels from.
+    ///
+    /// A mask also shows what lies before and behind its object. At another moment that is elsewhere, so that there only
+    /// the points as far away as the object are on the mask, where the parameters ask for depth.
+    pub(crate) fn find_objects(
+        &mut self,
+        points: &[[f64; 3]],
+        same_object: f64,
+        params: &Params,
+        cancel: &Cancel,
+    ) -> Result<()> {
+        let views = self.views;
+        let of_moments = views.iter().any(|view| view.rows != View::ALL_ROWS);
+        let mut seen = None;
+        let mut depths = Vec::new();
+        if of_moments {
+            let own = self.sightings.iter().zip(&self.own);
+            let own = own.map(|(all, &[start, end])| all.within(start..end, cancel));
+            let own: Vec<Sighting> = own.collect::<Result<_>>()?;
+            if params.need_depth() {
+                depths = self.depth_groups(&own, points, params, cancel)?;
+                for ((depths, view), all) in depths.iter_mut().zip(views).zip(&self.sightings) {
+                    *depths = depths.at_other_moments(distances(view, all, points, cancel)?);
+                }
+            }
+            seen = Some(own);
+        }
+        // what a single image of the whole cloud shows, nobody asks
+        let asked = if views.len() > 1 || of_moments {
+            &self.sightings[..]
+        } else {
+            &[]
+        };
+        let show = |(image, sighting)| {
+            let (slots, painted) = (&self.slots[image], &self.painted[image]);
+            Shown::new(sighting, slots, painted, depths.get(image), cancel)
+        };
+        let shown = asked.par_iter().enumerate().map(show);
+        let shown: Vec<Shown> = shown.collect::<Result<_>>()?;
+        self.objects = same_objects(views, &shown, same_object);
+        self.labels = labels_of(views, &self.objects);
+        if of_moments {
+            let moments = Moments {
+                views,
+                shown: &shown,
+                labels: &self.labels,
+                objects: &self.objects,
+            };
+            self.sightings = moments.sightings(&self.own)?;
+            self.slots = Slots::of_images(&self.sightings, points.len(), cancel)?;
+            self.seen = seen;
+        }
+        Ok(())
     }
 
     /// The points that each image sees of its own moment, and the objects.
@@ -127,21 +156,29 @@ impl<'a> Images<'a> {
         if !params.need_depth() {
             return Ok(());
         }
+        self.depths = self.depth_groups(&self.sightings, points, params, cancel)?;
+        Ok(())
+    }
+
+    /// What depth says of the points that each image sees, given their `sightings`.
+    fn depth_groups(
+        &self,
+        sightings: &[Sighting],
+        points: &[[f64; 3]],
+        params: &Params,
+        cancel: &Cancel,
+    ) -> Result<Vec<DepthGroups>> {
         let standing = collect(
             self.heights.iter().map(|&height| !is_ground(height)),
             cancel,
         )?;
         let of_view = |(view, sighting): (&View, &Sighting)| {
-            let seen = &sighting.seen;
-            let distance = |at: usize| view.camera.distance(&points[seen[at] as usize]);
-            let distances = tabulate(seen.len(), distance, cancel)?;
-            let standing = arrange(seen, &standing, cancel)?;
+            let distances = distances(view, sighting, points, cancel)?;
+            let standing = arrange(&sighting.seen, &standing, cancel)?;
             view.masks
                 .depth_groups(&sighting.uv, distances, &standing, params, cancel)
         };
-        let views = self.views.iter().zip(&self.sightings);
-        self.depths = views.map(of_view).collect::<Result<_>>()?;
-        Ok(())
+        self.views.iter().zip(sightings).map(of_view).collect()
     }
 
     /// True if the point at `slot` of the sighting of `image` takes `label` from the pixels around it.
@@ -233,6 +270,17 @@ impl<'a> Images<'a> {
         }
         Ok(all)
     }
+}
+
+/// Distance of the points of a sighting to the camera, in metres.
+fn distances(
+    view: &View,
+    sighting: &Sighting,
+    points: &[[f64; 3]],
+    cancel: &Cancel,
+) -> Result<Vec<f64>> {
+    let distance = |at: usize| view.camera.distance(&points[sighting.seen[at] as usize]);
+    tabulate(sighting.seen.len(), distance, cancel)
 }
 
 /// Label of each instance of each view: the number of its object.

@@ -2,8 +2,9 @@
 //!
 //! A point takes those of the images of its own moment, for what moves is elsewhere in the others. Where these overlook an
 //! object, points on its place take those of the nearest other that shows it: the pixels look like background and say
-//! nothing. An object is overlooked where at least two other images show it, at the moment before or after, or at some
-//! before and some after; a single mask may be a segmenter's mistake, and what is not seen again may have left.
+//! nothing. A mask shows points as far away as its object. An object is overlooked where at least two other images show it,
+//! at the moment before or after, or at some before and some after; a single mask may be a segmenter's mistake, and what is
+//! not seen again may have left.
 
 use super::same_objects::Objects;
 use super::shown::Shown;

@@ -138,6 +138,7 @@ mod tests {
     use super::super::slots::Slots;
     use super::*;
     use crate::Cancel;
+    use crate::depth::DepthGroups;
     use crate::masks::LabelImage;
     use crate::projection::Sighting;
     use crate::test_support::{camera, masks, segment};
@@ -195,8 +196,38 @@ mod tests {
         let painted = [&first, &second].map(|masks| LabelImage::paint(masks, never).unwrap());
         let shown = painted
             .each_ref()
-            .map(|image| Shown::new(&sighting, slots, image, never).unwrap());
+            .map(|image| Shown::new(&sighting, slots, image, None, never).unwrap());
         let objects = |same_object| same_objects(&views, &shown, same_object).len();
+        assert_eq!((objects(0.5), objects(0.5_f64.next_up())), (1, 2));
+    }
+
+    #[test]
+    fn points_before_and_behind_the_object_of_a_mask_are_not_on_it() {
+        // eight points on the masks of both images, of which the second one's object is as far away as half of them
+        let masks = masks(&[[5, 8, 6, 8]]);
+        let camera = camera(20.0);
+        let view = View {
+            scores: &[1.0],
+            masks: &masks,
+            categories: &[1],
+            camera: &camera,
+            rows: View::ALL_ROWS,
+        };
+        let sighting = Sighting {
+            seen: (0..8).collect(),
+            uv: (8..16).map(|u| [f64::from(u), 7.0]).collect(),
+        };
+        let never = Cancel::never();
+        let slots = &Slots::of_images(std::slice::from_ref(&sighting), 8, never).unwrap()[0];
+        let painted = LabelImage::paint(&masks, never).unwrap();
+        let depths = DepthGroups {
+            intervals: vec![Some([2.0, 4.0])],
+            distances: vec![2.0, 4.0, 3.0, 3.5, 1.9, 4.1, 9.0, 1.0],
+            unsure: Vec::new(),
+        };
+        let shown = [None, Some(&depths)]
+            .map(|depths| Shown::new(&sighting, slots, &painted, depths, never).unwrap());
+        let objects = |same_object| same_objects(&[view; 2], &shown, same_object).len();
         assert_eq!((objects(0.5), objects(0.5_f64.next_up())), (1, 2));
     }
 

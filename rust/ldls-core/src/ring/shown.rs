@@ -1,6 +1,7 @@
 //! The instances that an image shows at the points that it sees.
 
 use super::slots::Slots;
+use crate::depth::DepthGroups;
 use crate::masks::LabelImage;
 use crate::memory::{collect, push};
 use crate::projection::{Sighting, nearest_pixel};
@@ -13,6 +14,8 @@ pub(super) struct Shown<'a> {
     image: &'a LabelImage,
     /// Set of labels of `image` at each point of the sighting; 0 is on no mask.
     sets: Vec<u32>,
+    /// How far away the objects of the masks are, and the points, where that is asked for.
+    depths: Option<&'a DepthGroups>,
     /// Slots and points that fall on any mask.
     pub(super) on_masks: Vec<(u32, u32)>,
 }
@@ -22,6 +25,7 @@ impl<'a> Shown<'a> {
         sighting: &'a Sighting,
         slots: &'a Slots,
         image: &'a LabelImage,
+        depths: Option<&'a DepthGroups>,
         cancel: &Cancel,
     ) -> Result<Self> {
         let set = |uv: &[f64; 2]| {
@@ -40,6 +44,7 @@ impl<'a> Shown<'a> {
             slots,
             image,
             sets,
+            depths,
             on_masks,
         })
     }
@@ -49,9 +54,11 @@ impl<'a> Shown<'a> {
         self.slots.of(point)
     }
 
-    /// The instances, from 1, on whose masks the point of a slot falls.
+    /// The instances, from 1, on whose masks the point of a slot falls, as far away as their objects.
     pub(super) fn instances(&self, slot: u32) -> impl Iterator<Item = u32> {
-        self.image.labels_of(self.sets[slot as usize])
+        let labels = self.image.labels_of(self.sets[slot as usize]);
+        let depths = self.depths;
+        labels.filter(move |&m| depths.is_none_or(|depths| depths.admits(slot as usize, m)))
     }
 
     /// True if the point of a slot falls on no mask.
