@@ -63,7 +63,7 @@ SETTINGS: dict[str, tuple[object, ...]] = {
     "part_gap": (0.0, 0.5, 1.0, 3.0),
 }
 
-NAMED = "masks on their objects"
+ON_OBJECTS = "masks on their objects"
 Labeller = Callable[[Frame], NDArray[np.int32]]
 
 
@@ -146,7 +146,7 @@ def by_method(frames: Sequence[Frame], classes: ClassSet) -> Mapping[str, Evalua
 
 
 def on_their_objects(frame: Frame) -> NDArray[np.int32]:
-    """Labels in which every mask has the object that it shows, wholly and alone, whatever the mask calls it."""
+    """(N,) labels by which every mask has the object that it shows, wholly and alone, whatever the mask calls it."""
     image, truth = frame.images[0], frame.truth
     assert truth is not None and image.masks is not None
     pixels = image.masks.to_array()
@@ -162,18 +162,17 @@ def methods(folder: Path, part: str) -> Iterator[tuple[str, Table]]:
     """Every method on every set: cars and pedestrians, all ten categories, panoptic quality, and each category."""
     sets, pair = sets_of(folder, part), ClassSet.kitti()
     found = {name: by_method(frames, pair) for name, frames in sets.items()}
-    rows = [(method, *(shown(found[name][method]) for name in sets)) for method in found["hdl-64e"]]
+    every = list(next(iter(found.values())))
+    rows = [(method, *(shown(found[name][method]) for name in sets)) for method in every]
     yield f"methods-{part}", table("IoU of Car and Pedestrian (recall of instances at 0.70), %", sets, rows)
-    rows = [(method, *(percent(found[name][method].panoptic.mean_pq) for name in sets)) for method in found["hdl-64e"]]
+    rows = [(method, *(percent(found[name][method].panoptic.mean_pq) for name in sets)) for method in every]
     yield f"panoptic-{part}", table("panoptic quality of Car and Pedestrian, %", sets, rows)
     ten = ClassSet.kitti(TEN)
     of_all = {name: by_method(frames, ten) for name, frames in sets.items()}
-    rows = [
-        (method, *(percent(of_all[name][method].semantic.mean_iou) for name in sets)) for method in of_all["hdl-64e"]
-    ]
+    rows = [(method, *(percent(of_all[name][method].semantic.mean_iou) for name in sets)) for method in every]
     yield f"ten-{part}", table("mean IoU of ten categories, %", sets, rows)
     named = {name: scores_of(frames, on_their_objects, ten) for name, frames in sets.items()}
-    rows = [(name, *(categories({**of_all[at], NAMED: named[at]}, name) for at in sets)) for name in TEN]
+    rows = [(name, *(categories({**of_all[at], ON_OBJECTS: named[at]}, name) for at in sets)) for name in TEN]
     title = "IoU of the paper's method, ours, masks on their objects, the bound (true points), %"
     yield f"categories-{part}", table(title, sets, rows)
 
@@ -267,7 +266,7 @@ def shown(scores: Evaluation) -> str:
 
 def categories(found: Mapping[str, Evaluation], name: str) -> str:
     """IoU of a category by the paper's method, ours, masks on their objects and the bound, and its true points."""
-    counts = [found[method].semantic[name] for method in (PAPER, FULL, NAMED, BOUND)]
+    counts = [found[method].semantic[name] for method in (PAPER, FULL, ON_OBJECTS, BOUND)]
     ious = " ".join("-" if each.iou is None else f"{100 * each.iou:.1f}" for each in counts)
     return f"{ious} ({counts[0].tp + counts[0].fn})"
 

@@ -109,9 +109,8 @@ def test_models_of_distortion(write, entries, options, model):
         pytest.param("%YAML:1.0\n---\nK: {a: b: c}", "line 3: not YAML", id="malformed, line"),
         pytest.param("1 2 3", "expected keys with values, got str", id="no keys"),
         pytest.param("", "expected keys with values, got NoneType", id="empty"),
-        pytest.param("[" * 40, "line 1: not YAML .more than 32 levels", id="deep"),
-        # some versions of the library have a limit of their own, and read ahead up to it
-        pytest.param("[" * 5000, "line 1: not YAML .(more than 32 levels|exceeded maximum nesting)", id="deeper"),
+        pytest.param("[" * 40, "line 1: not YAML .more than 32 levels", id="beyond the limit"),
+        pytest.param("[" * 5000, "line 1: not YAML .more than 32 levels", id="deep"),
         pytest.param("{[1]: 2}", "line 1: not YAML", id="key that is a list"),
         pytest.param("a: &a [*a]", "not YAML", id="list in itself"),
         pytest.param("K: !!python/object/apply:os.system [ls]", "could not determine a constructor", id="code"),

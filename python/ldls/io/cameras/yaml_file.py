@@ -9,6 +9,7 @@ from ldls.errors import CalibrationError
 
 MAX_DEPTH = 32
 """Levels of nesting: calibrations have six."""
+TOO_DEEP = f"more than {MAX_DEPTH} levels of nesting"
 OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
 NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 MAPPING = "tag:yaml.org,2002:map"
@@ -27,7 +28,11 @@ def entries_of(text: str, path: str) -> object:
         _check_growth(yaml, text)
         return next(iter(yaml.load_all(text, _loader(yaml))), None)
     except yaml.YAMLError as error:
-        raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({getattr(error, 'problem', error)})") from None
+        problem = getattr(error, "problem", error)
+        # newer versions of the library have a limit of their own, and read ahead up to it
+        if "nesting" in str(problem):
+            problem = TOO_DEEP
+        raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({problem})") from None
 
 
 def _without_opencv_directive(text: str) -> str:
@@ -43,7 +48,7 @@ def _check_growth(yaml: Any, text: str) -> None:  # noqa: ANN401
         if isinstance(event, yaml.AliasEvent):
             problem = "aliases are not read; write the value out"
         elif depth > MAX_DEPTH:
-            problem = f"more than {MAX_DEPTH} levels of nesting"
+            problem = TOO_DEEP
         else:
             continue
         raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
