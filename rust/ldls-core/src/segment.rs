@@ -124,10 +124,18 @@ pub fn segment(
         in_view: &in_view.indices,
         of_graph: arrange(order, &in_view.indices, cancel)?,
     };
+    let (labels, (diffused_labels, confidence)) = rayon::join(
+        || rows.labels(&kept, cancel),
+        || {
+            let labels = || rows.labels(&diffused.labels, cancel);
+            let confidence = || rows.scatter([0.0, of_cleared(params)], confidence, cancel);
+            rayon::join(labels, confidence)
+        },
+    );
     Ok(Segmentation {
-        labels: rows.labels(&kept, cancel)?,
-        diffused_labels: rows.labels(&diffused.labels, cancel)?,
-        confidence: rows.scatter([0.0, of_cleared(params)], confidence, cancel)?,
+        labels: labels?,
+        diffused_labels: diffused_labels?,
+        confidence: confidence?,
         report: Report::new(in_view.counts, nearest, diffused.convergence),
         in_view: in_view.indices,
         sightings,

@@ -8,6 +8,7 @@
 
 mod convergence;
 mod errors;
+mod lanes;
 mod pass;
 mod phases;
 mod products;
@@ -23,17 +24,18 @@ pub use convergence::Convergence;
 pub use products::Products;
 
 use self::errors::Errors;
+use self::lanes::{Lane, WIDTH_F32, WIDTH_F64};
 use self::pass::Pass;
 use self::reach::Reach;
 use self::schedule::Schedule;
 use self::seeds::{Seeds, plan};
 use self::series::Series;
-use self::sweep::{Step, WIDTH_F32, WIDTH_F64};
+use self::sweep::Step;
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{collect, filled, tabulate, zeros};
-use crate::{Cancel, Real, Result};
+use crate::{Cancel, Result};
 
 /// Share of the largest likelihood that a series in single precision may leave out.
 const TOLERANCE_F32: f64 = 1e-7;
@@ -172,7 +174,7 @@ pub fn likelihoods(
 }
 
 /// Calls `done` with each pass over the graph that `labels` take.
-fn for_each_pass<T: Real, const WIDTH: usize>(
+fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     b: &PixelLabels<T>,
     labels: &[u32],
@@ -183,9 +185,12 @@ fn for_each_pass<T: Real, const WIDTH: usize>(
     // in single precision, a probe shows how large the terms left out may be
     let probed = WIDTH == WIDTH_F32;
     let tolerance = if probed { TOLERANCE_F32 } else { TOLERANCE_F64 };
-    let mut series = Series::of_graph(a, iterations, tolerance);
-    cancel.check()?;
-    let schedule = Schedule::new(a, cancel)?;
+    // parts of each are for one thread alone
+    let (mut series, schedule) = rayon::join(
+        || Series::of_graph(a, iterations, tolerance),
+        || Schedule::new(a, cancel),
+    );
+    let schedule = schedule?;
     let mut convergence = Convergence::default();
     for lanes in plan(b, labels, WIDTH, probed) {
         let seeds = Seeds::new(b, lanes, cancel)?;

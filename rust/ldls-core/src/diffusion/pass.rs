@@ -1,6 +1,7 @@
 //! One pass over the graph: the values of some labels at all points.
 
 use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
+use super::lanes::{Lane, Lanes};
 use super::schedule::{Activity, ROWS_A_TASK, Schedule};
 use super::seeds::{BACKGROUND_LANE, Seeds};
 use super::series::Series;
@@ -8,7 +9,7 @@ use super::sweep::{Step, take_steps};
 use super::values::zeros;
 use crate::graph::PointGraph;
 use crate::memory::tabulate;
-use crate::{Cancel, Error, Real, Result};
+use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 
 /// Error from which on a series is given up for plain products.
@@ -23,15 +24,15 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     seeds: &'a Seeds<T>,
     activity: Activity<'a>,
     /// Values, group by group.
-    z: Vec<Vec<[T; WIDTH]>>,
+    z: Vec<Vec<Lanes<T, WIDTH>>>,
     /// Values before the last step, which the next one overwrites.
-    previous: Vec<Vec<[T; WIDTH]>>,
+    previous: Vec<Vec<Lanes<T, WIDTH>>>,
     /// Sum of the magnitudes of the coefficients that a series leaves out.
     left_out: f64,
     pub(super) convergence: Convergence,
 }
 
-impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
+impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     /// Runs `iterations` products, endlessly many for `None`, or the `series` that stands for them.
     pub(super) fn run(
         a: &'a PointGraph<T>,
@@ -96,7 +97,7 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
             a,
             schedule,
             seeds,
-            activity: Activity::new(schedule, seeds.groups(WIDTH, cancel)?, groups),
+            activity: Activity::new(schedule, &seeds.groups(WIDTH, cancel)?),
             z,
             previous,
             left_out: 0.0,
@@ -148,13 +149,13 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
     }
 
     /// Label, values of its group at all points and lane within the group of each label.
-    pub(super) fn labels(&self) -> impl Iterator<Item = (u32, &[[T; WIDTH]], usize)> {
+    pub(super) fn labels(&self) -> impl Iterator<Item = (u32, &[Lanes<T, WIDTH>], usize)> {
         let lanes = self.seeds.labels();
         lanes.map(|(label, lane)| (label, &self.z[lane / WIDTH][..], lane % WIDTH))
     }
 
     /// Values at all points and labels of the lanes of each group; no label for the probe.
-    pub(super) fn groups(&self) -> impl Iterator<Item = (&[[T; WIDTH]], &[Option<u32>])> {
+    pub(super) fn groups(&self) -> impl Iterator<Item = (&[Lanes<T, WIDTH>], &[Option<u32>])> {
         let values = self.z.iter().map(Vec::as_slice);
         values.zip(self.seeds.lanes.chunks(WIDTH))
     }
@@ -162,7 +163,7 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
     fn largest_change(&self) -> f64 {
         let probe = self.seeds.probe_lane();
         let of_group = |group: usize| {
-            let change_at = |(z, previous): (&[T; WIDTH], &[T; WIDTH])| {
+            let change_at = |(z, previous): (&Lanes<T, WIDTH>, &Lanes<T, WIDTH>)| {
                 let lanes = (0..WIDTH).filter(|lane| Some(group * WIDTH + lane) != probe);
                 let changes = lanes.map(|lane| (z[lane] - previous[lane]).to_f64().abs());
                 changes.fold(0.0, f64::max)
@@ -192,15 +193,31 @@ impl<'a, T: Real, const WIDTH: usize> Pass<'a, T, WIDTH> {
     /// True if little is left out, no likelihood is negative, and those of no point sum to more than `overlap`, the most
     /// labels that its pixel edges count for.
     pub(super) fn is_sound(&self, overlap: f64) -> bool {
-        let labels: Vec<_> = self.labels().collect();
+        // one for a label, zero for the probe
+        let counts = self.groups().map(|(values, labels)| {
+            let mut counts = [T::default(); WIDTH];
+            for (count, label) in counts.iter_mut().zip(labels) {
+                *count = T::from_f64(if label.is_some() { 1.0 } else { 0.0 });
+            }
+            (values, counts)
+        });
+        let counts: Vec<_> = counts.collect();
         let row_is_sound = |i: usize| {
-            let mut sum = 0.0;
-            labels.iter().all(|(_, group, lane)| {
-                let value = group[i][*lane].to_f64();
-                sum += value;
-                value >= -SLACK
-            }) && sum.is_finite()
-                && sum <= overlap + SLACK
+            let (mut sums, mut least) = ([T::default(); WIDTH], [T::default(); WIDTH]);
+            for (values, counts) in &counts {
+                for lane in 0..WIDTH {
+                    let value = counts[lane] * values[i][lane];
+                    sums[lane] += value;
+                    least[lane] = if value < least[lane] {
+                        value
+                    } else {
+                        least[lane]
+                    };
+                }
+            }
+            let sum: f64 = sums.iter().map(|sum| sum.to_f64()).sum();
+            let negative = least.iter().any(|value| value.to_f64() < -SLACK);
+            sum.is_finite() && sum <= overlap + SLACK && !negative
         };
         let points = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
         self.convergence.error <= LARGEST_ERROR && points.all(row_is_sound)

@@ -3,7 +3,8 @@
 //! A step takes values one edge farther, so before the last step only the points themselves and those that they have edges
 //! from matter, before the one before it those two edges away, and so on: a tenth of a frame on average.
 
-use super::sweep::{Step, WIDTH_F64};
+use super::lanes::WIDTH_F64;
+use super::sweep::Step;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{filled, push, zeros};
@@ -145,9 +146,10 @@ fn take_step(
             }
         }
         for lane in 0..WIDTH_F64 {
-            next[lane] = step.seeds * seeds[lane] + step.along * sum[lane]
-                - step.stay * own[lane]
-                - step.back * next[lane];
+            next[lane] = step.seeds * seeds[lane]
+                + step.along * sum[lane]
+                + step.stay * own[lane]
+                + step.back * next[lane];
         }
     }
 }

@@ -23,18 +23,20 @@ pub(super) const BLOCK: usize = 16;
 const TILE: usize = 4 * BLOCK;
 /// Blocks between two looks at the flag.
 const BLOCKS_A_LOOK: usize = 4096;
+/// Fewest blocks for a task of the thread pool.
+const BLOCKS_A_TASK: usize = ROWS_A_TASK / BLOCK;
 /// Tiles of a region: some 16 MB of values and edges.
 const REGION: usize = 32768 / TILE;
 /// Steps that a region takes at a time.
 const ROUND: usize = 12;
 
-/// Blocks of consecutive rows, the blocks that labels flow from to each, and when each tile takes which step.
+/// Blocks of consecutive rows, the blocks that labels flow to from each, and when each tile takes which step.
 #[derive(Debug)]
 pub(super) struct Schedule {
     rows: usize,
-    /// Sources of block i at `source_offsets[i]..source_offsets[i + 1]`.
-    source_offsets: Vec<u32>,
-    sources: Vec<u32>,
+    /// Targets of block i at `target_offsets[i]..target_offsets[i + 1]`.
+    target_offsets: Vec<u32>,
+    targets: Vec<u32>,
     /// Steps after which the order repeats itself.
     round: usize,
     /// Region after region and step after step of a round, the tiles that take it then.
@@ -50,11 +52,11 @@ impl Schedule {
 
     /// Regions of `size` tiles each.
     fn in_regions<T: Real>(a: &PointGraph<T>, size: usize, cancel: &Cancel) -> Result<Self> {
-        let (source_offsets, sources) = sources(a, cancel)?;
+        let (target_offsets, targets) = targets(a, cancel)?;
         let mut schedule = Self {
             rows: a.len(),
-            source_offsets,
-            sources,
+            target_offsets,
+            targets,
             round: 1,
             order: Vec::new(),
             offsets: Vec::new(),
@@ -113,8 +115,8 @@ impl Schedule {
         for block in 0..self.rows.div_ceil(BLOCK) {
             let tile = (block * BLOCK / TILE) as u32;
             met[tile as usize] = tile;
-            for &source in self.sources(block) {
-                let other = source / (TILE / BLOCK) as u32;
+            for &target in self.targets(block) {
+                let other = target / (TILE / BLOCK) as u32;
                 if std::mem::replace(&mut met[other as usize], tile) != tile {
                     push(&mut edges, [tile, other])?;
                 }
@@ -123,11 +125,10 @@ impl Schedule {
         Ok(edges)
     }
 
-    /// The blocks other than `block` with a row that a row of `block` has an edge from.
-    #[inline(always)]
-    fn sources(&self, block: usize) -> &[u32] {
-        let [start, end] = [block, block + 1].map(|at| self.source_offsets[at] as usize);
-        &self.sources[start..end]
+    /// The blocks other than `block` with a row that has an edge from a row of `block`.
+    fn targets(&self, block: usize) -> &[u32] {
+        let [start, end] = [block, block + 1].map(|at| self.target_offsets[at] as usize);
+        &self.targets[start..end]
     }
 
     /// Calls `work(rows, step)` for steps 0 to `steps` - 1 of every tile of rows, on all threads of the pool.
@@ -161,8 +162,8 @@ impl Schedule {
     }
 }
 
-/// Offsets and sources of all blocks: the other blocks that each has edges from.
-fn sources<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<(Vec<u32>, Vec<u32>)> {
+/// Offsets and targets of all blocks: the other blocks with edges from each.
+fn targets<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<(Vec<u32>, Vec<u32>)> {
     let count = a.len().div_ceil(BLOCK);
     // few tasks: each marks the blocks that it has met in an array of its own
     let size = count.div_ceil(4 * rayon::current_num_threads()).max(1);
@@ -181,22 +182,38 @@ fn sources<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<(Vec<u32>, Vec
                     push(&mut sources, source)?;
                 }
             }
-            ends.push(sources.len() as u32);
+            ends.push(sources.len());
         }
         Ok((sources, ends))
     };
     let tasks = (0..count.div_ceil(size)).into_par_iter();
-    let parts: Vec<(Vec<u32>, Vec<u32>)> = tasks.map(of_task).collect::<Result<_>>()?;
-    let mut offsets = with_room(count + 1)?;
-    offsets.push(0);
-    let mut all = with_room(parts.iter().map(|(sources, _)| sources.len()).sum())?;
-    for (sources, ends) in parts {
-        cancel.check()?;
-        let start = all.len() as u32;
-        offsets.extend(ends.iter().map(|end| start + end));
-        all.extend(sources);
+    let parts: Vec<(Vec<u32>, Vec<usize>)> = tasks.map(of_task).collect::<Result<_>>()?;
+    // turned round
+    let mut offsets: Vec<u32> = zeros(count + 1, cancel)?;
+    for source in parts.iter().flat_map(|(sources, _)| sources) {
+        offsets[*source as usize + 1] += 1;
     }
-    Ok((offsets, all))
+    for block in 0..count {
+        offsets[block + 1] += offsets[block];
+    }
+    let mut targets = zeros(offsets[count] as usize, cancel)?;
+    let mut block = 0;
+    for (sources, ends) in &parts {
+        cancel.check()?;
+        let mut start = 0;
+        for &end in ends {
+            for &source in &sources[start..end] {
+                let next = &mut offsets[source as usize];
+                targets[*next as usize] = block;
+                *next += 1;
+            }
+            (start, block) = (end, block + 1);
+        }
+    }
+    // each block's now begin where they ended
+    offsets.rotate_right(1);
+    offsets[0] = 0;
+    Ok((offsets, targets))
 }
 
 /// The groups of lanes of each block that hold anything but zeros; bit g of a block stands for group g.
@@ -207,44 +224,42 @@ fn sources<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<(Vec<u32>, Vec
 pub(super) struct Activity<'a> {
     schedule: &'a Schedule,
     filled: Vec<AtomicU8>,
-    /// All groups.
-    all: u8,
+    /// The same of each block and of those that labels flow from to it.
+    active: Vec<AtomicU8>,
 }
 
 impl<'a> Activity<'a> {
-    /// Of so many groups of each block, those that are `seeded`.
-    pub(super) fn new(schedule: &'a Schedule, seeded: Vec<u8>, groups: usize) -> Self {
-        Self {
+    /// Of each block those groups that are `seeded`.
+    pub(super) fn new(schedule: &'a Schedule, seeded: &[u8]) -> Self {
+        let activity = Self {
             schedule,
-            filled: seeded.into_iter().map(AtomicU8::new).collect(),
-            all: u8::MAX >> (u8::BITS as usize - groups),
-        }
+            filled: seeded.iter().map(|_| AtomicU8::new(0)).collect(),
+            active: seeded.iter().copied().map(AtomicU8::new).collect(),
+        };
+        let blocks = seeded.par_iter().enumerate().with_min_len(BLOCKS_A_TASK);
+        blocks.for_each(|(block, &groups)| activity.fill(block, groups));
+        activity
     }
 
     /// Groups of `block` that a step may fill: those filled in it or in a block that labels flow from.
-    #[inline(always)]
     pub(super) fn active(&self, block: usize) -> u8 {
-        let mut active = self.filled(block);
-        for &source in self.schedule.sources(block) {
-            if active == self.all {
-                break;
-            }
-            active |= self.filled(source as usize);
-        }
-        active
+        // threads may see values of a step that they are not in yet, and so compute zeros in vain, but no wrong ones
+        self.active[block].load(Relaxed)
     }
 
     /// Groups of `block` that hold values.
-    #[inline(always)]
     pub(super) fn filled(&self, block: usize) -> u8 {
-        // threads may see values of a step that they are not in yet, and so compute zeros in vain, but no wrong ones
         self.filled[block].load(Relaxed)
     }
 
     /// Notes that `groups` of `block` hold values.
-    #[inline(always)]
     pub(super) fn fill(&self, block: usize, groups: u8) {
-        self.filled[block].fetch_or(groups, Relaxed);
+        if groups != 0 {
+            self.filled[block].fetch_or(groups, Relaxed);
+            for &target in self.schedule.targets(block) {
+                self.active[target as usize].fetch_or(groups, Relaxed);
+            }
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use super::schedule::{BLOCK, ROWS_A_TASK};
 use crate::masks::PixelLabels;
 use crate::memory::{collect, push, tabulate, with_room, zeros};
 use crate::{Cancel, Real, Result};
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;
 
@@ -122,14 +123,17 @@ impl<T: Real> Seeds<T> {
             }
             offsets.push(entries.len() as u32);
         }
-        let weights = b.weights.iter().map(|weight| weight.to_f64());
+        let weights = b.weights.par_iter().with_min_len(ROWS_A_TASK);
+        let largest = weights
+            .map(|weight| weight.to_f64())
+            .reduce(|| 0.0, f64::max);
         Ok(Self {
             lanes,
             background,
             probe,
             entries,
             offsets,
-            least: T::from_f64(T::NEGLIGIBLE * weights.fold(0.0, f64::max)),
+            least: T::from_f64(T::NEGLIGIBLE * largest),
         })
     }
 

@@ -111,8 +111,8 @@ impl Series {
             // the last step takes X once, all others twice
             let times = if k == 0 { 1.0 } else { 2.0 };
             let along = times / self.half_width;
-            let stay = times * self.middle / self.half_width;
-            Step::new(self.coefficients[k], along, stay, 1.0)
+            let stay = -along * self.middle;
+            Step::new(self.coefficients[k], along, stay, -1.0)
         };
         (0..self.degree()).rev().map(step).collect()
     }

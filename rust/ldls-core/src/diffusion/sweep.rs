@@ -5,24 +5,21 @@
     reason = "threads share values by rows, and a check of every column takes a sixth of the time of a sweep"
 )]
 
+use super::lanes::{Lane, Lanes, Vector};
 use super::schedule::{Activity, BLOCK, Schedule};
-use super::seeds::{BACKGROUND_LANE, Seeds};
+use super::seeds::{BACKGROUND_LANE, MOST_GROUPS, Seeds};
 use super::values::SharedValues;
 use crate::graph::PointGraph;
 use crate::{Cancel, Real, Result};
+use bytemuck::Zeroable;
 use multiversion::multiversion;
-use std::hint::black_box;
+use multiversion::target::match_target;
 use std::ops::Range;
 
 /// Edges of a point with the paper's parameters: 10 neighbours and itself.
 const PAPER_DEGREE: usize = 11;
 
-/// Lanes of a group in single precision.
-pub(super) const WIDTH_F32: usize = 8;
-/// The same in double precision.
-pub(super) const WIDTH_F64: usize = 4;
-
-/// One step next <- seeds * s + along * A z - stay * z - back * next.
+/// One step next <- seeds * s + along * A z + stay * z + back * next.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step<T> {
     pub(super) seeds: T,
@@ -49,13 +46,13 @@ impl<T: Real> Step<T> {
 }
 
 /// Takes `steps` one after the other, each from the first of `values` to the second, which change places after it.
-pub(super) fn take_steps<T: Real, const WIDTH: usize>(
+pub(super) fn take_steps<T: Lane<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     schedule: &Schedule,
     steps: &[Step<T>],
     activity: &Activity,
-    values: [&mut [Vec<[T; WIDTH]>]; 2],
+    values: [&mut [Vec<Lanes<T, WIDTH>>]; 2],
     cancel: &Cancel,
 ) -> Result<()> {
     let values = values.map(SharedValues::new);
@@ -72,9 +69,7 @@ pub(super) fn take_steps<T: Real, const WIDTH: usize>(
 /// # Safety
 /// Meanwhile nobody else touches these rows of the second values, or writes a row of the first that lies in `all` or that
 /// a row in `all` has an edge from.
-// without fused multiply-add, which is not faster here, results are the same bits on every processor
-#[multiversion(targets("x86_64+avx2"))]
-unsafe fn sweep<T: Real, const WIDTH: usize>(
+unsafe fn sweep<T: Lane<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,
@@ -82,200 +77,214 @@ unsafe fn sweep<T: Real, const WIDTH: usize>(
     values: [&SharedValues<T, WIDTH>; 2],
     all: Range<usize>,
 ) {
-    // one where the background lies: its seed is added to all lanes at once, since a single lane would have to wait for
-    // the row to reach memory; a black box, since the compiler would take the lanes apart
-    let mut lanes = [T::default(); WIDTH];
-    lanes[BACKGROUND_LANE] = T::from_f64(1.0);
-    let lanes = &black_box(lanes);
-    let next = values[1];
-    for block in all.start / BLOCK..all.end.div_ceil(BLOCK) {
-        let rows = block * BLOCK..all.end.min((block + 1) * BLOCK);
-        let active = activity.active(block);
-        let mut groups = (0..next.groups()).filter(|group| active >> group & 1 == 1);
-        while let Some(group) = groups.next() {
-            let pair = (group, groups.next());
-            // SAFETY: as the caller promises; groups differ
-            unsafe {
-                if group == BACKGROUND_LANE / WIDTH {
-                    step_pair::<T, WIDTH, true>(a, seeds, step, pair, values, &rows, lanes);
-                } else {
-                    step_pair::<T, WIDTH, false>(a, seeds, step, pair, values, &rows, lanes);
-                }
-            }
-        }
-        for &(i, lane, weight) in seeds.of_rows(rows.clone()) {
+    let blocks = all.start / BLOCK..all.end.div_ceil(BLOCK);
+    let rows_of = |blocks: Range<usize>| blocks.start * BLOCK..all.end.min(blocks.end * BLOCK);
+    let mut first = blocks.start;
+    while first < blocks.end {
+        // blocks of the same groups take the step as one
+        let active = activity.active(first);
+        let differs = |block: &usize| activity.active(*block) != active;
+        let end = (first + 1..blocks.end).find(differs).unwrap_or(blocks.end);
+        let rows = rows_of(first..end);
+        // SAFETY: as the caller promises
+        unsafe { step_active(a, seeds, step, active, values, &rows) };
+        for &(i, lane, weight) in seeds.of_rows(rows) {
             let (group, lane) = (lane as usize / WIDTH, lane as usize % WIDTH);
-            // SAFETY: as the caller promises
-            let next = unsafe { next.rows_mut(group, &rows) };
-            next[i as usize - rows.start][lane] += step.seeds * weight;
+            // SAFETY: as the caller promises; a seed lies in one of the rows
+            let next = unsafe { &mut *values[1].begin(group).add(i as usize) };
+            next[lane] += step.seeds * weight;
         }
-        let unfilled = active & !activity.filled(block);
-        if unfilled != 0 {
-            let unfilled = (0..next.groups()).filter(|group| unfilled >> group & 1 == 1);
+        for block in first..end {
             // SAFETY: as the caller promises
-            let new = unfilled.filter(|&group| in_use(unsafe { next.rows(group, &rows) }));
+            let rows = |group| unsafe { values[1].rows(group, &rows_of(block..block + 1)) };
+            let unfilled = groups_in(active & !activity.filled(block));
+            let new = unfilled.filter(|&group| in_use(rows(group)));
             activity.fill(block, new.fold(0, |bits, group| bits | 1 << group));
         }
+        first = end;
     }
 }
 
-fn in_use<T: Real, const WIDTH: usize>(rows: &[[T; WIDTH]]) -> bool {
-    rows.iter().any(|row| *row != [T::default(); WIDTH])
+/// The groups whose bits are set.
+fn groups_in(bits: u8) -> impl Iterator<Item = usize> {
+    (0..MOST_GROUPS).filter(move |group| bits >> group & 1 == 1)
 }
 
-/// Computes one group of `rows`, the one with the background if `BACKGROUND`.
+fn in_use<T: Real, const WIDTH: usize>(rows: &[Lanes<T, WIDTH>]) -> bool {
+    let mut sums = [T::default(); WIDTH];
+    for row in rows {
+        for lane in 0..WIDTH {
+            sums[lane] += row[lane].abs();
+        }
+    }
+    sums != [T::default(); WIDTH]
+}
+
+/// Computes the groups of `rows` whose bits are set in `active`, three at a time.
 ///
 /// # Safety
 /// As of [`sweep`].
-#[inline(always)]
-unsafe fn step_rows<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
+unsafe fn step_active<T: Lane<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,
-    group: usize,
-    [z, next]: [&SharedValues<T, WIDTH>; 2],
+    active: u8,
+    values: [&SharedValues<T, WIDTH>; 2],
     rows: &Range<usize>,
-    lanes: &[T; WIDTH],
 ) {
-    let source = z.source(group);
-    // SAFETY: as the caller promises
-    let (own, next) = unsafe { (z.rows(group, rows), next.rows_mut(group, rows)) };
-    let points = next
-        .iter_mut()
-        .zip(own)
-        .zip(&seeds.background[rows.clone()]);
-    if a.degree() == Some(PAPER_DEGREE) {
-        // with a number of edges known beforehand there is no loop over them, and less to check
-        for (((row, own), &seed), (columns, weights)) in points.zip(paper_edges(a, rows)) {
-            let [sum] = paper_sums([source], [own], columns, weights);
-            *row = finish::<T, WIDTH, BACKGROUND>(step, &sum, own, row, seed, lanes, seeds.least);
-        }
-    } else {
-        for (i, ((row, own), &seed)) in rows.clone().zip(points) {
-            let (columns, weights) = a.slices(i..i + 1);
-            let mut sum = [[T::default(); WIDTH]];
-            for (&column, &weight) in columns.iter().zip(weights) {
-                add(&mut sum, [source], column, weight);
+    let mut groups = groups_in(active);
+    while let Some(first) = groups.next() {
+        // SAFETY: as the caller promises; groups differ
+        unsafe {
+            match (groups.next(), groups.next()) {
+                (Some(second), Some(third)) => {
+                    step_groups(a, seeds, step, [first, second, third], values, rows);
+                }
+                (Some(second), None) => step_groups(a, seeds, step, [first, second], values, rows),
+                _ => step_groups(a, seeds, step, [first], values, rows),
             }
-            *row =
-                finish::<T, WIDTH, BACKGROUND>(step, &sum[0], own, row, seed, lanes, seeds.least);
         }
     }
 }
 
-/// Computes a group of `rows`, and another one with it if there is one, which share what they read of the graph; the
-/// background lies in the first, if `BACKGROUND`.
+/// Computes `groups` of `rows`, which share what they read of the graph.
+///
+/// # Safety
+/// As of [`sweep`]; groups differ.
+#[multiversion(targets("x86_64+avx2+fma"))]
+unsafe fn step_groups<T: Lane<WIDTH>, const WIDTH: usize, const GROUPS: usize>(
+    a: &PointGraph<T>,
+    seeds: &Seeds<T>,
+    step: Step<T>,
+    groups: [usize; GROUPS],
+    [z, next]: [&SharedValues<T, WIDTH>; 2],
+    rows: &Range<usize>,
+) {
+    let values = groups.map(|group| (z.begin(group).cast_const(), next.begin(group)));
+    let mut background = Lanes::zeroed();
+    if groups[0] == BACKGROUND_LANE / WIDTH {
+        background[BACKGROUND_LANE] = step.seeds;
+    }
+    match_target! {
+        // SAFETY: as the caller promises
+        "x86_64+avx2+fma" => unsafe {
+            step_rows::<T, WIDTH, T::Register, GROUPS>(a, seeds, step, values, &background, rows);
+        },
+        // SAFETY: the same
+        _ => unsafe {
+            step_rows::<T, WIDTH, Lanes<T, WIDTH>, GROUPS>(a, seeds, step, values, &background, rows);
+        },
+    }
+}
+
+/// The same with vectors of one kind. `values` says where z and next of each group begin, and the lane of `background` where
+/// the first group has it by how much its seeds are multiplied.
 ///
 /// # Safety
 /// As of [`sweep`].
 #[inline(always)]
-unsafe fn step_pair<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
+unsafe fn step_rows<T, const WIDTH: usize, V, const GROUPS: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,
-    (first, second): (usize, Option<usize>),
-    [z, next]: [&SharedValues<T, WIDTH>; 2],
+    values: [(*const Lanes<T, WIDTH>, *mut Lanes<T, WIDTH>); GROUPS],
+    background: &Lanes<T, WIDTH>,
     rows: &Range<usize>,
-    lanes: &[T; WIDTH],
-) {
-    let Some(second) = second.filter(|_| a.degree() == Some(PAPER_DEGREE)) else {
+) where
+    T: Real,
+    V: Vector<T, WIDTH>,
+{
+    let uniform = a.degree() == Some(PAPER_DEGREE);
+    let (all_columns, all_weights) = a.slices(0..a.len());
+    for (i, &seed) in rows.clone().zip(&seeds.background[rows.clone()]) {
+        let (sums, own_weight): ([V; GROUPS], T) = if uniform {
+            let start = i * PAPER_DEGREE;
+            // SAFETY: as the caller promises; all rows are of this length
+            unsafe {
+                let (columns, weights) = (
+                    all_columns.as_ptr().add(start),
+                    all_weights.as_ptr().add(start),
+                );
+                // the first edge is to the point itself, whose values are at hand
+                let others = sums(values, columns.add(1), weights.add(1), PAPER_DEGREE - 1);
+                (others, *weights)
+            }
+        } else {
+            let (columns, weights) = a.slices(i..i + 1);
+            // SAFETY: as the caller promises
+            let all = unsafe { sums(values, columns.as_ptr(), weights.as_ptr(), columns.len()) };
+            (all, T::default())
+        };
+        let stay = V::splat(step.along * own_weight + step.stay);
+        for group in 0..GROUPS {
+            let (z, next) = values[group];
+            // SAFETY: as the caller promises
+            let (own, row) = unsafe { (&*z.add(i), &mut *next.add(i)) };
+            // first what does not wait for the sum
+            let mut value = V::zero().plus_product(stay, V::load(own));
+            value = value.plus_product(V::splat(step.back), V::load(row));
+            if group == 0 {
+                // added to all lanes at once, since a single lane would have to wait for the row to reach memory
+                value = value.plus_product(V::splat(seed), V::load(background));
+            }
+            value = value.plus_product(V::splat(step.along), sums[group]);
+            value.or_zero(V::splat(seeds.least)).store(row);
+        }
+    }
+}
+
+/// Weighted sums, for each group, of its z at the `degree` points that `columns` name.
+///
+/// # Safety
+/// `columns` and `weights` are those of a row of the graph, and nobody writes z at these points.
+#[inline(always)]
+unsafe fn sums<T: Real, const WIDTH: usize, V: Vector<T, WIDTH>, const GROUPS: usize>(
+    values: [(*const Lanes<T, WIDTH>, *mut Lanes<T, WIDTH>); GROUPS],
+    columns: *const u32,
+    weights: *const T,
+    degree: usize,
+) -> [V; GROUPS] {
+    // two sums of every other edge each, so that not every edge waits for the one before it
+    let (mut even, mut odd) = ([V::zero(); GROUPS], [V::zero(); GROUPS]);
+    let mut edge = 0;
+    while edge + 1 < degree {
         // SAFETY: as the caller promises
         unsafe {
-            step_rows::<T, WIDTH, BACKGROUND>(a, seeds, step, first, [z, next], rows, lanes);
-            if let Some(second) = second {
-                step_rows::<T, WIDTH, false>(a, seeds, step, second, [z, next], rows, lanes);
-            }
+            add(&mut even, values, *columns.add(edge), *weights.add(edge));
+            add(
+                &mut odd,
+                values,
+                *columns.add(edge + 1),
+                *weights.add(edge + 1),
+            );
         }
-        return;
-    };
-    let sources = [z.source(first), z.source(second)];
-    // SAFETY: as the caller promises; groups differ
-    let (own, other) = unsafe { (z.rows(first, rows), z.rows(second, rows)) };
-    // SAFETY: the same
-    let (one, two) = unsafe { (next.rows_mut(first, rows), next.rows_mut(second, rows)) };
-    let points = one.iter_mut().zip(two).zip(own.iter().zip(other));
-    let points = points.zip(&seeds.background[rows.clone()]);
-    for ((((one, two), own), &seed), (columns, weights)) in points.zip(paper_edges(a, rows)) {
-        let sums = paper_sums(sources, [own.0, own.1], columns, weights);
-        *one = finish::<T, WIDTH, BACKGROUND>(step, &sums[0], own.0, one, seed, lanes, seeds.least);
-        *two = finish::<T, WIDTH, false>(step, &sums[1], own.1, two, seed, lanes, seeds.least);
+        edge += 2;
     }
+    if edge < degree {
+        // SAFETY: as the caller promises
+        unsafe { add(&mut even, values, *columns.add(edge), *weights.add(edge)) };
+    }
+    for group in 0..GROUPS {
+        even[group] = even[group].plus(odd[group]);
+    }
+    even
 }
 
-/// Columns and weights of each of `rows`.
+/// Adds to the sum of each group what comes along one edge.
+///
+/// # Safety
+/// `column` is a point of the graph, and nobody writes z there.
 #[inline(always)]
-fn paper_edges<'a, T: Real>(
-    a: &'a PointGraph<T>,
-    rows: &Range<usize>,
-) -> impl Iterator<Item = (&'a [u32; PAPER_DEGREE], &'a [T; PAPER_DEGREE])> {
-    let (columns, weights) = a.slices(rows.clone());
-    columns.as_chunks().0.iter().zip(weights.as_chunks().0)
-}
-
-/// Weighted sums, for each of `sources`, of the rows that `columns` name, the first of which are their `own`.
-#[inline(always)]
-fn paper_sums<T: Real, const WIDTH: usize, const GROUPS: usize>(
-    sources: [*const [T; WIDTH]; GROUPS],
-    own: [&[T; WIDTH]; GROUPS],
-    columns: &[u32; PAPER_DEGREE],
-    weights: &[T; PAPER_DEGREE],
-) -> [[T; WIDTH]; GROUPS] {
-    // rows of one length begin with the point itself
-    let mut sums = own.map(|values| values.map(|value| weights[0] * value));
-    // in three parts, since the compiler leaves a loop over all edges a loop, which takes a quarter more time
-    for edge in 1..4 {
-        add(&mut sums, sources, columns[edge], weights[edge]);
-    }
-    for edge in 4..8 {
-        add(&mut sums, sources, columns[edge], weights[edge]);
-    }
-    for edge in 8..PAPER_DEGREE {
-        add(&mut sums, sources, columns[edge], weights[edge]);
-    }
-    sums
-}
-
-/// Adds to the sums of some groups what comes along one edge of a row.
-#[inline(always)]
-fn add<T: Real, const WIDTH: usize, const GROUPS: usize>(
-    sums: &mut [[T; WIDTH]; GROUPS],
-    sources: [*const [T; WIDTH]; GROUPS],
+unsafe fn add<T: Real, const WIDTH: usize, V: Vector<T, WIDTH>, const GROUPS: usize>(
+    sums: &mut [V; GROUPS],
+    values: [(*const Lanes<T, WIDTH>, *mut Lanes<T, WIDTH>); GROUPS],
     column: u32,
     weight: T,
 ) {
+    let weight = V::splat(weight);
     for group in 0..GROUPS {
-        // SAFETY: a `PointGraph` has no column beyond its last row, this is an edge of a row that the caller of `sweep`
-        // holds, and nobody writes the rows that such edges come from
-        let values = unsafe { &*sources[group].add(column as usize) };
-        for lane in 0..WIDTH {
-            sums[group][lane] += weight * values[lane];
-        }
+        // SAFETY: as the caller promises
+        let z = unsafe { &*values[group].0.add(column as usize) };
+        sums[group] = sums[group].plus_product(weight, V::load(z));
     }
-}
-
-/// The values of a group at a point after the step; those too small to matter become zero.
-#[inline(always)]
-fn finish<T: Real, const WIDTH: usize, const BACKGROUND: bool>(
-    step: Step<T>,
-    sum: &[T; WIDTH],
-    own: &[T; WIDTH],
-    before: &[T; WIDTH],
-    background: T,
-    lanes: &[T; WIDTH],
-    least: T,
-) -> [T; WIDTH] {
-    let background = step.seeds * background;
-    let mut after = [T::default(); WIDTH];
-    for lane in 0..WIDTH {
-        let mut value = step.along * sum[lane] - step.stay * own[lane] - step.back * before[lane];
-        if BACKGROUND {
-            value += background * lanes[lane];
-        }
-        after[lane] = if value.abs() > least {
-            value
-        } else {
-            T::default()
-        };
-    }
-    after
 }

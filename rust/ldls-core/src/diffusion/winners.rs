@@ -1,5 +1,6 @@
 //! The label that wins at each point, and the points at which single precision cannot decide.
 
+use super::lanes::{WIDTH_F32, WIDTH_F64};
 use super::pass::Pass;
 use super::schedule::ROWS_A_TASK;
 use crate::Result;
@@ -15,30 +16,22 @@ const RANKS: usize = 3;
 /// The best labels of a point so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Best {
-    /// The winner and those behind it; of equal ones the lowest first.
-    pub(super) labels: [u32; RANKS],
-    /// Their values and that of the next one.
+    /// The winner, those behind it and one more; of equal ones the lowest first.
+    pub(super) labels: [u32; RANKS + 1],
+    /// Their values.
     values: [f32; RANKS + 1],
     sum: f32,
 }
 
 impl Best {
     #[inline]
-    fn offer(&mut self, label: u32, value: f32) {
+    fn offer(&mut self, mut label: u32, mut value: f32) {
         self.sum += value;
-        if value <= self.values[RANKS] {
-            return;
-        }
-        let precedes = |rank: usize| {
-            let other = self.values[rank];
-            other > value || (other == value && self.labels[rank] < label)
-        };
-        let rank = (0..RANKS).find(|&rank| !precedes(rank)).unwrap_or(RANKS);
-        self.values.copy_within(rank..RANKS, rank + 1);
-        self.values[rank] = value;
-        if rank < RANKS {
-            self.labels.copy_within(rank..RANKS - 1, rank + 1);
-            self.labels[rank] = label;
+        for (other, best) in self.labels.iter_mut().zip(&mut self.values) {
+            if value > *best || (value == *best && label < *other) {
+                std::mem::swap(other, &mut label);
+                std::mem::swap(best, &mut value);
+            }
         }
     }
 
@@ -58,19 +51,21 @@ impl Best {
 }
 
 /// Offers the values of a pass to the best labels of all points.
-pub(super) fn update<const WIDTH: usize>(best: &mut [Best], pass: &Pass<f32, WIDTH>) {
+pub(super) fn update(best: &mut [Best], pass: &Pass<f32, WIDTH_F32>) {
+    let groups: Vec<_> = pass.groups().collect();
     let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
-    points.for_each(|(i, best)| {
-        for (values, labels) in pass.groups() {
-            // most points have values of few groups
-            if values[i] != [0.0; WIDTH] {
-                for (label, &value) in labels.iter().zip(&values[i]) {
-                    if let Some(label) = *label {
-                        best.offer(label, value);
-                    }
+    points.for_each(|(i, of_point)| {
+        let mut best = *of_point;
+        for (values, labels) in &groups {
+            // few labels reach a point
+            let of_lanes = labels.iter().zip(values[i].iter());
+            for (label, &value) in of_lanes.filter(|&(_, value)| *value != 0.0) {
+                if let Some(label) = *label {
+                    best.offer(label, value);
                 }
             }
         }
+        *of_point = best;
     });
 }
 
@@ -105,11 +100,7 @@ pub(super) fn candidates(
 }
 
 /// Keeps in `refined` the best label of each of `points` and its value.
-pub(super) fn refine<const WIDTH: usize>(
-    points: &[u32],
-    refined: &mut [(u32, f64)],
-    pass: &Pass<f64, WIDTH>,
-) {
+pub(super) fn refine(points: &[u32], refined: &mut [(u32, f64)], pass: &Pass<f64, WIDTH_F64>) {
     for (&point, best) in points.iter().zip(refined) {
         for (label, group, lane) in pass.labels() {
             let value = group[point as usize][lane];
@@ -142,7 +133,7 @@ mod tests {
             [(0, 0.5), (3, 0.5), (7, 0.25)],
             [(7, 0.25), (3, 0.5), (0, 0.5)],
         ] {
-            assert_eq!(best(&values).labels, [0, 3, 7]);
+            assert_eq!(best(&values).labels[..3], [0, 3, 7]);
         }
     }
 
