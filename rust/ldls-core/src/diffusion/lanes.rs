@@ -109,6 +109,10 @@ impl<T: Real, const WIDTH: usize> Vector<T, WIDTH> for Lanes<T, WIDTH> {
     }
 }
 
+/// Registers of AVX2.
+///
+/// SAFETY: only what runs on processors with AVX2 and fused multiply-add asks for them, and lanes lie where they may be loaded
+/// from and stored to.
 #[cfg(target_arch = "x86_64")]
 mod registers {
     use super::{Lane, Lanes, Vector, WIDTH_F32, WIDTH_F64};
@@ -125,41 +129,46 @@ mod registers {
                 type Register = $register;
             }
 
-            // SAFETY of all that follows: only what runs on processors with AVX2 and fused multiply-add asks for registers,
-            // and lanes lie where these may be loaded from
             impl Vector<$number, $width> for $register {
                 #[inline(always)]
                 fn zero() -> Self {
+                    // SAFETY: as the module says
                     unsafe { $zero() }
                 }
 
                 #[inline(always)]
                 fn splat(value: $number) -> Self {
+                    // SAFETY: as the module says
                     unsafe { $splat(value) }
                 }
 
                 #[inline(always)]
                 fn load(values: &Lanes<$number, $width>) -> Self {
+                    // SAFETY: as the module says
                     unsafe { $load(values.as_ptr()) }
                 }
 
                 #[inline(always)]
                 fn store(self, values: &mut Lanes<$number, $width>) {
+                    // SAFETY: as the module says
                     unsafe { $store(values.as_mut_ptr(), self) }
                 }
 
                 #[inline(always)]
                 fn plus(self, other: Self) -> Self {
+                    // SAFETY: as the module says
                     unsafe { $add(self, other) }
                 }
 
                 #[inline(always)]
                 fn plus_product(self, one: Self, other: Self) -> Self {
+                    // SAFETY: as the module says
                     unsafe { $add_product(one, other, self) }
                 }
 
                 #[inline(always)]
                 fn or_zero(self, least: Self) -> Self {
+                    // SAFETY: as the module says
                     unsafe {
                         let magnitude = $and_not($splat(-0.0), self);
                         $and(self, $compare::<_CMP_GT_OQ>(magnitude, least))

@@ -30,7 +30,6 @@ use self::reach::Reach;
 use self::schedule::Schedule;
 use self::seeds::{Seeds, plan};
 use self::series::Series;
-use self::sweep::Step;
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
@@ -99,7 +98,7 @@ pub fn diffuse(
             a,
             &contested,
             &candidates,
-            series,
+            series.as_ref(),
             iterations,
             exact,
             cancel,
@@ -122,19 +121,16 @@ fn decide(
     a: &PointGraph,
     points: &[u32],
     candidates: &[u32],
-    series: Option<Series>,
+    series: Option<&Series>,
     iterations: Option<usize>,
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     if let Some(products) = iterations {
-        let (first, steps) = series.map_or_else(
-            || (1.0, vec![Step::product(); products.saturating_sub(1)]),
-            |series| (series.coefficients[series.degree()], series.steps()),
-        );
-        if let Some(reach) = Reach::of(a, points, steps.len(), cancel)? {
+        let steps = series.map_or(products.saturating_sub(1), Series::degree);
+        if let Some(reach) = Reach::of(a, points, steps, cancel)? {
             let (a, b) = exact(Some(&reach.points))?;
-            return reach.winners((&a, &b), candidates, (first, &steps), cancel);
+            return reach.winners((&a, &b), candidates, (series, products), cancel);
         }
     }
     let (a, b) = exact(None)?;

@@ -4,20 +4,19 @@
 //! from matter, before the one before it those two edges away, and so on: a tenth of a frame on average.
 
 use super::lanes::WIDTH_F64;
-use super::sweep::Step;
+use super::pass::Pass;
+use super::schedule::Schedule;
+use super::seeds::{Seeds, plan};
+use super::series::Series;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{filled, push, zeros};
-use crate::{Cancel, Error, Result};
-use multiversion::multiversion;
-use rayon::prelude::*;
+use crate::memory::{filled, push};
+use crate::{Cancel, Result};
 
 /// Share of the work of diffusing the whole graph from which on that is done instead.
 const MOST_WORK: f64 = 0.5;
 /// Share of the largest value within which values are equal: what rounding leaves of equal ones.
 const EQUAL: f64 = 1e-13;
-/// Rows handled by one task of the thread pool.
-const ROWS_A_TASK: usize = 1024;
 
 /// What some points may have labels from.
 #[derive(Debug)]
@@ -69,88 +68,38 @@ impl Reach {
         Ok(Some(Self { points, ends }))
     }
 
-    /// Which of `labels`, ascending, wins at each of the points themselves, of equal ones the lowest, after `steps` from
-    /// `first` times the seeds. `a` and `b` are of `self.points`, in this order; rows of the outermost do not matter.
+    /// Which of `labels` wins at each of the points themselves, of equal ones the lowest, after `iterations` products or by
+    /// the `series` that stands for them. `a` and `b` are of `self.points`, in this order; rows of the outermost do not matter.
     pub(super) fn winners(
         &self,
         (a, b): (&PointGraph<f64>, &PixelLabels<f64>),
         labels: &[u32],
-        (first, steps): (f64, &[Step<f64>]),
+        (series, iterations): (Option<&Series>, usize),
         cancel: &Cancel,
     ) -> Result<Vec<u32>> {
-        let groups = labels.chunks(WIDTH_F64);
-        let values = groups.map(|labels| self.values(a, b, labels, (first, steps), cancel));
-        let values = values.collect::<Result<Vec<_>>>()?;
-        let winner = |at: usize| {
-            let of_labels = || values.iter().flat_map(|group| group[at]).zip(labels);
-            let best = of_labels().fold(0.0, |best: f64, (value, _)| best.max(value));
-            let mut winners = of_labels().filter(|(value, _)| *value >= best * (1.0 - EQUAL));
-            winners.next().map_or(0, |(_, &label)| label)
-        };
-        Ok((0..self.ends[0]).map(winner).collect())
-    }
-
-    /// Likelihoods of a group of labels at the points themselves.
-    fn values(
-        &self,
-        a: &PointGraph<f64>,
-        b: &PixelLabels<f64>,
-        labels: &[u32],
-        (first, steps): (f64, &[Step<f64>]),
-        cancel: &Cancel,
-    ) -> Result<Vec<[f64; WIDTH_F64]>> {
-        let mut seeds: Vec<[f64; WIDTH_F64]> = zeros(self.ends[steps.len()], cancel)?;
-        for (at, seeds) in seeds.iter_mut().enumerate() {
-            for (label, weight) in b.row(at) {
-                if let Some(lane) = labels.iter().position(|&own| own as usize == label) {
-                    seeds[lane] = weight;
+        let steps = self.ends.len() - 2;
+        let schedule = Schedule::narrowing(a, self.ends[..steps].iter().rev().copied(), cancel)?;
+        let mut found = vec![Vec::new(); self.ends[0]];
+        for lanes in plan(b, labels, WIDTH_F64, false) {
+            let seeds = Seeds::new(b, lanes, cancel)?;
+            let pass: Pass<f64, WIDTH_F64> =
+                Pass::run(a, &schedule, &seeds, series, Some(iterations), cancel)?;
+            for (label, group, lane) in pass.labels() {
+                for (of_point, values) in found.iter_mut().zip(group) {
+                    of_point.push((label, values[lane]));
                 }
             }
         }
-        let [mut values, mut next] = [zeros(seeds.len(), cancel)?, zeros(seeds.len(), cancel)?];
-        for (value, seed) in values.iter_mut().zip(&seeds) {
-            *value = seed.map(|seed| first * seed);
-        }
-        for (step, &end) in steps.iter().zip(self.ends[..steps.len()].iter().rev()) {
-            let tasks = next[..end].par_chunks_mut(ROWS_A_TASK).enumerate();
-            tasks.try_for_each(|(task, next)| {
-                cancel.check()?;
-                take_step(a, *step, &seeds, &values, task * ROWS_A_TASK, next);
-                Ok::<(), Error>(())
-            })?;
-            std::mem::swap(&mut values, &mut next);
-        }
-        values.truncate(self.ends[0]);
-        Ok(values)
-    }
-}
-
-/// Takes `step` with the rows from `start` on, whose values before the last step are in `next`.
-#[multiversion(targets("x86_64+avx2"))]
-fn take_step(
-    a: &PointGraph<f64>,
-    step: Step<f64>,
-    seeds: &[[f64; WIDTH_F64]],
-    values: &[[f64; WIDTH_F64]],
-    start: usize,
-    next: &mut [[f64; WIDTH_F64]],
-) {
-    let points = next.iter_mut().zip(&seeds[start..]).zip(&values[start..]);
-    for (at, ((next, seeds), own)) in (start..).zip(points) {
-        let (columns, weights) = a.slices(at..at + 1);
-        let mut sum = [0.0; WIDTH_F64];
-        for (&column, &weight) in columns.iter().zip(weights) {
-            let values = &values[column as usize];
-            for lane in 0..WIDTH_F64 {
-                sum[lane] += weight * values[lane];
-            }
-        }
-        for lane in 0..WIDTH_F64 {
-            next[lane] = step.seeds * seeds[lane]
-                + step.along * sum[lane]
-                + step.stay * own[lane]
-                + step.back * next[lane];
-        }
+        let winner = |of_point: &Vec<(u32, f64)>| {
+            let best = of_point
+                .iter()
+                .fold(0.0, |best: f64, (_, value)| best.max(*value));
+            let equal = of_point
+                .iter()
+                .filter(|(_, value)| *value >= best * (1.0 - EQUAL));
+            equal.map(|(label, _)| *label).min().unwrap_or(0)
+        };
+        Ok(found.iter().map(winner).collect())
     }
 }
 
@@ -198,8 +147,7 @@ mod tests {
             let reach = Reach::of(&chain(600), from, products - 1, Cancel::never());
             let reach = reach.unwrap().unwrap();
             let near = (&a.among(&reach.points), &b.among(&reach.points));
-            let steps = vec![Step::product(); products - 1];
-            let found = reach.winners(near, &[0, 1, 2, 3], (1.0, &steps), Cancel::never());
+            let found = reach.winners(near, &[0, 1, 2, 3], (None, products), Cancel::never());
             found.unwrap()
         };
         // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5

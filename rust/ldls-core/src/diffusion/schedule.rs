@@ -50,6 +50,28 @@ impl Schedule {
         Self::in_regions(a, REGION, cancel)
     }
 
+    /// One step after the other, in which fewer and fewer rows take part: in each the first ones, as many as `rows` says of it.
+    pub(super) fn narrowing<T: Real>(
+        a: &PointGraph<T>,
+        rows: impl ExactSizeIterator<Item = usize>,
+        cancel: &Cancel,
+    ) -> Result<Self> {
+        let (target_offsets, targets) = targets(a, cancel)?;
+        let (round, mut order, mut offsets) = (rows.len().max(1), Vec::new(), vec![0]);
+        for rows in rows {
+            (0..rows.div_ceil(TILE)).try_for_each(|tile| push(&mut order, tile as u32))?;
+            offsets.push(order.len());
+        }
+        Ok(Self {
+            rows: a.len(),
+            target_offsets,
+            targets,
+            round,
+            order,
+            offsets,
+        })
+    }
+
     /// Regions of `size` tiles each.
     fn in_regions<T: Real>(a: &PointGraph<T>, size: usize, cancel: &Cancel) -> Result<Self> {
         let (target_offsets, targets) = targets(a, cancel)?;
