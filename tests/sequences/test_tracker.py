@@ -128,26 +128,42 @@ def test_two_who_meet_do_not_swap():
     assert rows[0, 0] != rows[0, 1]
 
 
+LEFT, RIGHT = (0, 1), (3, 4)
+
+
+def car_at(k, y, *shown, ends_m=(0.6, 1.2)):
+    """A sweep of a car 3 m long and `y` m to the left, in five parts, and of masks of some of them each."""
+    near, far = ends_m
+    whole = sweep_at(0.1 * k, [((8, y + part), True) for part in (-far, -near, 0, near, far)])
+    pixels = whole.views[0].masks.to_array()
+    masks = np.array([pixels[list(parts)].any(axis=0) for parts in shown])
+    return replace(whole, views=[ldls.View(ldls.InstanceMasks.from_array(masks, categories=[1] * len(shown)), WIDE)])
+
+
 @pytest.mark.parametrize("ends_m", [(0.6, 1.2), (1.8, 2.4)], ids=["a car", "two cars"])
 def test_tracks_of_one_object_are_joined(ends_m):
-    """A car 3 m long, of which the masks of the first sweeps show the two ends as two objects."""
+    """The masks of the first sweeps show the two ends of a car as two objects."""
 
-    def sweep(k, *ends):
-        near, far = ends_m
-        parts = [(8, y) for y in (-far, -near, 0, near, far)]
-        whole = sweep_at(0.1 * k, [(part, True) for part in parts])
-        pixels = whole.views[0].masks.to_array()
-        masks = np.array([pixels[list(end)].any(axis=0) for end in ends])
-        return replace(whole, views=[ldls.View(ldls.InstanceMasks.from_array(masks, categories=[1] * len(ends)), WIDE)])
+    def sweep(k, *shown):
+        return car_at(k, 0, *shown, ends_m=ends_m)
 
-    left, right = (0, 1), (3, 4)
-    sweeps = [sweep(0, left), sweep(1, left, right), sweep(2, left, right)]
+    sweeps = [sweep(0, LEFT), sweep(1, LEFT, RIGHT), sweep(2, LEFT, RIGHT)]
     one = ends_m == (0.6, 1.2)
-    sweeps += [sweep(3, (*left, 2, *right)) if one else sweep(3, left)]
-    rows = tracks_of(ldls.Tracker(), [*sweeps, sweep(4, right), sweep(5, left)])
+    sweeps += [sweep(3, (*LEFT, 2, *RIGHT)) if one else sweep(3, LEFT)]
+    rows = tracks_of(ldls.Tracker(), [*sweeps, sweep(4, RIGHT), sweep(5, LEFT)])
     assert [rows[2][0], rows[2][4]] == [1, 2]
     assert rows[4][4] == (1 if one else 2)
     assert rows[5][0] == 1
+
+
+def test_tracks_joined_within_a_window_have_one_number_in_all_of_it():
+    """A car passes too fast to have one label; an end of it is seen alone, then all of it."""
+    shown = {0: [LEFT], **dict.fromkeys((1, 2, 3), (LEFT, RIGHT)), 4: [RIGHT], 8: [(*LEFT, 2, *RIGHT)]}
+    sweeps = [car_at(k, k - 6, *parts) for k, parts in shown.items()]
+    tracker = ldls.Tracker()
+    alone, together = tracks_of(tracker, sweeps[:4]), tracks_of(tracker, sweeps[4:], together=2)
+    assert alone[3] == [1, 1, 1, 2, 2]
+    assert together == [[0, 0, 0, 1, 1], [1] * 5]
 
 
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():

@@ -164,6 +164,8 @@ class Tracker:
             for double in doubles:
                 ended.add(double)
                 self._moments = [moment.renumbered(double.number, one.number) for moment in self._moments]
+                # an earlier label of these sweeps may have it
+                double.number = one.number
         self._tracks = [track for track in self._tracks if track not in ended]
         return joined
 
