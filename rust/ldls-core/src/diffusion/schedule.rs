@@ -212,8 +212,11 @@ fn targets<T: Real>(a: &PointGraph<T>, cancel: &Cancel) -> Result<(Vec<u32>, Vec
     let parts: Vec<(Vec<u32>, Vec<usize>)> = tasks.map(of_task).collect::<Result<_>>()?;
     // turned round
     let mut offsets: Vec<u32> = zeros(count + 1, cancel)?;
-    for source in parts.iter().flat_map(|(sources, _)| sources) {
-        offsets[*source as usize + 1] += 1;
+    for (sources, _) in &parts {
+        cancel.check()?;
+        for &source in sources {
+            offsets[source as usize + 1] += 1;
+        }
     }
     for block in 0..count {
         offsets[block + 1] += offsets[block];
