@@ -56,6 +56,7 @@ pub(super) trait Vector<T, const WIDTH: usize>: Copy {
     fn load(values: &Lanes<T, WIDTH>) -> Self;
     fn store(self, values: &mut Lanes<T, WIDTH>);
     fn plus(self, other: Self) -> Self;
+    /// `one` times `other` added, rounded once or twice.
     fn plus_product(self, one: Self, other: Self) -> Self;
     /// Zero for what is not larger in magnitude than `least`.
     fn or_zero(self, least: Self) -> Self;

@@ -50,7 +50,8 @@ impl Schedule {
         Self::in_regions(a, REGION, cancel)
     }
 
-    /// One step after the other, in which fewer and fewer rows take part: in each the first ones, as many as `rows` says of it.
+    /// One step after the other, in which fewer and fewer rows take part: in each the first ones, as many as `rows` says of it,
+    /// and the rest of their last tile, whose values then are not those of its steps.
     pub(super) fn narrowing<T: Real>(
         a: &PointGraph<T>,
         rows: impl ExactSizeIterator<Item = usize>,
@@ -155,8 +156,8 @@ impl Schedule {
 
     /// Calls `work(rows, step)` for steps 0 to `steps` - 1 of every tile of rows, on all threads of the pool.
     ///
-    /// At that time every tile next to it has taken steps 0 to `step` - 1, none has begun with `step` + 1, and what
-    /// was written for those is visible.
+    /// At that time every tile next to it that takes part has taken steps 0 to `step` - 1, none has begun with `step` + 1, and
+    /// what was written for those is visible.
     ///
     /// # Errors
     /// [`Error::Cancelled`]: some tiles have taken fewer steps then.

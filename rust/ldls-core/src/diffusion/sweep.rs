@@ -58,8 +58,9 @@ pub(super) fn take_steps<T: Lane<WIDTH>, const WIDTH: usize>(
     let values = values.map(SharedValues::new);
     schedule.run(steps.len(), cancel, |rows, step| {
         let from_to = [&values[step % 2], &values[(step + 1) % 2]];
-        // SAFETY: nobody else is in these rows, and what they have edges from lies in them or in tiles next to them,
-        // which neither are behind `step`, so have its z, nor ahead of the step after it, so have not lost it
+        // SAFETY: nobody else is in these rows, and what they have edges from lies in them, in tiles next to them, which
+        // neither are behind `step`, so have its z, nor ahead of the step after it, so have not lost it, or in rows that
+        // take no more steps, which nobody writes
         unsafe { sweep(a, seeds, steps[step], activity, from_to, rows) }
     })
 }
@@ -198,6 +199,7 @@ unsafe fn step_rows<T, const WIDTH: usize, V, const GROUPS: usize>(
     let (all_columns, all_weights) = a.slices(0..a.len());
     for (i, &seed) in rows.clone().zip(&seeds.background[rows.clone()]) {
         let (sums, own_weight): ([V; GROUPS], T) = if uniform {
+            // a number of edges known beforehand leaves no loop over them
             let start = i * PAPER_DEGREE;
             // SAFETY: as the caller promises; all rows are of this length
             unsafe {
