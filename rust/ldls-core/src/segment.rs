@@ -100,12 +100,11 @@ pub fn segment(
         normalize(nearest, pixel_labels, heights, params, cancel)
     })?;
     let exact = |among: Option<&[u32]>| {
+        let pixels = b.counted(among, |row| a.own_weight(row), params.pixel_weight, cancel)?;
         let Some(places) = among else {
-            let pixels = scene.pixel_labels(order, params, cancel)?;
             return normalize(nearest, pixels, heights, params, cancel);
         };
         let nearest = nearest.among(places, cancel)?;
-        let pixels = scene.pixel_labels(&nearest.order, params, cancel)?;
         let heights = arrange(places, heights, cancel)?;
         normalize(&nearest, pixels, &heights, params, cancel)
     };

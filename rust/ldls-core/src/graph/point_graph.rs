@@ -266,6 +266,12 @@ impl<T: Real> PointGraph<T> {
         }
     }
 
+    /// Weight of the first edge of row `i`, which in the graph of a cloud is to the point itself: by how much normalising
+    /// has multiplied the row.
+    pub(crate) fn own_weight(&self, i: usize) -> T {
+        self.slices(i..i + 1).1[0]
+    }
+
     /// Columns and weights of row `i`.
     #[inline]
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, T)> {

@@ -1,13 +1,13 @@
 //! The weights b that the pixels around points give them (method, steps 2 and 4).
 
 use super::label_image::{LabelImage, WindowCounts};
-use crate::memory::with_room;
+use crate::memory::{push, with_room};
 use crate::projection::nearest_pixel;
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
 
 /// Points handled by one task of the thread pool.
-const POINTS_A_TASK: usize = 2048;
+const POINTS_A_TASK: usize = 512;
 
 /// The pixel edges of every point, added up by label: row i holds the labels found in the window of point i and the
 /// sum of the weights of the edges that end in each. A pixel under several masks counts for each of them.
@@ -89,6 +89,40 @@ impl LabelImage {
                 problem,
             }
         })
+    }
+}
+
+impl PixelLabels {
+    /// The rows of `points`, or all, in double precision as they were before each was multiplied by its `scale`: single
+    /// precision still tells how many pixels of `pixel_weight` each had.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`] and [`Error::Cancelled`].
+    pub(crate) fn counted(
+        &self,
+        points: Option<&[u32]>,
+        scale: impl Fn(usize) -> f32,
+        pixel_weight: f64,
+        cancel: &Cancel,
+    ) -> Result<PixelLabels<f64>> {
+        let count = points.map_or(self.rows(), <[_]>::len);
+        let mut all = PixelLabels::with_room(count)?;
+        for at in 0..count {
+            if at % POINTS_A_TASK == 0 {
+                cancel.check()?;
+            }
+            let point = points.map_or(at, |points| points[at] as usize);
+            let pixel = f64::from(scale(point)) * pixel_weight;
+            let counted = |weight: f32| pixel_weight * (f64::from(weight) / pixel).round();
+            let row = self.offsets[point]..self.offsets[point + 1];
+            for (&label, &weight) in self.labels[row.clone()].iter().zip(&self.weights[row]) {
+                push(&mut all.labels, label)?;
+                push(&mut all.weights, counted(weight))?;
+            }
+            all.mass.push(counted(self.mass[point]));
+            all.offsets.push(all.labels.len());
+        }
+        Ok(all)
     }
 }
 
@@ -255,6 +289,38 @@ mod tests {
             (labels.mass[0], labels.row(0).collect::<Vec<_>>()),
             (9.0, vec![(1, 9.0)])
         );
+    }
+
+    #[test]
+    fn rows_in_double_precision_are_those_of_the_pixels() {
+        let stripes = (0..63).map(|at| at % 9 < 4).collect();
+        let image = painted(7, 9, &[stripes, vec![true; 63]]);
+        let uv: Vec<[f64; 2]> = (0..63)
+            .map(|at| [f64::from(at % 9), f64::from(at / 9)])
+            .collect();
+        for weight in [0.001, 0.7, 1e6] {
+            let mut labels = image
+                .pixel_labels::<f32>(&uv, 5, weight, |_, _| true, Cancel::never())
+                .unwrap();
+            let expected: PixelLabels<f64> = image
+                .pixel_labels(&uv, 5, weight, |_, _| true, Cancel::never())
+                .unwrap();
+            // as rows are normalised
+            let scales: Vec<f32> = (1..=63).map(|i| 1.0 / (1.7 * i as f32)).collect();
+            for (i, scale) in scales.iter().enumerate() {
+                let row = labels.offsets[i]..labels.offsets[i + 1];
+                labels.weights[row]
+                    .iter_mut()
+                    .for_each(|weight| *weight *= scale);
+                labels.mass[i] *= scale;
+            }
+            let counted = |points: Option<&[u32]>| {
+                let all = labels.counted(points, |i| scales[i], weight, Cancel::never());
+                all.unwrap()
+            };
+            assert_eq!(counted(None), expected);
+            assert_eq!(counted(Some(&[40, 3])), expected.among(&[40, 3]));
+        }
     }
 
     proptest! {

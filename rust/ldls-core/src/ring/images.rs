@@ -11,7 +11,7 @@ use crate::masks::{LabelImage, PixelLabels};
 use crate::memory::{collect, filled, push, tabulate, with_room};
 use crate::neighbors::arrange;
 use crate::projection::{Cloud, InView, Sighting, project};
-use crate::{Cancel, Params, Real, Result};
+use crate::{Cancel, Params, Result};
 use rayon::prelude::*;
 
 /// Fewest points for a task of the thread pool.
@@ -202,12 +202,12 @@ impl<'a> Images<'a> {
     }
 
     /// The pixel edges of the points in view, in `order`.
-    pub(crate) fn pixel_labels<T: Real>(
+    pub(crate) fn pixel_labels(
         &self,
         order: &[u32],
         params: &Params,
         cancel: &Cancel,
-    ) -> Result<PixelLabels<T>> {
+    ) -> Result<PixelLabels> {
         let parts = self.painted.iter().enumerate().map(|(image, painted)| {
             cancel.check()?;
             let mut seen = with_room(self.sightings[image].seen.len())?;
@@ -230,21 +230,21 @@ impl<'a> Images<'a> {
     }
 
     /// Rows of all images that see a point added up, their instances named by the objects they show.
-    fn together<T: Real>(
+    fn together(
         &self,
         order: &[u32],
-        parts: &[PixelLabels<T>],
+        parts: &[PixelLabels],
         cancel: &Cancel,
-    ) -> Result<PixelLabels<T>> {
+    ) -> Result<PixelLabels> {
         let mut next = vec![0; parts.len()];
         let mut all = PixelLabels::with_room(order.len())?;
-        let mut row: Vec<(u32, T)> = Vec::new();
+        let mut row: Vec<(u32, f32)> = Vec::new();
         for (at, &point) in order.iter().enumerate() {
             if at % POINTS_A_TASK == 0 {
                 cancel.check()?;
             }
             row.clear();
-            let mut mass = T::default();
+            let mut mass = 0.0;
             for (image, part) in parts.iter().enumerate() {
                 if self.slots[image].of(point).is_none() {
                     continue;
