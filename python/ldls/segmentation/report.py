@@ -18,7 +18,7 @@ class Report:
         n_outside: Points in front of the camera but beside the image.
         n_duplicates: Points of the graph that share their place with another of them.
         k_effective: Neighbours that each point has: K, or one less than the points of the graph.
-        n_refined: Points at which two labels were so near that double precision had to decide.
+        n_refined: Points at which two labels were too near to one another for single precision.
         sweeps: Sweeps over the graph that were computed; a series saves most of the products.
         residual: Largest change of any likelihood that one more product would make; None where the number of
             iterations was given.

@@ -18,6 +18,43 @@ const ROUNDING: f64 = 1e-9;
 /// Share of the largest seed below which a likelihood is nothing.
 const NEGLIGIBLE: f64 = 1e-9;
 
+/// The edges of points.
+enum Graph {
+    /// Those of the nearest neighbours of a cloud.
+    Cloud {
+        points: Vec<[f64; 3]>,
+        neighbors: Neighbors,
+        sigma: f64,
+    },
+    Any(Csr),
+}
+
+impl Graph {
+    fn points(&self) -> usize {
+        match self {
+            Self::Cloud { points, .. } => points.len(),
+            Self::Any(edges) => edges.offsets.len() - 1,
+        }
+    }
+
+    fn weighted<T: Real>(&self) -> PointGraph<T> {
+        match self {
+            Self::Cloud {
+                points,
+                neighbors,
+                sigma,
+            } => PointGraph::from_neighbors(points, neighbors, *sigma, Cancel::never())
+                .expect("neighbours of these points"),
+            Self::Any(edges) => PointGraph::from_csr(
+                edges.offsets.clone(),
+                edges.columns.clone(),
+                edges.weights.iter().copied().map(T::from_f64).collect(),
+            )
+            .expect("it is a square matrix"),
+        }
+    }
+}
+
 /// The arrays of a sparse matrix.
 struct Csr {
     offsets: Vec<usize>,
@@ -35,10 +72,10 @@ pub fn diffusion(data: &[u8]) -> Outcome {
     let graph = if of_cloud {
         cloud_graph(&mut bytes)
     } else {
-        any_graph(&mut bytes)
+        Graph::Any(any_graph(&mut bytes))
     };
     let n_labels = 1 + [bytes.below(3), bytes.below(9), bytes.below(40)][bytes.below(3)];
-    let (labels, mass) = random_labels(&mut bytes, graph.offsets.len() - 1, n_labels);
+    let (labels, mass) = random_labels(&mut bytes, graph.points(), n_labels);
     let iterations = [Some(1 + bytes.below(12)), Some(1 + bytes.below(300)), None][bytes.below(3)];
     let (a, b) = system::<f32>(&graph, &labels, &mass);
 
@@ -96,7 +133,7 @@ pub fn diffusion(data: &[u8]) -> Outcome {
 
 /// Holds the label of each point against plain products over the same graph in double precision.
 fn check_winners(
-    graph: &Csr,
+    graph: &Graph,
     (labels, mass): (&Csr, &[f64]),
     (a, b): (&PointGraph, &PixelLabels),
     n_labels: usize,
@@ -187,15 +224,10 @@ fn plain_product<T: Real>(
 }
 
 /// A and b from the weights of edges, rows that sum to 1 together.
-fn system<T: Real>(graph: &Csr, labels: &Csr, mass: &[f64]) -> (PointGraph<T>, PixelLabels<T>) {
+fn system<T: Real>(graph: &Graph, labels: &Csr, mass: &[f64]) -> (PointGraph<T>, PixelLabels<T>) {
     let of =
         |values: &[f64]| -> Vec<T> { values.iter().map(|&value| T::from_f64(value)).collect() };
-    let mut a = PointGraph::from_csr(
-        graph.offsets.clone(),
-        graph.columns.clone(),
-        of(&graph.weights),
-    )
-    .expect("it is a square matrix");
+    let mut a = graph.weighted();
     let mut b = PixelLabels::from_csr(
         labels.offsets.clone(),
         labels.columns.clone(),
@@ -209,28 +241,16 @@ fn system<T: Real>(graph: &Csr, labels: &Csr, mass: &[f64]) -> (PointGraph<T>, P
 }
 
 /// The graph of a cloud's nearest neighbours.
-fn cloud_graph(bytes: &mut Bytes<'_>) -> Csr {
+fn cloud_graph(bytes: &mut Bytes<'_>) -> Graph {
     let mut points = random_cloud(bytes);
     points.truncate(200);
     let sigma = 10_f64.powf(bytes.between(-2.0, 2.0));
-    let neighbors =
-        Neighbors::search(&points, 1 + bytes.below(12), Cancel::never()).expect("memory");
-    let squared = neighbors
-        .squared_distances(&points, Cancel::never())
-        .expect("memory");
-    let (mut columns, mut weights) = (Vec::new(), Vec::new());
-    for i in 0..points.len() {
-        let row = i * neighbors.k..(i + 1) * neighbors.k;
-        columns.push(i as u32);
-        weights.push(1.0);
-        columns.extend(&neighbors.indices[row.clone()]);
-        weights.extend(squared[row].iter().map(|d| (-d / sigma).exp()));
-    }
-    let offsets = (0..=points.len()).map(|i| i * (neighbors.k + 1)).collect();
-    Csr {
-        offsets,
-        columns,
-        weights,
+    let k = [10, 1 + bytes.below(12)][bytes.below(2)];
+    let neighbors = Neighbors::search(&points, k, Cancel::never()).expect("memory");
+    Graph::Cloud {
+        points,
+        neighbors,
+        sigma,
     }
 }
 

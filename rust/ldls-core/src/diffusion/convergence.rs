@@ -14,7 +14,7 @@ pub struct Convergence {
     pub residual: Option<f64>,
     /// Estimate of the largest error of a likelihood from the terms that the series leaves out.
     pub error: f64,
-    /// Points whose label was decided in double precision.
+    /// Points at which labels were too near to one another for single precision.
     pub refined: usize,
 }
 

@@ -2,13 +2,14 @@
 //!
 //! The products are not run one by one: their result is a polynomial of A times b, which a Chebyshev series
 //! reaches with a third of the sweeps, in single precision. Both leave an error, which is estimated; where two
-//! labels are nearer to one another than that, the point is decided in double precision: by the part of the graph that
-//! flows to it, or where that is much, by diffusing such labels again. Where the graph is such that the series cannot be
-//! trusted, the products are run as they stand.
+//! labels are nearer to one another than that and not the same, the point is decided in double precision: by the part of
+//! the graph that flows to it, or where that is much, by diffusing such labels again. Where the graph is such that no series
+//! can be trusted, the products are run as they stand.
 
 mod convergence;
 mod errors;
 mod lanes;
+mod near_ties;
 mod pass;
 mod phases;
 mod products;
@@ -24,16 +25,15 @@ pub use convergence::Convergence;
 pub use products::Products;
 
 use self::errors::Errors;
-use self::lanes::{Lane, WIDTH_F32, WIDTH_F64};
+use self::lanes::{Lane, WIDTH_F32};
 use self::pass::Pass;
-use self::reach::Reach;
 use self::schedule::Schedule;
 use self::seeds::{Seeds, plan};
 use self::series::Series;
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect, filled, tabulate, zeros};
+use crate::memory::{filled, tabulate, zeros};
 use crate::{Cancel, Result};
 
 /// Share of the largest likelihood that a series in single precision may leave out.
@@ -70,77 +70,36 @@ pub fn diffuse(
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let (mut best, mut probed) = (Vec::new(), Vec::new());
+    let (mut best, mut probed, mut error) = (Vec::new(), Vec::new(), 0.0);
     let choose = |pass: &Pass<f32, WIDTH_F32>| {
         if best.is_empty() {
             // not before, since a pass takes the most memory while it runs
             best = filled(Best::default(), a.len(), cancel)?;
         }
-        winners::update(&mut best, pass);
+        error = pass.convergence.error.max(error);
+        winners::update(&mut best, pass, error);
         if let Some(errors) = pass.errors(cancel)? {
             probed = errors;
         }
         Ok(())
     };
     let mut convergence = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
-    let errors = Errors { a, probed };
-    let error = |point: u32| errors.at(point as usize);
-    // the largest error of all points leaves few to be looked at more closely
-    let mut contested = winners::contested(&best, convergence.error)?;
-    contested.retain(|&point| best[point as usize].may_win(1, error(point)));
-    if !contested.is_empty() {
-        let candidates = winners::candidates(&best, &contested, n_labels, error);
-        // where the series of single precision was given up, that of double precision is no better
-        let held = iterations.is_some_and(|products| convergence.sweeps < products);
-        let series = held.then(|| Series::of_graph(a, iterations, TOLERANCE_F64));
-        let series = series.flatten();
-        let labels = decide(
-            a,
-            &contested,
-            &candidates,
-            series.as_ref(),
-            iterations,
-            exact,
-            cancel,
-        )?;
-        for (&point, label) in contested.iter().zip(labels) {
-            best[point as usize].labels[0] = label;
-        }
-        convergence.refined = contested.len();
-    }
+    // where the series of single precision was given up, that of double precision is no better
+    let held = iterations.is_some_and(|products| convergence.sweeps < products);
+    convergence.refined = near_ties::decide(
+        (a, b),
+        &mut best,
+        (&Errors { a, probed }, convergence.error),
+        n_labels,
+        (iterations, held),
+        exact,
+        cancel,
+    )?;
     Ok(Diffused {
         labels: tabulate(best.len(), |i| best[i].labels[0], cancel)?,
         confidence: tabulate(best.len(), |i| best[i].confidence(), cancel)?,
         convergence,
     })
-}
-
-/// Which of `candidates`, ascending, wins at each of `points`, in double precision: by the part of the graph that flows to
-/// them, or where that is much, by diffusing the candidates again. `series` stands for the products where there is one.
-fn decide(
-    a: &PointGraph,
-    points: &[u32],
-    candidates: &[u32],
-    series: Option<&Series>,
-    iterations: Option<usize>,
-    exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
-    cancel: &Cancel,
-) -> Result<Vec<u32>> {
-    if let Some(products) = iterations {
-        let steps = series.map_or(products.saturating_sub(1), Series::degree);
-        if let Some(reach) = Reach::of(a, points, steps, cancel)? {
-            let (a, b) = exact(Some(&reach.points))?;
-            return reach.winners((&a, &b), candidates, (series, products), cancel);
-        }
-    }
-    let (a, b) = exact(None)?;
-    let mut refined = filled((0, f64::NEG_INFINITY), points.len(), cancel)?;
-    let choose = |pass: &Pass<f64, WIDTH_F64>| {
-        winners::refine(points, &mut refined, pass);
-        Ok(())
-    };
-    for_each_pass(&a, &b, candidates, iterations, cancel, choose)?;
-    collect(refined.iter().map(|&(label, _)| label), cancel)
 }
 
 /// The likelihoods that [`diffuse`] compares, in single precision: `a.len()` rows of `n_labels`, row by row.
@@ -186,15 +145,24 @@ fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
         || Series::of_graph(a, iterations, tolerance),
         || Schedule::new(a, cancel),
     );
+    if !probed {
+        // the short one goes unwatched
+        series.truncate(1);
+    }
     let schedule = schedule?;
     let mut convergence = Convergence::default();
     for lanes in plan(b, labels, WIDTH, probed) {
         let seeds = Seeds::new(b, lanes, cancel)?;
-        let mut pass = Pass::run(a, &schedule, &seeds, series.as_ref(), iterations, cancel)?;
-        if series.is_some() && !pass.is_sound(b.largest_overlap()) {
-            series = None;
+        let run =
+            |series: &[Series]| Pass::run(a, &schedule, &seeds, series.last(), iterations, cancel);
+        let mut pass = run(&series)?;
+        while let Some(tried) = series.last() {
+            if pass.is_sound(tried.most_left_out, b.largest_overlap()) {
+                break;
+            }
+            series.pop();
             drop(pass);
-            pass = Pass::run(a, &schedule, &seeds, None, iterations, cancel)?;
+            pass = run(&series)?;
         }
         cancel.check()?;
         pass.drop_previous();
@@ -422,7 +390,7 @@ mod tests {
         };
         let (mut a, mut b) = (a.unwrap(), b);
         a.normalize_rows(&mut b, Cancel::never()).unwrap();
-        assert!(Series::of_graph(&a, None, TOLERANCE_F32).is_some());
+        assert!(!Series::of_graph(&a, None, TOLERANCE_F32).is_empty());
         let [plain, endless] = [Some(MANY), None].map(|iterations| {
             let found = likelihoods(&a, &b, 1, iterations, Cancel::never());
             found.unwrap().0

@@ -12,10 +12,11 @@ use crate::memory::tabulate;
 use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 
-/// Error from which on a series is given up for plain products.
-const LARGEST_ERROR: f64 = 1e-3;
 /// How far likelihoods may leave [0, 1], and their sum what the seeds allow.
 const SLACK: f64 = 1e-3;
+
+/// Values of a group at all points, labels of its lanes, and one for each that has a label.
+type Group<'a, T, const WIDTH: usize> = (&'a [Lanes<T, WIDTH>], &'a [Option<u32>], [T; WIDTH]);
 
 /// The values of the lanes of one pass at all points, and how far they have come.
 pub(super) struct Pass<'a, T, const WIDTH: usize> {
@@ -154,10 +155,17 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         lanes.map(|(label, lane)| (label, &self.z[lane / WIDTH][..], lane % WIDTH))
     }
 
-    /// Values at all points and labels of the lanes of each group; no label for the probe.
-    pub(super) fn groups(&self) -> impl Iterator<Item = (&[Lanes<T, WIDTH>], &[Option<u32>])> {
-        let values = self.z.iter().map(Vec::as_slice);
-        values.zip(self.seeds.lanes.chunks(WIDTH))
+    /// Values at all points and labels of the lanes of each group, no label for the probe, and one for each lane that has a
+    /// label, zero for the others.
+    pub(super) fn groups(&self) -> impl Iterator<Item = Group<'_, T, WIDTH>> {
+        let groups = self.z.iter().zip(self.seeds.lanes.chunks(WIDTH));
+        groups.map(|(values, labels)| {
+            let mut counts = [T::default(); WIDTH];
+            for (count, label) in counts.iter_mut().zip(labels) {
+                *count = T::from_f64(if label.is_some() { 1.0 } else { 0.0 });
+            }
+            (values.as_slice(), labels, counts)
+        })
     }
 
     fn largest_change(&self) -> f64 {
@@ -190,21 +198,13 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         tabulate(self.a.len(), error, cancel).map(Some)
     }
 
-    /// True if little is left out, no likelihood is negative, and those of no point sum to more than `overlap`, the most
+    /// True if at most `most_left_out` is left out, no likelihood is negative, and those of no point sum to more than `overlap`, the most
     /// labels that its pixel edges count for.
-    pub(super) fn is_sound(&self, overlap: f64) -> bool {
-        // one for a label, zero for the probe
-        let counts = self.groups().map(|(values, labels)| {
-            let mut counts = [T::default(); WIDTH];
-            for (count, label) in counts.iter_mut().zip(labels) {
-                *count = T::from_f64(if label.is_some() { 1.0 } else { 0.0 });
-            }
-            (values, counts)
-        });
-        let counts: Vec<_> = counts.collect();
+    pub(super) fn is_sound(&self, most_left_out: f64, overlap: f64) -> bool {
+        let groups: Vec<_> = self.groups().collect();
         let row_is_sound = |i: usize| {
             let (mut sums, mut least) = ([T::default(); WIDTH], [T::default(); WIDTH]);
-            for (values, counts) in &counts {
+            for (values, _, counts) in &groups {
                 for lane in 0..WIDTH {
                     let value = counts[lane] * values[i][lane];
                     sums[lane] += value;
@@ -220,7 +220,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             sum.is_finite() && sum <= overlap + SLACK && !negative
         };
         let points = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
-        self.convergence.error <= LARGEST_ERROR && points.all(row_is_sound)
+        self.convergence.error <= most_left_out && points.all(row_is_sound)
     }
 }
 
@@ -243,7 +243,7 @@ mod tests {
         let seeds = Seeds::new(&b, vec![Some(0), Some(1)], never).unwrap();
         let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1), never).unwrap();
         pass.convergence.error = error;
-        pass.is_sound(overlap)
+        pass.is_sound(1e-3, overlap)
     }
 
     #[test]

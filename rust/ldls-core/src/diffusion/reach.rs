@@ -68,15 +68,16 @@ impl Reach {
         Ok(Some(Self { points, ends }))
     }
 
-    /// Which of `labels` wins at each of the points themselves, of equal ones the lowest, after `iterations` products or by
-    /// the `series` that stands for them. `a` and `b` are of `self.points`, in this order; rows of the outermost do not matter.
-    pub(super) fn winners(
+    /// Which of `labels` wins at each of the points themselves, of equal ones the lowest, and how far it is ahead of the others,
+    /// by the `series` that stands for the products; or after `iterations` products, which is all there is to say, so that it
+    /// is endlessly far. `a` and `b` are of `self.points`, in this order; rows of the outermost do not matter.
+    pub(super) fn leaders(
         &self,
         (a, b): (&PointGraph<f64>, &PixelLabels<f64>),
         labels: &[u32],
         (series, iterations): (Option<&Series>, usize),
         cancel: &Cancel,
-    ) -> Result<Vec<u32>> {
+    ) -> Result<Vec<(u32, f64)>> {
         let steps = self.ends.len() - 2;
         let schedule = Schedule::narrowing(a, self.ends[..steps].iter().rev().copied(), cancel)?;
         let mut found = vec![Vec::new(); self.ends[0]];
@@ -90,16 +91,25 @@ impl Reach {
                 }
             }
         }
-        let winner = |of_point: &Vec<(u32, f64)>| {
-            let best = of_point
+        let leader = |of_point: &Vec<(u32, f64)>| {
+            let [best, next] = of_point
                 .iter()
-                .fold(0.0, |best: f64, (_, value)| best.max(*value));
-            let equal = of_point
-                .iter()
-                .filter(|(_, value)| *value >= best * (1.0 - EQUAL));
-            equal.map(|(label, _)| *label).min().unwrap_or(0)
+                .fold([0.0_f64; 2], |[best, next], &(_, value)| {
+                    [best.max(value), next.max(best.min(value))]
+                });
+            let equal = best * (1.0 - EQUAL);
+            let labels = of_point.iter().filter(|(_, value)| *value >= equal);
+            let label = labels.map(|(label, _)| *label).min().unwrap_or(0);
+            let lead = if series.is_none() {
+                f64::INFINITY
+            } else if next < equal {
+                best - next
+            } else {
+                0.0
+            };
+            (label, lead)
         };
-        Ok(found.iter().map(winner).collect())
+        Ok(found.iter().map(leader).collect())
     }
 }
 
@@ -147,8 +157,9 @@ mod tests {
             let reach = Reach::of(&chain(600), from, products - 1, Cancel::never());
             let reach = reach.unwrap().unwrap();
             let near = (&a.among(&reach.points), &b.among(&reach.points));
-            let found = reach.winners(near, &[0, 1, 2, 3], (None, products), Cancel::never());
-            found.unwrap()
+            let found = reach.leaders(near, &[0, 1, 2, 3], (None, products), Cancel::never());
+            let found = found.unwrap().into_iter();
+            found.map(|(label, _)| label).collect::<Vec<u32>>()
         };
         // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5
         assert_eq!(winners(&[1, 2, 3, 5], 3), [1, 2, 2, 0]);

@@ -12,6 +12,14 @@ use crate::graph::PointGraph;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
+/// What the eigenvalues of the graph of a cloud lie above: -0.25 to -0.34 is the least one of frames of 64 beams, where
+/// Gershgorin's theorem says -0.82.
+const USUAL_LOW: f64 = -0.5;
+/// What series may leave out of a likelihood.
+const MOST_LEFT_OUT: f64 = 1e-3;
+/// The same of those that end at [`USUAL_LOW`]: a few points of a frame in a hundred, which double precision then decides.
+const MOST_LEFT_OUT_OF_SHORT: f64 = 1e-2;
+
 /// `c_0 T_0 + c_1 T_1 + ...` on an interval.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Series {
@@ -23,26 +31,42 @@ pub(super) struct Series {
     pub(super) coefficients: Vec<f64>,
     /// Sum of the magnitudes of the coefficients left out.
     pub(super) tail: f64,
+    /// What it may leave out of any likelihood: where that is more, it is given up.
+    pub(super) most_left_out: f64,
 }
 
 impl Series {
-    /// The series that stands for so many products with `a`, `None` for endlessly many, and leaves out at most the share
-    /// `tolerance` of the largest value; none where it cannot be trusted or takes no fewer sweeps.
+    /// The series that stand for so many products with `a`, `None` for endlessly many, and leave out at most the share
+    /// `tolerance` of the largest value: first that of an interval near which all eigenvalues lie, then a shorter one of
+    /// where they lie as a rule. None that cannot be trusted or takes no fewer sweeps.
     pub(super) fn of_graph<T: Real>(
         a: &PointGraph<T>,
         iterations: Option<usize>,
         tolerance: f64,
-    ) -> Option<Self> {
+    ) -> Vec<Self> {
         let sound = |[low, high]: [f64; 2]| -1.0 <= low && low < high && high <= 1.0;
-        let [low, high] = gershgorin(a).filter(|ends| sound(*ends))?;
-        let (middle, half_width) = (f64::midpoint(high, low), (high - low) / 2.0);
-        let series = match iterations {
-            Some(products) => Self::of_geometric_sum(products, middle, half_width, tolerance),
-            None if high < 1.0 => Self::of_resolvent(middle, half_width, tolerance, MOST_SWEEPS),
-            None => return None,
+        let Some([low, high]) = gershgorin(a).filter(|ends| sound(*ends)) else {
+            return Vec::new();
         };
-        let shorter = iterations.is_none_or(|products| series.degree() + 1 < products);
-        shorter.then_some(series)
+        let on = |[low, high]: [f64; 2]| {
+            let (middle, half_width) = (f64::midpoint(high, low), (high - low) / 2.0);
+            let Some(products) = iterations else {
+                let most = MOST_SWEEPS;
+                return (high < 1.0)
+                    .then(|| Self::of_resolvent(middle, half_width, tolerance, most));
+            };
+            let series = Self::of_geometric_sum(products, middle, half_width, tolerance);
+            Some(series).filter(|series| series.degree() + 1 < products)
+        };
+        let mut series: Vec<Self> = on([low, high]).into_iter().collect();
+        let of_cloud = a.degree().is_some() && iterations.is_some();
+        if of_cloud && low < USUAL_LOW && USUAL_LOW < high && !series.is_empty() {
+            series.extend(on([USUAL_LOW, high]).map(|short| Self {
+                most_left_out: MOST_LEFT_OUT_OF_SHORT,
+                ..short
+            }));
+        }
+        series
     }
 
     /// The series of 1 + x + ... + x^(`terms` - 1).
@@ -73,6 +97,7 @@ impl Series {
                     half_width,
                     coefficients: kept.to_vec(),
                     tail,
+                    most_left_out: MOST_LEFT_OUT,
                 };
             }
             nodes *= 2;
@@ -101,6 +126,7 @@ impl Series {
             half_width,
             coefficients,
             tail,
+            most_left_out: MOST_LEFT_OUT,
         }
     }
 

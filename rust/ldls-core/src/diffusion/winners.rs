@@ -10,6 +10,9 @@ use rayon::prelude::*;
 /// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
 const ROUNDING: f32 = 2.5e-5;
 
+/// Times the error from which on labels of less than half of the largest value cannot win.
+const LEAST_ERRORS: f64 = 32.0;
+
 /// Labels of a point that are told apart from one another; any more that may win and all labels are looked at.
 const RANKS: usize = 3;
 
@@ -26,7 +29,6 @@ pub(super) struct Best {
 impl Best {
     #[inline]
     fn offer(&mut self, mut label: u32, mut value: f32) {
-        self.sum += value;
         for (other, best) in self.labels.iter_mut().zip(&mut self.values) {
             if value > *best || (value == *best && label < *other) {
                 std::mem::swap(other, &mut label);
@@ -41,6 +43,22 @@ impl Best {
         self.values[rank] > 0.0 && behind <= f64::from(ROUNDING * self.values[0]) + 2.0 * error
     }
 
+    /// Value of the best label.
+    pub(super) fn value(&self) -> f32 {
+        self.values[0]
+    }
+
+    /// The labels that may win, ascending; none where there are more than are told apart.
+    pub(super) fn rivals(&self, error: f64) -> Option<Vec<u32>> {
+        if self.may_win(RANKS, error) {
+            return None;
+        }
+        let may_win = (0..RANKS).filter(|&rank| self.may_win(rank, error));
+        let mut labels: Vec<u32> = may_win.map(|rank| self.labels[rank]).collect();
+        labels.sort_unstable();
+        Some(labels)
+    }
+
     pub(super) fn confidence(&self) -> f32 {
         if self.sum > 0.0 {
             (self.values[0] / self.sum).min(1.0)
@@ -50,22 +68,39 @@ impl Best {
     }
 }
 
-/// Offers the values of a pass to the best labels of all points.
-pub(super) fn update(best: &mut [Best], pass: &Pass<f32, WIDTH_F32>) {
+/// Offers the values of a pass to the best labels of all points, where each may be off by `error`.
+pub(super) fn update(best: &mut [Best], pass: &Pass<f32, WIDTH_F32>, error: f64) {
     let groups: Vec<_> = pass.groups().collect();
+    let least = (LEAST_ERRORS * error) as f32;
     let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
-    points.for_each(|(i, of_point)| {
-        let mut best = *of_point;
-        for (values, labels) in &groups {
-            // few labels reach a point
-            let of_lanes = labels.iter().zip(values[i].iter());
-            for (label, &value) in of_lanes.filter(|&(_, value)| *value != 0.0) {
-                if let Some(label) = *label {
-                    best.offer(label, value);
+    points.for_each(|(i, best)| {
+        let (mut sums, mut largest) = ([0.0; WIDTH_F32], [best.values[0]; WIDTH_F32]);
+        for (values, _, counts) in &groups {
+            let values = &values[i];
+            for lane in 0..WIDTH_F32 {
+                let value = counts[lane] * values[lane];
+                sums[lane] += value;
+                largest[lane] = if value > largest[lane] {
+                    value
+                } else {
+                    largest[lane]
+                };
+            }
+        }
+        best.sum += sums.iter().sum::<f32>();
+        let largest = largest.iter().fold(0.0, |one: f32, other| one.max(*other));
+        // most labels are far behind, and cannot win
+        let far_behind = if largest > least { largest / 2.0 } else { 0.0 };
+        for (values, labels, counts) in &groups {
+            let values = &values[i];
+            let may_win = |lane: usize| counts[lane] * values[lane] > far_behind;
+            if (0..WIDTH_F32).fold(false, |any, lane| any | may_win(lane)) {
+                let lanes = labels.iter().enumerate();
+                for (lane, label) in lanes.filter(|(lane, _)| may_win(*lane)) {
+                    best.offer(label.unwrap_or_default(), values[lane]);
                 }
             }
         }
-        *of_point = best;
     });
 }
 
@@ -87,12 +122,10 @@ pub(super) fn candidates(
 ) -> Vec<u32> {
     let mut labels = Vec::new();
     for &point in points {
-        let (best, error) = (&best[point as usize], error(point));
-        if best.may_win(RANKS, error) {
+        let Some(rivals) = best[point as usize].rivals(error(point)) else {
             return (0..n_labels as u32).collect();
-        }
-        let may_win = (0..RANKS).filter(|&rank| best.may_win(rank, error));
-        labels.extend(may_win.map(|rank| best.labels[rank]));
+        };
+        labels.extend(rivals);
     }
     labels.sort_unstable();
     labels.dedup();
