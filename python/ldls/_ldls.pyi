@@ -30,6 +30,7 @@ __all__ = [
     "in_graph",
     "neighbors",
     "normalize_rows",
+    "pack_png",
     "panic_in_worker",
     "pixel_labels",
     "point_graph",
@@ -193,6 +194,7 @@ def confidence(
     labels: NDArray[np.uint32],
     scores: NDArray[np.float32],
 ) -> NDArray[np.float32]: ...
+def pack_png(width: int, height: int, channels: int, pixels: bytes) -> bytes: ...
 def unpack_laz(
     file: bytes, offset: int, laszip: bytes, n_points: int
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16]]: ...

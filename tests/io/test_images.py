@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import ldls
-from ldls.io.images import SIGNATURES, read_image_size
+from ldls.io.images import SIGNATURES, png_of, read_image_size
 
 RGB = np.arange(60 * 80 * 3).reshape(60, 80, 3).astype(np.uint8)
 EPS = b"""%!PS-Adobe-3.0 EPSF-3.0
@@ -141,3 +141,19 @@ def test_a_jpeg_of_more_pixels_than_its_bytes_can_hold_takes_no_memory(tmp_path)
     assert ldls.read_image(path).shape == (60, 80, 3)
     Image.new("L", (4000, 3000)).save(path, quality=1, optimize=True, progressive=True)  # packed as well as may be
     assert ldls.read_image(path).shape == (3000, 4000, 3)
+
+
+@pytest.mark.parametrize("mode", ["L", "LA", "RGB", "RGBA"])
+def test_a_picture_is_the_same_in_its_file(mode):
+    bands = Image.new(mode, (1, 1)).getbands()
+    pixels = np.random.default_rng(0).integers(0, 256, (23, 31, len(bands)), np.uint8)
+    picture = Image.fromarray(pixels.squeeze(), mode)
+    with Image.open(io.BytesIO(png_of(picture))) as found:
+        assert (found.format, found.mode) == ("PNG", mode)
+        np.testing.assert_array_equal(np.asarray(found), np.asarray(picture))
+
+
+def test_a_picture_of_a_palette_keeps_its_colours():
+    picture = Image.fromarray(RGB).quantize(16)
+    with Image.open(io.BytesIO(png_of(picture))) as found:
+        np.testing.assert_array_equal(np.asarray(found.convert("RGB")), np.asarray(picture.convert("RGB")))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from ldls import _ldls
 from ldls.checks import checked
 from ldls.errors import CorruptFileError, LimitError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file, parsing
@@ -18,6 +19,8 @@ from ldls.io.files import open_file, parsing
 MAX_BYTES = 1 << 30
 SIGNATURES = {"PNG": b"\x89PNG\r\n\x1a\n", "JPEG": b"\xff\xd8\xff"}
 """First bytes of each format that is opened: Pillow knows more of them, and starts programs for some."""
+CHANNELS = {"L": 1, "LA": 2, "RGB": 3, "RGBA": 4}
+"""Bytes of a pixel by the mode of a picture."""
 DEFLATE_RATIO = 1032
 """Nothing in a PNG unpacks to more than so many times its size."""
 PIXELS_A_BYTE = 1024
@@ -62,6 +65,13 @@ def decode(file: IO[bytes], n_bytes: int) -> NDArray[np.uint8]:
     with parsing("image"), _opened(file) as image:
         check_pixels(image, n_bytes)
         return np.asarray(image.convert("RGB"))
+
+
+def png_of(picture: Image.Image) -> bytes:
+    """The PNG file of a picture; one of another mode than Pillow's L, LA, RGB and RGBA becomes RGBA."""
+    if picture.mode not in CHANNELS:
+        picture = picture.convert("RGBA")
+    return _ldls.pack_png(*picture.size, CHANNELS[picture.mode], picture.tobytes())
 
 
 def check_pixels(image: Image.Image, n_bytes: int) -> None:

@@ -23,6 +23,7 @@ from PIL import Image
 
 from ldls.camera import Camera
 from ldls.io.files import whole_file
+from ldls.io.images import png_of
 from ldls.io.labels import write_annotations
 from ldls.io.labels.kitti_objects import in_camera_frame
 from ldls.masks import InstanceMasks
@@ -57,7 +58,7 @@ def write_picture(path: Path, image: NDArray[np.uint8]) -> None:
     """Write a PNG and its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as file:
-        Image.fromarray(image).save(file, "PNG", compress_level=3)
+        file.write(png_of(Image.fromarray(image)))
 
 
 def write_masks(path: Path, masks: InstanceMasks, image_id: int) -> None:

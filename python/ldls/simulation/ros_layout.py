@@ -9,7 +9,6 @@ STAMP is that of the sweep in nanoseconds, the name that `ldls.datasets.RosBag` 
 
 from __future__ import annotations
 
-import io
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.camera.rigid import to_quaternion
+from ldls.io.images import png_of
 from ldls.io.ros.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -164,9 +164,7 @@ def _image(types: Any, pixels: NDArray[np.uint8], header: Any) -> Any:  # noqa: 
 
 
 def _png(types: Any, pixels: NDArray[np.uint8], header: Any) -> Any:  # noqa: ANN401
-    file = io.BytesIO()
-    Image.fromarray(pixels).save(file, "PNG", compress_level=3)
-    data = np.frombuffer(file.getvalue(), np.uint8)
+    data = np.frombuffer(png_of(Image.fromarray(pixels)), np.uint8)
     return make(types, COMPRESSED_IMAGE, header=header, format="rgb8; png compressed bgr8", data=data)
 
 

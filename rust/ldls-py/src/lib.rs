@@ -14,6 +14,7 @@ mod clouds;
 mod errors;
 mod laz;
 mod masks;
+mod pictures;
 mod products;
 mod segment;
 mod stages;
@@ -31,6 +32,8 @@ mod _ldls {
     use crate::laz::unpack_laz;
     #[pymodule_export]
     use crate::masks::{Masks, Rle};
+    #[pymodule_export]
+    use crate::pictures::pack_png;
     #[pymodule_export]
     use crate::products::Products;
     #[pymodule_export]
