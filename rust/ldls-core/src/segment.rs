@@ -111,26 +111,25 @@ pub fn segment(
     let diffused = timed(&mut t.diffusion, || {
         diffuse(&a, &b, scene.n_labels(), params.iterations, exact, cancel)
     })?;
-    let mut kept = timed(&mut t.components, || {
-        let place = |row: usize| cloud.xyz(in_view.indices[order[row] as usize] as usize);
-        remove_outliers(&a, &diffused.labels, order, params, place, cancel)
-    })?;
-    let confidence = judge(&mut kept, &diffused, &scene.scores(), params, cancel)?;
-
-    let (sightings, objects) = images.into_parts();
     let rows = Rows {
         cloud: cloud.len(),
         in_view: &in_view.indices,
         of_graph: arrange(order, &in_view.indices, cancel)?,
     };
-    let (labels, (diffused_labels, confidence)) = rayon::join(
+    let components = || {
+        timed(&mut t.components, || {
+            let place = |row: usize| cloud.xyz(in_view.indices[order[row] as usize] as usize);
+            remove_outliers(&a, &diffused.labels, order, params, place, cancel)
+        })
+    };
+    let (kept, diffused_labels) = rayon::join(components, || rows.labels(&diffused.labels, cancel));
+    let mut kept = kept?;
+    let confidence = judge(&mut kept, &diffused, &scene.scores(), params, cancel)?;
+    let (labels, confidence) = rayon::join(
         || rows.labels(&kept, cancel),
-        || {
-            let labels = || rows.labels(&diffused.labels, cancel);
-            let confidence = || rows.scatter([0.0, of_cleared(params)], confidence, cancel);
-            rayon::join(labels, confidence)
-        },
+        || rows.scatter([0.0, of_cleared(params)], confidence, cancel),
     );
+    let (sightings, objects) = images.into_parts();
     Ok(Segmentation {
         labels: labels?,
         diffused_labels: diffused_labels?,
