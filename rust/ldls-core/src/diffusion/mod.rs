@@ -83,9 +83,8 @@ pub fn diffuse(
         }
         Ok(())
     };
-    let mut convergence = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
-    // where the series of single precision was given up, that of double precision is no better
-    let held = iterations.is_some_and(|products| convergence.sweeps < products);
+    // where a series of single precision was given up, that of double precision is no better
+    let (mut convergence, held) = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
     convergence.refined = near_ties::decide(
         (a, b),
         &mut best,
@@ -124,11 +123,11 @@ pub fn likelihoods(
         }
         Ok(())
     };
-    let convergence = for_each_pass(a, b, &labels, iterations, cancel, write)?;
+    let (convergence, _) = for_each_pass(a, b, &labels, iterations, cancel, write)?;
     Ok((all, convergence))
 }
 
-/// Calls `done` with each pass over the graph that `labels` take.
+/// Calls `done` with each pass over the graph that `labels` take; how far they came, and how many series could be trusted.
 fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     b: &PixelLabels<T>,
@@ -136,7 +135,7 @@ fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
     iterations: Option<usize>,
     cancel: &Cancel,
     mut done: impl FnMut(&Pass<T, WIDTH>) -> Result<()>,
-) -> Result<Convergence> {
+) -> Result<(Convergence, usize)> {
     // in single precision, a probe shows how large the terms left out may be
     let probed = WIDTH == WIDTH_F32;
     let tolerance = if probed { TOLERANCE_F32 } else { TOLERANCE_F64 };
@@ -169,7 +168,7 @@ fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
         done(&pass)?;
         convergence.merge(pass.convergence);
     }
-    Ok(convergence)
+    Ok((convergence, series.len()))
 }
 
 #[cfg(test)]

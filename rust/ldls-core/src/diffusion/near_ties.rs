@@ -18,22 +18,24 @@ use crate::memory::{collect, filled};
 use crate::{Cancel, Result};
 use std::collections::BTreeMap;
 
-/// What the series leave out, as a share of the largest value, and by how much a label must be ahead for each to be believed,
-/// as a share of the error in single precision, a hundred times that of the first.
-const SERIES: [(f64, f64); 2] = [(1e-9, 0.05), (TOLERANCE_F64, 0.0)];
+/// What the first series leaves out, as a share of the largest value: a hundredth of what that of single precision does.
+const FIRST_TOLERANCE: f64 = 1e-9;
+/// By how much a label must be ahead for the first series to be believed, as a share of the error in single precision.
+const LEAD: f64 = 0.05;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
 const NEGLIGIBLE: f32 = 1e-18;
 /// Most points that labels are followed over to see whether they are equal.
 const MOST_FOLLOWED: usize = 4096;
 
 /// Puts the winner first in `best` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
-/// points. `largest` is the largest error. Other arguments as in [`super::diffuse`]; `held` says whether a series serves.
+/// points. `largest` is the largest error, and `held` how many series of the graph can be trusted. Other arguments as in
+/// [`super::diffuse`].
 pub(super) fn decide(
     (a, b): (&PointGraph, &PixelLabels),
     best: &mut [Best],
     (errors, largest): (&Errors, f64),
     n_labels: usize,
-    (iterations, held): (Option<usize>, bool),
+    (iterations, held): (Option<usize>, usize),
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
     cancel: &Cancel,
 ) -> Result<usize> {
@@ -45,13 +47,16 @@ pub(super) fn decide(
     if contested <= MOST_FOLLOWED {
         open = settle_equal(a, b, best, &open, error, cancel)?;
     }
-    for (tolerance, share) in SERIES {
+    let first = (FIRST_TOLERANCE, held, LEAD);
+    // nobody watches what the last one leaves out, so it is the one that can be trusted on every graph
+    let last = (TOLERANCE_F64, held.min(1), 0.0);
+    for (tolerance, trusted, share) in [first, last] {
         if open.is_empty() {
             break;
         }
         let candidates = winners::candidates(best, &open, n_labels, error);
-        let series = held.then(|| Series::of_graph(a, iterations, tolerance));
-        let series = series.as_deref().and_then(<[_]>::first);
+        let series = Series::of_graph(a, iterations, tolerance);
+        let series = series.iter().take(trusted).next_back();
         let leaders = leaders(a, &open, &candidates, series, iterations, &exact, cancel)?;
         let mut leaders = leaders.into_iter();
         open.retain(|&point| {
