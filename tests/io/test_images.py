@@ -147,7 +147,7 @@ def test_a_jpeg_of_more_pixels_than_its_bytes_can_hold_takes_no_memory(tmp_path)
 def test_a_picture_is_the_same_in_its_file(mode):
     bands = Image.new(mode, (1, 1)).getbands()
     pixels = np.random.default_rng(0).integers(0, 256, (23, 31, len(bands)), np.uint8)
-    picture = Image.fromarray(pixels.squeeze(), mode)
+    picture = Image.fromarray(pixels.squeeze())
     with Image.open(io.BytesIO(png_of(picture))) as found:
         assert (found.format, found.mode) == ("PNG", mode)
         np.testing.assert_array_equal(np.asarray(found), np.asarray(picture))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import base64
-import io
 from html import escape
 
 from PIL import Image
 
+from ldls.io.images import png_of
 from ldls.palette import label_colours
 from ldls.segmentation import Segmentation
 from ldls.viewing.birds_eye import birds_eye_of, surroundings
@@ -33,9 +33,7 @@ def html_of(result: Segmentation) -> str:
 
 
 def _img(picture: Image.Image, caption: str) -> str:
-    file = io.BytesIO()
-    picture.save(file, "PNG")
-    encoded = base64.b64encode(file.getvalue()).decode()
+    encoded = base64.b64encode(png_of(picture)).decode()
     return f'<img alt="{caption}" style="max-width: 100%; display: block" src="data:image/png;base64,{encoded}">'
 
 

@@ -2,6 +2,7 @@
 
 use crate::call::run_here;
 use ldls_core::Error;
+use ldls_core::memory::with_room;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -23,19 +24,14 @@ pub fn pack_png(
         _ => ColorType::Rgba,
     };
     let file = run_here(py, || {
-        check_room(2 * pixels.len())?;
+        // the encoder does not ask whether there is memory for what it makes, which is seldom larger than the pixels
+        drop(with_room::<u8>(2 * pixels.len())?);
         packed([width, height], color, pixels).map_err(|error| Error::Mismatch {
             name: "pixels",
             problem: error.to_string(),
         })
     })?;
     Ok(PyBytes::new(py, &file).unbind())
-}
-
-/// The encoder does not ask whether there is memory for what it makes, which is seldom larger than the pixels.
-fn check_room(bytes: usize) -> ldls_core::Result<()> {
-    let room = Vec::<u8>::new().try_reserve(bytes);
-    room.map_err(|_| Error::OutOfMemory { bytes })
 }
 
 fn packed(

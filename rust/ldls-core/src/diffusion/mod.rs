@@ -11,6 +11,7 @@ mod errors;
 mod lanes;
 mod near_ties;
 mod pass;
+mod passes;
 mod phases;
 mod products;
 mod reach;
@@ -25,21 +26,14 @@ pub use convergence::Convergence;
 pub use products::Products;
 
 use self::errors::Errors;
-use self::lanes::{Lane, WIDTH_F32};
+use self::lanes::WIDTH_F32;
 use self::pass::Pass;
-use self::schedule::Schedule;
-use self::seeds::{Seeds, plan};
-use self::series::Series;
+use self::passes::for_each_pass;
 use self::winners::Best;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{filled, tabulate, zeros};
 use crate::{Cancel, Result};
-
-/// Share of the largest likelihood that a series in single precision may leave out.
-const TOLERANCE_F32: f64 = 1e-7;
-/// The same in double precision.
-const TOLERANCE_F64: f64 = 1e-13;
 
 /// The winning label of every point.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,14 +77,13 @@ pub fn diffuse(
         }
         Ok(())
     };
-    // where a series of single precision was given up, that of double precision is no better
-    let (mut convergence, held) = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
+    let (mut convergence, trusted) = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
     convergence.refined = near_ties::decide(
         (a, b),
         &mut best,
         (&Errors { a, probed }, convergence.error),
         n_labels,
-        (iterations, held),
+        (iterations, &trusted),
         exact,
         cancel,
     )?;
@@ -127,52 +120,10 @@ pub fn likelihoods(
     Ok((all, convergence))
 }
 
-/// Calls `done` with each pass over the graph that `labels` take; how far they came, and how many series could be trusted.
-fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
-    a: &PointGraph<T>,
-    b: &PixelLabels<T>,
-    labels: &[u32],
-    iterations: Option<usize>,
-    cancel: &Cancel,
-    mut done: impl FnMut(&Pass<T, WIDTH>) -> Result<()>,
-) -> Result<(Convergence, usize)> {
-    // in single precision, a probe shows how large the terms left out may be
-    let probed = WIDTH == WIDTH_F32;
-    let tolerance = if probed { TOLERANCE_F32 } else { TOLERANCE_F64 };
-    // parts of each are for one thread alone
-    let (mut series, schedule) = rayon::join(
-        || Series::of_graph(a, iterations, tolerance),
-        || Schedule::new(a, cancel),
-    );
-    if !probed {
-        // the short one goes unwatched
-        series.truncate(1);
-    }
-    let schedule = schedule?;
-    let mut convergence = Convergence::default();
-    for lanes in plan(b, labels, WIDTH, probed) {
-        let seeds = Seeds::new(b, lanes, cancel)?;
-        let run =
-            |series: &[Series]| Pass::run(a, &schedule, &seeds, series.last(), iterations, cancel);
-        let mut pass = run(&series)?;
-        while let Some(tried) = series.last() {
-            if pass.is_sound(tried.most_left_out, b.largest_overlap()) {
-                break;
-            }
-            series.pop();
-            drop(pass);
-            pass = run(&series)?;
-        }
-        cancel.check()?;
-        pass.drop_previous();
-        done(&pass)?;
-        convergence.merge(pass.convergence);
-    }
-    Ok((convergence, series.len()))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::passes::TOLERANCE_F32;
+    use super::series::Series;
     use super::*;
     use crate::Real;
     use crate::neighbors::Neighbors;

@@ -8,10 +8,10 @@
 use super::errors::Errors;
 use super::lanes::WIDTH_F64;
 use super::pass::Pass;
+use super::passes::{TOLERANCE_F64, for_each_pass};
 use super::reach::Reach;
 use super::series::Series;
 use super::winners::{self, Best};
-use super::{TOLERANCE_F64, for_each_pass};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{collect, filled};
@@ -28,14 +28,14 @@ const NEGLIGIBLE: f32 = 1e-18;
 const MOST_FOLLOWED: usize = 4096;
 
 /// Puts the winner first in `best` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
-/// points. `largest` is the largest error, and `held` how many series of the graph can be trusted. Other arguments as in
-/// [`super::diffuse`].
+/// points. `largest` is the largest error, and `trusted` are the series that served in single precision or would have, the
+/// longest first. Other arguments as in [`super::diffuse`].
 pub(super) fn decide(
     (a, b): (&PointGraph, &PixelLabels),
     best: &mut [Best],
     (errors, largest): (&Errors, f64),
     n_labels: usize,
-    (iterations, held): (Option<usize>, usize),
+    (iterations, trusted): (Option<usize>, &[Series]),
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
     cancel: &Cancel,
 ) -> Result<usize> {
@@ -47,16 +47,17 @@ pub(super) fn decide(
     if contested <= MOST_FOLLOWED {
         open = settle_equal(a, b, best, &open, error, cancel)?;
     }
-    let first = (FIRST_TOLERANCE, held, LEAD);
-    // nobody watches what the last one leaves out, so it is the one that can be trusted on every graph
-    let last = (TOLERANCE_F64, held.min(1), 0.0);
-    for (tolerance, trusted, share) in [first, last] {
+    // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
+    let first = (trusted.last(), FIRST_TOLERANCE, LEAD);
+    let last = (trusted.first(), TOLERANCE_F64, 0.0);
+    for (alike, tolerance, share) in [first, last] {
         if open.is_empty() {
             break;
         }
         let candidates = winners::candidates(best, &open, n_labels, error);
-        let series = Series::of_graph(a, iterations, tolerance);
-        let series = series.iter().take(trusted).next_back();
+        let series = alike.zip(iterations);
+        let series = series.and_then(|(alike, products)| alike.within(tolerance, products));
+        let series = series.as_ref();
         let leaders = leaders(a, &open, &candidates, series, iterations, &exact, cancel)?;
         let mut leaders = leaders.into_iter();
         open.retain(|&point| {

@@ -17,7 +17,8 @@ use std::f64::consts::PI;
 const USUAL_LOW: f64 = -0.5;
 /// What series may leave out of a likelihood.
 const MOST_LEFT_OUT: f64 = 1e-3;
-/// The same of those that end at [`USUAL_LOW`]: a few points of a frame in a hundred, which double precision then decides.
+/// The same of those that begin at [`USUAL_LOW`]: in one frame of a hundred some dozen points have more than the others may,
+/// and double precision decides the near-ties among them.
 const MOST_LEFT_OUT_OF_SHORT: f64 = 1e-2;
 
 /// `c_0 T_0 + c_1 T_1 + ...` on an interval.
@@ -48,25 +49,35 @@ impl Series {
         let Some([low, high]) = gershgorin(a).filter(|ends| sound(*ends)) else {
             return Vec::new();
         };
-        let on = |[low, high]: [f64; 2]| {
-            let (middle, half_width) = (f64::midpoint(high, low), (high - low) / 2.0);
-            let Some(products) = iterations else {
-                let most = MOST_SWEEPS;
-                return (high < 1.0)
-                    .then(|| Self::of_resolvent(middle, half_width, tolerance, most));
-            };
-            let series = Self::of_geometric_sum(products, middle, half_width, tolerance);
-            Some(series).filter(|series| series.degree() + 1 < products)
-        };
-        let mut series: Vec<Self> = on([low, high]).into_iter().collect();
+        let long = Self::on([low, high], iterations, tolerance);
+        let mut series: Vec<Self> = long.into_iter().collect();
         let of_cloud = a.degree().is_some() && iterations.is_some();
         if of_cloud && low < USUAL_LOW && USUAL_LOW < high && !series.is_empty() {
-            series.extend(on([USUAL_LOW, high]).map(|short| Self {
+            let short = Self::on([USUAL_LOW, high], iterations, tolerance);
+            series.extend(short.map(|short| Self {
                 most_left_out: MOST_LEFT_OUT_OF_SHORT,
                 ..short
             }));
         }
         series
+    }
+
+    /// The series on the same interval that leaves out at most the share `tolerance`, if it takes fewer sweeps than the
+    /// `products`.
+    pub(super) fn within(&self, tolerance: f64, products: usize) -> Option<Self> {
+        let ends = [self.middle - self.half_width, self.middle + self.half_width];
+        Self::on(ends, Some(products), tolerance)
+    }
+
+    /// The series on the interval from `low` to `high`, if there is one and it takes fewer sweeps.
+    fn on([low, high]: [f64; 2], iterations: Option<usize>, tolerance: f64) -> Option<Self> {
+        let (middle, half_width) = (f64::midpoint(high, low), (high - low) / 2.0);
+        let Some(products) = iterations else {
+            let most = MOST_SWEEPS;
+            return (high < 1.0).then(|| Self::of_resolvent(middle, half_width, tolerance, most));
+        };
+        let series = Self::of_geometric_sum(products, middle, half_width, tolerance);
+        Some(series).filter(|series| series.degree() + 1 < products)
     }
 
     /// The series of 1 + x + ... + x^(`terms` - 1).
@@ -215,6 +226,9 @@ fn degree_within(coefficients: &[f64], remainder: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Cancel;
+    use crate::masks::PixelLabels;
+    use crate::neighbors::Neighbors;
 
     const LOW: f64 = -0.8;
     const HIGH: f64 = 0.998;
@@ -229,6 +243,40 @@ mod tests {
 
     fn points() -> impl Iterator<Item = f64> {
         (0..=1000).map(|i| LOW + f64::from(i) / 1000.0 * (HIGH - LOW))
+    }
+
+    #[test]
+    fn graphs_of_clouds_have_a_long_series_and_a_short_one_and_others_the_long_one() {
+        let points: Vec<[f64; 3]> = (0..400)
+            .map(|i| [f64::from(i % 20) / 9.0, f64::from(i / 20) / 9.0, 0.0])
+            .collect();
+        let never = Cancel::never();
+        let neighbors = Neighbors::search(&points, 10, never).unwrap();
+        let mut a = PointGraph::<f32>::from_neighbors(&points, &neighbors, 1.0, never).unwrap();
+        let mut b = PixelLabels {
+            offsets: vec![0; 401],
+            labels: vec![],
+            weights: vec![],
+            mass: vec![0.025; 400],
+        };
+        a.normalize_rows(&mut b, never).unwrap();
+        let degrees = |a: &PointGraph, iterations| {
+            let series = Series::of_graph(a, iterations, 1e-7);
+            let degrees = series.iter().map(Series::degree);
+            degrees.collect::<Vec<_>>()
+        };
+        assert_eq!(degrees(&a, Some(200)), [64, 58]);
+        assert_eq!(degrees(&a, None).len(), 1);
+        let (offsets, columns, weights) = a.clone().into_csr(never).unwrap();
+        let any = PointGraph::from_csr(offsets, columns, weights).unwrap();
+        assert_eq!(degrees(&any, Some(200)), [64]);
+        let [long, short] = &Series::of_graph(&a, Some(200), 1e-7)[..] else {
+            panic!("two series")
+        };
+        assert!(short.most_left_out > long.most_left_out);
+        let within = short.within(1e-9, 200).unwrap();
+        assert!(short.degree() < within.degree() && within.degree() < 72);
+        assert!(short.within(1e-9, 10).is_none());
     }
 
     #[test]

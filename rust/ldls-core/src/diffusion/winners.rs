@@ -10,8 +10,8 @@ use rayon::prelude::*;
 /// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
 const ROUNDING: f32 = 2.5e-5;
 
-/// Times the error from which on labels of less than half of the largest value cannot win.
-const LEAST_ERRORS: f64 = 32.0;
+/// Share of the largest value of a point that errors are at most where labels of less than half of it cannot win.
+const SMALL_ERROR: f64 = 1.0 / 32.0;
 
 /// Labels of a point that are told apart from one another; any more that may win and all labels are looked at.
 const RANKS: usize = 3;
@@ -71,7 +71,7 @@ impl Best {
 /// Offers the values of a pass to the best labels of all points, where each may be off by `error`.
 pub(super) fn update(best: &mut [Best], pass: &Pass<f32, WIDTH_F32>, error: f64) {
     let groups: Vec<_> = pass.groups().collect();
-    let least = (LEAST_ERRORS * error) as f32;
+    let least = (error / SMALL_ERROR) as f32;
     let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
     points.for_each(|(i, best)| {
         let (mut sums, mut largest) = ([0.0; WIDTH_F32], [best.values[0]; WIDTH_F32]);
