@@ -7,6 +7,7 @@
 //! can be trusted, the products are run as they stand.
 
 mod convergence;
+mod equal_labels;
 mod errors;
 mod lanes;
 mod near_ties;
@@ -34,6 +35,11 @@ use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{filled, tabulate, zeros};
 use crate::{Cancel, Result};
+
+/// Labels kept of each point where few masks overlap, one more than are told apart.
+const FEW_RANKS: usize = 4;
+/// The same where many do.
+const MANY_RANKS: usize = 10;
 
 /// The winning label of every point.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,12 +69,29 @@ pub fn diffuse(
     cancel: &Cancel,
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
+    // as many labels may be equal at a point, and all of them are kept
+    if b.largest_overlap() < FEW_RANKS as f64 {
+        diffuse_ranked::<FEW_RANKS>(a, b, n_labels, iterations, exact, cancel)
+    } else {
+        diffuse_ranked::<MANY_RANKS>(a, b, n_labels, iterations, exact, cancel)
+    }
+}
+
+/// The same, with so many labels kept of each point.
+fn diffuse_ranked<const RANKS: usize>(
+    a: &PointGraph,
+    b: &PixelLabels,
+    n_labels: usize,
+    iterations: Option<usize>,
+    exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    cancel: &Cancel,
+) -> Result<Diffused> {
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let (mut best, mut probed, mut error) = (Vec::new(), Vec::new(), 0.0);
     let choose = |pass: &Pass<f32, WIDTH_F32>| {
         if best.is_empty() {
             // not before, since a pass takes the most memory while it runs
-            best = filled(Best::default(), a.len(), cancel)?;
+            best = filled(Best::<RANKS>::default(), a.len(), cancel)?;
         }
         error = pass.convergence.error.max(error);
         winners::update(&mut best, pass, error);

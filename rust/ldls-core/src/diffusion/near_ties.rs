@@ -1,21 +1,23 @@
 //! The points at which single precision cannot decide between labels.
 //!
-//! Labels of many of them are equal, as where two masks show the same few points that nothing else flows to: their seeds are the
-//! same wherever one comes from. The others are decided in double precision: by the part of the graph that flows to them, with a
-//! series that leaves out little, and where this does not tell them apart, with one that leaves out next to nothing. Where
-//! what flows to them is much of the graph, all of it is diffused again.
+//! Labels of many of them are equal, as where several masks show all that anything flows from: their seeds are the same
+//! there. The others are decided in double precision: by the part of the graph that flows to them, with a series that
+//! leaves out little, and where this does not tell them apart, with one that leaves out next to nothing. Where what flows
+//! to them is much of the graph, all of it is diffused again.
 
+use super::equal_labels::Followed;
 use super::errors::Errors;
 use super::lanes::WIDTH_F64;
 use super::pass::Pass;
 use super::passes::{TOLERANCE_F64, for_each_pass};
 use super::reach::Reach;
 use super::series::Series;
-use super::winners::{self, Best};
+use super::winners::{Best, NearTie, candidates, near_ties, refine};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect, filled};
+use crate::memory::{collect, filled, push};
 use crate::{Cancel, Result};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// What the first series leaves out, as a share of the largest value: a hundredth of what that of single precision does.
@@ -24,15 +26,13 @@ const FIRST_TOLERANCE: f64 = 1e-9;
 const LEAD: f64 = 0.05;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
 const NEGLIGIBLE: f32 = 1e-18;
-/// Most points that labels are followed over to see whether they are equal.
-const MOST_FOLLOWED: usize = 4096;
 
 /// Puts the winner first in `best` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
 /// points. `largest` is the largest error, and `trusted` are the series that served in single precision or would have, the
 /// longest first. Other arguments as in [`super::diffuse`].
-pub(super) fn decide(
+pub(super) fn decide<const RANKS: usize>(
     (a, b): (&PointGraph, &PixelLabels),
-    best: &mut [Best],
+    best: &mut [Best<RANKS>],
     (errors, largest): (&Errors, f64),
     n_labels: usize,
     (iterations, trusted): (Option<usize>, &[Series]),
@@ -40,27 +40,24 @@ pub(super) fn decide(
     cancel: &Cancel,
 ) -> Result<usize> {
     let error = |point: u32| errors.at(point as usize);
-    // the largest error of all points leaves few to be looked at more closely
-    let mut open = winners::contested(best, largest)?;
-    open.retain(|&point| best[point as usize].may_win(1, error(point)));
-    let contested = open.len();
-    if contested <= MOST_FOLLOWED {
-        open = settle_equal(a, b, best, &open, error, cancel)?;
-    }
+    let mut ties = near_ties(best, largest, error)?;
+    let contested = ties.len();
+    settle_equal((a, b), best, &mut ties, cancel)?;
     // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
     let first = (trusted.last(), FIRST_TOLERANCE, LEAD);
     let last = (trusted.first(), TOLERANCE_F64, 0.0);
     for (alike, tolerance, share) in [first, last] {
-        if open.is_empty() {
+        if ties.is_empty() {
             break;
         }
-        let candidates = winners::candidates(best, &open, n_labels, error);
+        let candidates = candidates(&ties, n_labels);
         let series = alike.zip(iterations);
         let series = series.and_then(|(alike, products)| alike.within(tolerance, products));
         let series = series.as_ref();
-        let leaders = leaders(a, &open, &candidates, series, iterations, &exact, cancel)?;
+        let points: Vec<u32> = ties.iter().map(|tie| tie.point).collect();
+        let leaders = leaders(a, &points, &candidates, series, iterations, &exact, cancel)?;
         let mut leaders = leaders.into_iter();
-        open.retain(|&point| {
+        ties.retain(|&NearTie { point, .. }| {
             let (label, lead) = leaders.next().unwrap_or_default();
             // labels that differ in no bit are equal: what the first series leaves out is smaller where they differ less
             let is_open = lead > 0.0 && lead < share * error(point);
@@ -73,74 +70,40 @@ pub(super) fn decide(
     Ok(contested)
 }
 
-/// Puts the lowest label first at those of `points` at which all that may win are equal; the others.
-fn settle_equal(
-    a: &PointGraph,
-    b: &PixelLabels,
-    best: &mut [Best],
-    points: &[u32],
-    error: impl Fn(u32) -> f64,
+/// Puts the lowest label first at those of `ties` at which all that may win are equal, and leaves the others.
+fn settle_equal<const RANKS: usize>(
+    (a, b): (&PointGraph, &PixelLabels),
+    best: &mut [Best<RANKS>],
+    ties: &mut Vec<NearTie>,
     cancel: &Cancel,
-) -> Result<Vec<u32>> {
-    let mut open = Vec::new();
-    let mut sets: BTreeMap<Vec<u32>, Vec<u32>> = BTreeMap::new();
-    for &point in points {
-        match best[point as usize].rivals(error(point)) {
-            Some(labels) => sets.entry(labels).or_default().push(point),
-            None => open.push(point),
+) -> Result<()> {
+    let mut sets: BTreeMap<&[u32], Vec<u32>> = BTreeMap::new();
+    for tie in &*ties {
+        if let Some(rivals) = &tie.rivals {
+            push(sets.entry(rivals).or_default(), tie.point)?;
         }
     }
-    let mut met = filled(false, a.len(), cancel)?;
-    for (labels, points) in sets {
-        cancel.check()?;
-        let values = points.iter().map(|&point| best[point as usize].value());
-        let least = NEGLIGIBLE * values.fold(1.0, f32::min);
-        if are_equal((a, least), b, &labels, &points, &mut met) {
-            for point in points {
-                best[point as usize].labels[0] = labels[0];
-            }
-        } else {
-            open.extend(points);
+    let sets: Vec<_> = sets.into_iter().collect();
+    let shares = sets.par_chunks(sets.len().div_ceil(rayon::current_num_threads()).max(1));
+    let settled_by_set = shares.map(|sets| {
+        let mut followed = Followed::new(a, b, cancel)?;
+        let equal = |(labels, points): &(&[u32], Vec<u32>)| {
+            let values = points.iter().map(|&point| best[point as usize].value());
+            let least = NEGLIGIBLE * values.fold(1.0, f32::min);
+            Ok((labels[0], followed.equal_at(points, labels, least, cancel)?))
+        };
+        sets.iter().map(equal).collect::<Result<Vec<_>>>()
+    });
+    let mut settled = Vec::new();
+    for (lowest, points) in settled_by_set.collect::<Result<Vec<_>>>()?.concat() {
+        for &point in &points {
+            best[point as usize].labels[0] = lowest;
         }
+        settled.extend(points);
     }
-    open.sort_unstable();
-    Ok(open)
-}
-
-/// True if `labels` have the same seeds at `points` and wherever anything flows to them from, by edges of more than the `least`
-/// weight, which must not be far. `met` is of all points, and false.
-fn are_equal(
-    (a, least): (&PointGraph, f32),
-    b: &PixelLabels,
-    labels: &[u32],
-    points: &[u32],
-    met: &mut [bool],
-) -> bool {
-    let seed = |point: usize, label: u32| {
-        let mut row = b.row(point);
-        row.find_map(|(at, weight)| (at == label as usize).then_some(weight))
-    };
-    let mut followed = points.to_vec();
-    for &point in points {
-        met[point as usize] = true;
-    }
-    let (mut at, mut equal) = (0, true);
-    while equal && at < followed.len() {
-        let point = followed[at] as usize;
-        let first = seed(point, labels[0]);
-        equal = followed.len() <= MOST_FOLLOWED
-            && labels.iter().all(|&label| seed(point, label) == first);
-        for (column, weight) in a.row(point) {
-            if weight > least && !std::mem::replace(&mut met[column], true) {
-                followed.push(column as u32);
-            }
-        }
-        at += 1;
-    }
-    for point in followed {
-        met[point as usize] = false;
-    }
-    equal
+    settled.sort_unstable();
+    ties.retain(|tie| settled.binary_search(&tie.point).is_err());
+    Ok(())
 }
 
 /// Which of `candidates`, ascending, wins at each of `points` and by how much, in double precision, with `series` in the place
@@ -164,7 +127,7 @@ fn leaders(
     let (a, b) = exact(None)?;
     let mut refined = filled((0, f64::NEG_INFINITY), points.len(), cancel)?;
     let choose = |pass: &Pass<f64, WIDTH_F64>| {
-        winners::refine(points, &mut refined, pass);
+        refine(points, &mut refined, pass);
         Ok(())
     };
     for_each_pass(&a, &b, candidates, iterations, cancel, choose)?;
@@ -215,7 +178,7 @@ mod tests {
             }))
         };
         let (a, b) = chain(weights, seeds);
-        let found = diffuse(&a, &b, 3, Some(20), exact, Cancel::never()).unwrap();
+        let found = diffuse(&a, &b, 8, Some(20), exact, Cancel::never()).unwrap();
         (found.labels, asked.get())
     }
 
@@ -223,6 +186,13 @@ mod tests {
     fn labels_of_the_same_seeds_are_equal_without_a_look_in_double_precision() {
         let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
         assert_eq!(decided(&[0.2; 3], &[twins, &[], twins]), (vec![1, 1, 1], 0));
+    }
+
+    #[test]
+    fn as_many_labels_may_be_equal_as_masks_lie_over_one_another() {
+        let masks: Vec<(u32, f64)> = (2..8).map(|label| (label, 0.5)).collect();
+        let seeds: [&[_]; 3] = [&masks, &[], &masks];
+        assert_eq!(decided(&[0.2; 3], &seeds), (vec![2, 2, 2], 0));
     }
 
     #[test]

@@ -13,20 +13,27 @@ const ROUNDING: f32 = 2.5e-5;
 /// Share of the largest value of a point that errors are at most where labels of less than half of it cannot win.
 const SMALL_ERROR: f64 = 1.0 / 32.0;
 
-/// Labels of a point that are told apart from one another; any more that may win and all labels are looked at.
-const RANKS: usize = 3;
-
-/// The best labels of a point so far.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Best {
-    /// The winner, those behind it and one more; of equal ones the lowest first.
-    pub(super) labels: [u32; RANKS + 1],
+/// The best labels of a point so far. All but the last are told apart: where that may win too, all labels are looked at.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Best<const RANKS: usize> {
+    /// The winner first; of equal ones the lowest.
+    pub(super) labels: [u32; RANKS],
     /// Their values.
-    values: [f32; RANKS + 1],
+    values: [f32; RANKS],
     sum: f32,
 }
 
-impl Best {
+impl<const RANKS: usize> Default for Best<RANKS> {
+    fn default() -> Self {
+        Self {
+            labels: [0; RANKS],
+            values: [0.0; RANKS],
+            sum: 0.0,
+        }
+    }
+}
+
+impl<const RANKS: usize> Best<RANKS> {
     #[inline]
     fn offer(&mut self, mut label: u32, mut value: f32) {
         for (other, best) in self.labels.iter_mut().zip(&mut self.values) {
@@ -50,10 +57,10 @@ impl Best {
 
     /// The labels that may win, ascending; none where there are more than are told apart.
     pub(super) fn rivals(&self, error: f64) -> Option<Vec<u32>> {
-        if self.may_win(RANKS, error) {
+        if self.may_win(RANKS - 1, error) {
             return None;
         }
-        let may_win = (0..RANKS).filter(|&rank| self.may_win(rank, error));
+        let may_win = (0..RANKS - 1).filter(|&rank| self.may_win(rank, error));
         let mut labels: Vec<u32> = may_win.map(|rank| self.labels[rank]).collect();
         labels.sort_unstable();
         Some(labels)
@@ -69,7 +76,11 @@ impl Best {
 }
 
 /// Offers the values of a pass to the best labels of all points, where each may be off by `error`.
-pub(super) fn update(best: &mut [Best], pass: &Pass<f32, WIDTH_F32>, error: f64) {
+pub(super) fn update<const RANKS: usize>(
+    best: &mut [Best<RANKS>],
+    pass: &Pass<f32, WIDTH_F32>,
+    error: f64,
+) {
     let groups: Vec<_> = pass.groups().collect();
     let least = (error / SMALL_ERROR) as f32;
     let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
@@ -104,28 +115,52 @@ pub(super) fn update(best: &mut [Best], pass: &Pass<f32, WIDTH_F32>, error: f64)
     });
 }
 
-/// The points at which single precision cannot decide, where each value may be off by `error`.
-pub(super) fn contested(best: &[Best], error: f64) -> Result<Vec<u32>> {
-    let mut points = Vec::new();
-    for point in (0..best.len()).filter(|&point| best[point].may_win(1, error)) {
-        push(&mut points, point as u32)?;
-    }
-    Ok(points)
+/// A point at which single precision cannot decide.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NearTie {
+    pub(super) point: u32,
+    /// The labels that may win, ascending; none where there are more than are told apart.
+    pub(super) rivals: Option<Vec<u32>>,
 }
 
-/// The labels that may win at any of `points`, ascending, where each value may be off by the `error` of the point.
-pub(super) fn candidates(
-    best: &[Best],
-    points: &[u32],
-    n_labels: usize,
-    error: impl Fn(u32) -> f64,
-) -> Vec<u32> {
+/// All near-ties by point, where each value may be off by the `error` of the point, none by more than the `largest`.
+pub(super) fn near_ties<const RANKS: usize>(
+    best: &[Best<RANKS>],
+    largest: f64,
+    error: impl Fn(u32) -> f64 + Sync,
+) -> Result<Vec<NearTie>> {
+    let of_task = |task: usize| {
+        let mut ties = Vec::new();
+        for at in task * ROWS_A_TASK..best.len().min((task + 1) * ROWS_A_TASK) {
+            // the largest leaves few to be looked at more closely
+            if best[at].may_win(1, largest) {
+                let (point, error) = (at as u32, error(at as u32));
+                if best[at].may_win(1, error) {
+                    let rivals = best[at].rivals(error);
+                    push(&mut ties, NearTie { point, rivals })?;
+                }
+            }
+        }
+        Ok(ties)
+    };
+    let tasks = (0..best.len().div_ceil(ROWS_A_TASK)).into_par_iter();
+    let ties = tasks.map(of_task).collect::<Result<Vec<_>>>()?;
+    Ok(ties.into_iter().flatten().collect())
+}
+
+/// The labels that may win at any of `ties`, ascending.
+pub(super) fn candidates(ties: &[NearTie], n_labels: usize) -> Vec<u32> {
     let mut labels = Vec::new();
-    for &point in points {
-        let Some(rivals) = best[point as usize].rivals(error(point)) else {
+    for tie in ties {
+        let Some(rivals) = &tie.rivals else {
             return (0..n_labels as u32).collect();
         };
         labels.extend(rivals);
+        // most have the same
+        if labels.len() > 2 * n_labels {
+            labels.sort_unstable();
+            labels.dedup();
+        }
     }
     labels.sort_unstable();
     labels.dedup();
@@ -148,11 +183,16 @@ pub(super) fn refine(points: &[u32], refined: &mut [(u32, f64)], pass: &Pass<f64
 mod tests {
     use super::*;
 
-    fn contested_by(best: &[Best], error: f64) -> Vec<u32> {
-        contested(best, error).unwrap()
+    /// Near-ties where each value may be off by as much.
+    fn ties_of(best: &[Best<4>], error: f64) -> Vec<NearTie> {
+        near_ties(best, error, |_| error).unwrap()
     }
 
-    fn best(values: &[(u32, f32)]) -> Best {
+    fn tied(best: &[Best<4>], error: f64) -> Vec<u32> {
+        ties_of(best, error).iter().map(|tie| tie.point).collect()
+    }
+
+    fn best(values: &[(u32, f32)]) -> Best<4> {
         let mut best = Best::default();
         for &(label, value) in values {
             best.offer(label, value);
@@ -171,34 +211,33 @@ mod tests {
     }
 
     #[test]
-    fn a_point_is_contested_within_twice_the_error_of_the_values() {
+    fn values_within_twice_their_error_are_near_ties() {
         let points = [
             best(&[(1, 0.500), (2, 0.499)]),
             best(&[(1, 0.5), (2, 0.25)]),
         ];
         assert!(
-            contested_by(&points, 0.0).is_empty(),
+            tied(&points, 0.0).is_empty(),
             "far more than rounding apart"
         );
-        assert_eq!(contested_by(&points, 0.001), [0]);
-        assert_eq!(contested_by(&points, 0.2), [0, 1]);
-        assert_eq!(contested_by(&[best(&[(1, 0.5), (2, 0.5)])], 0.0), [0]);
+        assert_eq!(tied(&points, 0.001), [0]);
+        assert_eq!(tied(&points, 0.2), [0, 1]);
+        assert_eq!(tied(&[best(&[(1, 0.5), (2, 0.5)])], 0.0), [0]);
     }
 
     #[test]
     fn a_label_that_nothing_reached_is_no_candidate() {
-        assert!(contested_by(&[best(&[(1, 0.5)])], 1.0).is_empty());
-        assert!(contested_by(&[Best::default()], 1.0).is_empty());
+        assert!(tied(&[best(&[(1, 0.5)])], 1.0).is_empty());
+        assert!(tied(&[Best::default()], 1.0).is_empty());
     }
 
     #[test]
     fn where_a_fourth_label_may_win_all_are_candidates() {
         let two = best(&[(1, 0.5), (4, 0.5), (6, 0.1)]);
         let four = best(&[(1, 0.5), (4, 0.5), (6, 0.5), (8, 0.5)]);
-        assert_eq!(candidates(&[two], &[0], 9, |_| 0.0), [1, 4]);
-        assert_eq!(candidates(&[two], &[0], 9, |_| 0.2), [1, 4, 6]);
-        assert_eq!(candidates(&[two, four], &[0], 9, |_| 0.0), [1, 4]);
+        assert_eq!(candidates(&ties_of(&[two], 0.0), 9), [1, 4]);
+        assert_eq!(candidates(&ties_of(&[two], 0.2), 9), [1, 4, 6]);
         let all: Vec<u32> = (0..9).collect();
-        assert_eq!(candidates(&[two, four], &[0, 1], 9, |_| 0.0), all);
+        assert_eq!(candidates(&ties_of(&[two, four], 0.0), 9), all);
     }
 }
