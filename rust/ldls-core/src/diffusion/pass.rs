@@ -6,7 +6,7 @@ use super::schedule::{Activity, ROWS_A_TASK, Schedule};
 use super::seeds::{BACKGROUND_LANE, Seeds};
 use super::series::Series;
 use super::sweep::{Step, take_steps};
-use super::values::zeros;
+use super::values::Values;
 use crate::graph::PointGraph;
 use crate::memory::tabulate;
 use crate::{Cancel, Error, Result};
@@ -24,10 +24,10 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     schedule: &'a Schedule,
     seeds: &'a Seeds<T>,
     activity: Activity<'a>,
-    /// Values, group by group.
-    z: Vec<Vec<Lanes<T, WIDTH>>>,
+    /// Values.
+    z: Values<T, WIDTH>,
     /// Values before the last step, which the next one overwrites.
-    previous: Vec<Vec<Lanes<T, WIDTH>>>,
+    previous: Values<T, WIDTH>,
     /// Sum of the magnitudes of the coefficients that a series leaves out.
     left_out: f64,
     pub(super) convergence: Convergence,
@@ -76,9 +76,8 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         cancel: &Cancel,
     ) -> Result<Self> {
         let groups = seeds.lanes.len().div_ceil(WIDTH).max(1);
-        let mut z = zeros(a.len(), groups, cancel)?;
-        let previous = zeros(a.len(), groups, cancel)?;
-        let rows = z[0].par_chunks_mut(ROWS_A_TASK);
+        let [mut z, previous] = Values::zeros(a.len(), groups, cancel)?;
+        let rows = z.group_mut(0).par_chunks_mut(ROWS_A_TASK);
         let rows = rows.zip(seeds.background.par_chunks(ROWS_A_TASK));
         rows.try_for_each(|(rows, weights)| {
             cancel.check()?;
@@ -87,10 +86,10 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             Ok::<(), Error>(())
         })?;
         for &(i, lane, weight) in seeds.of_rows(0..a.len()) {
-            z[lane as usize / WIDTH][i as usize][lane as usize % WIDTH] = scale * weight;
+            z.group_mut(lane as usize / WIDTH)[i as usize][lane as usize % WIDTH] = scale * weight;
         }
         if let Some(lane) = seeds.probe_lane() {
-            let rows = z[lane / WIDTH].par_iter_mut().zip(&seeds.probe);
+            let rows = z.group_mut(lane / WIDTH).par_iter_mut().zip(&seeds.probe);
             rows.with_min_len(ROWS_A_TASK)
                 .for_each(|(row, &weight)| row[lane % WIDTH] = weight);
         }
@@ -119,7 +118,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     /// Applies `steps` one after the other; what was z before the last becomes the previous values.
     fn advance(&mut self, steps: &[Step<T>], cancel: &Cancel) -> Result<()> {
-        let values = [&mut self.z[..], &mut self.previous];
+        let values = [&mut self.z, &mut self.previous];
         take_steps(
             self.a,
             self.seeds,
@@ -146,25 +145,25 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     /// Gives up the values before the last step, once no further one is to come.
     pub(super) fn drop_previous(&mut self) {
-        self.previous = Vec::new();
+        self.previous = Values::none();
     }
 
     /// Label, values of its group at all points and lane within the group of each label.
     pub(super) fn labels(&self) -> impl Iterator<Item = (u32, &[Lanes<T, WIDTH>], usize)> {
         let lanes = self.seeds.labels();
-        lanes.map(|(label, lane)| (label, &self.z[lane / WIDTH][..], lane % WIDTH))
+        lanes.map(|(label, lane)| (label, self.z.group(lane / WIDTH), lane % WIDTH))
     }
 
     /// Values at all points and labels of the lanes of each group, no label for the probe, and one for each lane that has a
     /// label, zero for the others.
     pub(super) fn groups(&self) -> impl Iterator<Item = Group<'_, T, WIDTH>> {
-        let groups = self.z.iter().zip(self.seeds.lanes.chunks(WIDTH));
+        let groups = self.z.groups().zip(self.seeds.lanes.chunks(WIDTH));
         groups.map(|(values, labels)| {
             let mut counts = [T::default(); WIDTH];
             for (count, label) in counts.iter_mut().zip(labels) {
                 *count = T::from_f64(if label.is_some() { 1.0 } else { 0.0 });
             }
-            (values.as_slice(), labels, counts)
+            (values, labels, counts)
         })
     }
 
@@ -176,17 +175,25 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
                 let changes = lanes.map(|lane| (z[lane] - previous[lane]).to_f64().abs());
                 changes.fold(0.0, f64::max)
             };
-            let rows = self.z[group].par_iter().zip(&self.previous[group]);
+            let rows = self.z.group(group).par_iter();
+            let rows = rows.zip(self.previous.group(group));
             let rows = rows.with_min_len(ROWS_A_TASK);
             rows.map(change_at).reduce(|| 0.0, f64::max)
         };
-        (0..self.z.len()).map(of_group).fold(0.0, f64::max)
+        (0..self.z.groups().count())
+            .map(of_group)
+            .fold(0.0, f64::max)
     }
 
     /// What the series may leave out at a point, going by the probe there; none where there is no series or no probe.
     fn error(&self, point: usize) -> Option<f64> {
         let lane = self.seeds.probe_lane().filter(|_| self.left_out > 0.0)?;
-        Some(self.left_out * self.z[lane / WIDTH][point][lane % WIDTH].to_f64().abs())
+        Some(
+            self.left_out
+                * self.z.group(lane / WIDTH)[point][lane % WIDTH]
+                    .to_f64()
+                    .abs(),
+        )
     }
 
     /// That of all points.

@@ -8,7 +8,7 @@
 use super::lanes::{Lane, Lanes, Vector};
 use super::schedule::{Activity, BLOCK, Schedule};
 use super::seeds::{BACKGROUND_LANE, MOST_GROUPS, Seeds};
-use super::values::SharedValues;
+use super::values::{SharedValues, Values};
 use crate::graph::PointGraph;
 use crate::{Cancel, Real, Result};
 use bytemuck::Zeroable;
@@ -52,7 +52,7 @@ pub(super) fn take_steps<T: Lane<WIDTH>, const WIDTH: usize>(
     schedule: &Schedule,
     steps: &[Step<T>],
     activity: &Activity,
-    values: [&mut [Vec<Lanes<T, WIDTH>>]; 2],
+    values: [&mut Values<T, WIDTH>; 2],
     cancel: &Cancel,
 ) -> Result<()> {
     let values = values.map(SharedValues::new);

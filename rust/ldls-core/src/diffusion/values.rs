@@ -1,6 +1,6 @@
 //! The values of all lanes at all points, which threads read while others write other rows of them.
 //!
-//! They are kept group by group, `Vec<Vec<Lanes>>`: where a group holds nothing but zeros, a sweep leaves it out
+//! They are kept group by group: where a group holds nothing but zeros, a sweep leaves it out
 //! and does not touch its memory.
 
 #![expect(unsafe_code, reason = "threads share values by rows")]
@@ -13,15 +13,51 @@ use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Zeros of `groups` groups at `points` points.
-pub(super) fn zeros<T: Real, const WIDTH: usize>(
-    points: usize,
-    groups: usize,
-    cancel: &Cancel,
-) -> Result<Vec<Vec<Lanes<T, WIDTH>>>> {
-    // threads share out what the allocator has to clear
-    let group = |_| memory::zeros(points, cancel);
-    (0..groups).into_par_iter().map(group).collect()
+/// Points by which every other array is shifted, which are half a page. Processors tell by the place in its page whether what
+/// they load has just been stored, and what has just been stored are the next values of points nearby.
+const SHIFT: usize = 64;
+
+/// Values of all lanes at all points.
+#[derive(Debug)]
+pub(super) struct Values<T, const WIDTH: usize> {
+    groups: Vec<Vec<Lanes<T, WIDTH>>>,
+    /// Where in each group those of point 0 are.
+    first: usize,
+}
+
+impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
+    /// Zeros, for values and for those before them.
+    pub(super) fn zeros(points: usize, groups: usize, cancel: &Cancel) -> Result<[Self; 2]> {
+        let shifted = |first: usize| {
+            // threads share out what the allocator has to clear
+            let group = |_| memory::zeros(first + points, cancel);
+            let groups = (0..groups).into_par_iter().map(group);
+            let groups = groups.collect::<Result<_>>()?;
+            Ok(Self { groups, first })
+        };
+        Ok([shifted(0)?, shifted(SHIFT)?])
+    }
+
+    /// None at all.
+    pub(super) fn none() -> Self {
+        Self {
+            groups: Vec::new(),
+            first: 0,
+        }
+    }
+
+    /// Those of each group at all points.
+    pub(super) fn groups(&self) -> impl Iterator<Item = &[Lanes<T, WIDTH>]> {
+        self.groups.iter().map(|group| &group[self.first..])
+    }
+
+    pub(super) fn group(&self, group: usize) -> &[Lanes<T, WIDTH>] {
+        &self.groups[group][self.first..]
+    }
+
+    pub(super) fn group_mut(&mut self, group: usize) -> &mut [Lanes<T, WIDTH>] {
+        &mut self.groups[group][self.first..]
+    }
 }
 
 /// Values of all lanes at all points, borrowed for as long as threads share them.
@@ -37,15 +73,15 @@ pub(super) struct SharedValues<'a, T, const WIDTH: usize> {
 unsafe impl<T: Send, const WIDTH: usize> Sync for SharedValues<'_, T, WIDTH> {}
 
 impl<'a, T: Real, const WIDTH: usize> SharedValues<'a, T, WIDTH> {
-    pub(super) fn new(values: &'a mut [Vec<Lanes<T, WIDTH>>]) -> Self {
+    pub(super) fn new(values: &'a mut Values<T, WIDTH>) -> Self {
         let mut groups = [std::ptr::null_mut(); MOST_GROUPS];
-        for (shared, group) in groups.iter_mut().zip(values.iter_mut()) {
-            *shared = group.as_mut_ptr();
+        for (group, shared) in groups.iter_mut().take(values.groups.len()).enumerate() {
+            *shared = values.group_mut(group).as_mut_ptr();
         }
         Self {
             groups,
-            count: values.len(),
-            points: values.first().map_or(0, Vec::len),
+            count: values.groups.len(),
+            points: values.groups().next().map_or(0, <[_]>::len),
             borrowed: PhantomData,
         }
     }
