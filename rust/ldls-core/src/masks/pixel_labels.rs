@@ -246,7 +246,8 @@ impl<T: Real> PixelLabels<T> {
             // a point without pixel edges counts for none
             if weights > 0.0 { weights / mass } else { 0.0 }
         };
-        (0..self.rows()).map(overlap).fold(1.0, f64::max)
+        let points = (0..self.rows()).into_par_iter().with_min_len(POINTS_A_TASK);
+        points.map(overlap).reduce(|| 1.0, f64::max)
     }
 
     /// Number of points.
