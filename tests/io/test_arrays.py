@@ -1,12 +1,13 @@
 """`.npy` files that lie or are cut: the same refusals from every reader of them."""
 
 import tracemalloc
+import zipfile
 
 import numpy as np
 import pytest
 
 import ldls
-from ldls.io.arrays import read_npy
+from ldls.io.arrays import open_npz, read_npy, write_npz
 from ldls.io.labels.squeezeseg import read_squeezeseg
 
 READERS = {"points": ldls.read_points, "masks": ldls.read_masks, "squeezeseg": read_squeezeseg}
@@ -84,3 +85,23 @@ def test_arrays_are_read_as_numpy_reads_them(tmp_path, array):
     assert found.dtype == expected.dtype
     assert found.flags.f_contiguous == expected.flags.f_contiguous
     assert found.flags.writeable
+
+
+def test_what_does_not_get_half_as_large_is_stored_as_it_stands(tmp_path):
+    generator = np.random.default_rng(0)
+    arrays = {
+        "coordinates": generator.normal(size=(20_000, 4)).astype(np.float32),
+        "columns_first": np.asfortranarray(generator.normal(size=(20_000, 3))),
+        "labels": np.repeat(np.arange(20, dtype=np.int32), 1000),
+        "names": np.array(["car", "person"] * 500),
+        "empty": np.zeros((0, 3)),
+        "text": np.array("{}"),
+    }
+    write_npz(tmp_path / "a.npz", arrays)
+    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
+        stored = {member.filename for member in archive.infolist() if member.compress_type == zipfile.ZIP_STORED}
+    assert {"coordinates.npy", "columns_first.npy"} <= stored
+    assert not stored & {"labels.npy", "names.npy"}
+    with open_npz(tmp_path / "a.npz", "arrays") as read:
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(read[name], array)
