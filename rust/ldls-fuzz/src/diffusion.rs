@@ -158,13 +158,27 @@ fn check_winners(
         Cancel::never(),
     )
     .expect("the system fits");
+    let seeds_of: Vec<Vec<(usize, f64)>> = (0..n_labels)
+        .map(|label| {
+            let rows = 0..labels.offsets.len() - 1;
+            let own = rows.flat_map(|i| exact.1.row(i).map(move |(at, weight)| (i, at, weight)));
+            let own = own.filter(|&(_, at, _)| at == label);
+            own.map(|(i, _, weight)| (i, weight)).collect()
+        })
+        .collect();
     for (i, (row, &label)) in plain.chunks(n_labels).zip(&found.labels).enumerate() {
+        let twins = |&lower: &usize| seeds_of[lower] == seeds_of[label as usize];
         let best = row.iter().copied().fold(0.0, f64::max);
         let own = row[label as usize];
         let nothing = best <= NEGLIGIBLE * seeds;
         assert!(
             own >= best - ROUNDING * best || nothing,
             "point {i} has label {label} of {own:e}, {row:?}"
+        );
+        let twin = (0..label as usize).find(twins);
+        assert!(
+            nothing || twin.is_none(),
+            "point {i} has label {label}, and {twin:?} has the same seeds, {row:?}"
         );
         // of equal likelihoods the lowest label, where rounding cannot have told them apart
         let first = row.iter().position(|&value| value == best).unwrap_or(0);
@@ -284,10 +298,11 @@ fn any_graph(bytes: &mut Bytes<'_>) -> Csr {
     graph
 }
 
-/// Weights of pixel edges by label, and of all of them, for `points` points: none for some.
+/// Weights of pixel edges by label, and of all of them, for `points` points: none for some. Masks may be copies of others.
 fn random_labels(bytes: &mut Bytes<'_>, points: usize, n_labels: usize) -> (Csr, Vec<f64>) {
     let pixel_weight = [0.001, 0.001, 1.0][bytes.below(3)];
     let share = bytes.unit();
+    let originals = [n_labels, n_labels, 1 + bytes.below(n_labels.min(3))][bytes.below(3)];
     let mut labels = Csr {
         offsets: vec![0],
         columns: Vec::new(),
@@ -296,10 +311,14 @@ fn random_labels(bytes: &mut Bytes<'_>, points: usize, n_labels: usize) -> (Csr,
     let mut mass = Vec::new();
     for _ in 0..points {
         let (mut largest, mut sum) = (0.0_f64, 0.0);
-        for label in 0..n_labels as u32 {
-            if bytes.unit() < share / (1.0 + f64::from(label)) {
-                let weight = pixel_weight * (1 + bytes.below(25)) as f64;
-                labels.columns.push(label);
+        let mut weights = Vec::new();
+        for label in 0..originals {
+            let seen = bytes.unit() < share / (1.0 + label as f64);
+            weights.push(seen.then(|| pixel_weight * (1 + bytes.below(25)) as f64));
+        }
+        for label in 0..n_labels {
+            if let Some(weight) = weights[label % originals] {
+                labels.columns.push(label as u32);
                 labels.weights.push(weight);
                 (largest, sum) = (largest.max(weight), sum + weight);
             }

@@ -8,6 +8,7 @@ use super::pass::Pass;
 use super::schedule::Schedule;
 use super::seeds::{Seeds, plan};
 use super::series::Series;
+use super::winners::EQUAL;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{filled, push};
@@ -15,8 +16,6 @@ use crate::{Cancel, Result};
 
 /// Share of the work of diffusing the whole graph from which on that is done instead.
 const MOST_WORK: f64 = 0.5;
-/// Share of the largest value within which values are equal: what rounding leaves of equal ones.
-const EQUAL: f64 = 1e-13;
 
 /// What some points may have labels from.
 #[derive(Debug)]

@@ -13,6 +13,9 @@ const ROUNDING: f32 = 2.5e-5;
 /// Share of the largest value of a point that errors are at most where labels of less than half of it cannot win.
 const SMALL_ERROR: f64 = 1.0 / 32.0;
 
+/// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
+pub(super) const EQUAL: f64 = 1e-13;
+
 /// The best labels of a point so far. All but the last are told apart: where that may win too, all labels are looked at.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Best<const RANKS: usize> {
@@ -167,15 +170,20 @@ pub(super) fn candidates(ties: &[NearTie], n_labels: usize) -> Vec<u32> {
     labels
 }
 
-/// Keeps in `refined` the best label of each of `points` and its value.
+/// Keeps in `refined` the best label of each of `points` and its value; of [`EQUAL`] ones the lowest.
 pub(super) fn refine(points: &[u32], refined: &mut [(u32, f64)], pass: &Pass<f64, WIDTH_F64>) {
     for (&point, best) in points.iter().zip(refined) {
         for (label, group, lane) in pass.labels() {
-            let value = group[point as usize][lane];
-            if value > best.1 || (value == best.1 && label < best.0) {
-                *best = (label, value);
-            }
+            offer(best, label, group[point as usize][lane]);
         }
+    }
+}
+
+fn offer((best, largest): &mut (u32, f64), label: u32, value: f64) {
+    if value > *largest * (1.0 + EQUAL) {
+        (*best, *largest) = (label, value);
+    } else if value >= *largest * (1.0 - EQUAL) {
+        (*best, *largest) = (label.min(*best), value.max(*largest));
     }
 }
 
@@ -208,6 +216,26 @@ mod tests {
         ] {
             assert_eq!(best(&values).labels[..3], [0, 3, 7]);
         }
+    }
+
+    #[test]
+    fn of_values_that_rounding_tells_apart_the_lowest_label_wins_in_any_order() {
+        let below = 0.5 * (1.0 - f64::EPSILON);
+        for values in [
+            [(3, 0.5), (0, below), (7, 0.5)],
+            [(7, 0.5), (3, 0.5), (0, below)],
+            [(0, below), (7, 0.5), (3, 0.25)],
+        ] {
+            let mut best = (0, f64::NEG_INFINITY);
+            for (label, value) in values {
+                offer(&mut best, label, value);
+            }
+            assert_eq!(best, (0, 0.5));
+        }
+        let mut best = (1, 0.5);
+        offer(&mut best, 0, 0.5 * (1.0 - 1e-12));
+        offer(&mut best, 2, 0.5 * (1.0 + 1e-12));
+        assert_eq!(best.0, 2);
     }
 
     #[test]
