@@ -70,7 +70,7 @@ pub fn diffuse(
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
     // as many labels may be equal at a point, and all of them are kept
-    if b.largest_overlap() < FEW_RANKS as f64 {
+    if b.largest_overlap()[0] < FEW_RANKS as f64 {
         diffuse_ranked::<FEW_RANKS>(a, b, n_labels, iterations, exact, cancel)
     } else {
         diffuse_ranked::<MANY_RANKS>(a, b, n_labels, iterations, exact, cancel)

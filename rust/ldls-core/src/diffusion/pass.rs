@@ -205,12 +205,13 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         tabulate(self.a.len(), error, cancel).map(Some)
     }
 
-    /// True if at most `most_left_out` is left out, no likelihood is negative, and those of no point sum to more than `overlap`, the most
-    /// labels that its pixel edges count for.
-    pub(super) fn is_sound(&self, most_left_out: f64, overlap: f64) -> bool {
+    /// True if at most `most_left_out` is left out, no likelihood is negative or more than `one`, the largest share of pixel edges that
+    /// counts for a label, and those of no point sum to more than `overlap`, the most labels that its pixel edges count for.
+    pub(super) fn is_sound(&self, most_left_out: f64, [overlap, one]: [f64; 2]) -> bool {
         let groups: Vec<_> = self.groups().collect();
+        let zeros = [T::default(); WIDTH];
         let row_is_sound = |i: usize| {
-            let (mut sums, mut least) = ([T::default(); WIDTH], [T::default(); WIDTH]);
+            let (mut sums, mut least, mut largest) = (zeros, zeros, zeros);
             for (values, _, counts) in &groups {
                 for lane in 0..WIDTH {
                     let value = counts[lane] * values[i][lane];
@@ -220,11 +221,17 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
                     } else {
                         least[lane]
                     };
+                    largest[lane] = if value > largest[lane] {
+                        value
+                    } else {
+                        largest[lane]
+                    };
                 }
             }
             let sum: f64 = sums.iter().map(|sum| sum.to_f64()).sum();
             let negative = least.iter().any(|value| value.to_f64() < -SLACK);
-            sum.is_finite() && sum <= overlap + SLACK && !negative
+            let beyond = largest.iter().any(|value| value.to_f64() > one + SLACK);
+            sum.is_finite() && sum <= overlap + SLACK && !negative && !beyond
         };
         let points = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
         self.convergence.error <= most_left_out && points.all(row_is_sound)
@@ -250,7 +257,7 @@ mod tests {
         let seeds = Seeds::new(&b, vec![Some(0), Some(1)], never).unwrap();
         let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1), never).unwrap();
         pass.convergence.error = error;
-        pass.is_sound(1e-3, overlap)
+        pass.is_sound(1e-3, [overlap, 1.0])
     }
 
     #[test]
@@ -268,6 +275,12 @@ mod tests {
     fn likelihoods_that_sum_to_more_than_their_pixel_edges_count_for_are_unsound() {
         assert!(!pass_is_sound([[0.6, 0.6], [0.0, 1.0]], 0.0, 1.0));
         assert!(pass_is_sound([[0.6, 0.6], [0.0, 1.0]], 0.0, 1.2));
+    }
+
+    #[test]
+    fn a_likelihood_larger_than_any_share_of_pixel_edges_is_unsound() {
+        assert!(pass_is_sound([[1.0, 1.0], [0.0, 1.0]], 0.0, 2.0));
+        assert!(!pass_is_sound([[1.08, 0.5], [0.0, 1.0]], 0.0, 2.0));
     }
 
     #[test]

@@ -238,16 +238,21 @@ impl<T: Real> PixelLabels<T> {
         })
     }
 
-    /// Most labels that the pixel edges of a point count for on average: 1 where masks do not overlap.
-    pub(crate) fn largest_overlap(&self) -> f64 {
+    /// Most labels that the pixel edges of a point count for on average, 1 where masks do not overlap; and the largest share of
+    /// them that counts for one label, no less than 1.
+    pub(crate) fn largest_overlap(&self) -> [f64; 2] {
         let overlap = |i: usize| {
             let mass = self.mass[i].to_f64();
-            let weights: f64 = self.row(i).map(|(_, weight)| weight.to_f64()).sum();
+            let weights = self.row(i).map(|(_, weight)| weight.to_f64());
+            let [all, one] = weights.fold([0.0_f64; 2], |[all, one], weight| {
+                [all + weight, one.max(weight)]
+            });
             // a point without pixel edges counts for none
-            if weights > 0.0 { weights / mass } else { 0.0 }
+            [all, one].map(|weight| if all > 0.0 { weight / mass } else { 0.0 })
         };
+        let larger = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.max(c), b.max(d)];
         let points = (0..self.rows()).into_par_iter().with_min_len(POINTS_A_TASK);
-        points.map(overlap).reduce(|| 1.0, f64::max)
+        points.map(overlap).reduce(|| [1.0; 2], larger)
     }
 
     /// Number of points.
