@@ -34,9 +34,9 @@ HEADER_BYTES = 1 << 14
 """Bytes that the header of an array lies in."""
 CHUNK_BYTES = 1 << 20
 LEVEL = 1
-"""How hard arrays are compressed, of 9."""
+"""How hard arrays are compressed: a third of the time of 6, which is NumPy's, and 3 % larger."""
 SAMPLE_BYTES = 1 << 14
-"""Bytes that tell whether an array is worth it."""
+"""Bytes at the beginning of an array that tell whether it is worth compressing."""
 PLAIN_BYTES = 1 << 28
 """Size up to which an array may be packed as well as it likes: masks without a pixel are."""
 MAX_RATIO = 700
@@ -130,15 +130,13 @@ def open_npz(path: str | PathLike[str], what: str = ".npz file") -> Iterator[Arc
 
 
 def write_npz(path: str | PathLike[str], arrays: dict[str, NDArray[Any]]) -> None:
-    """Write a `.npz` file in which what gets half as large and less is compressed."""
-    # a third of the time of NumPy's own, whose level is 6, and 3 % larger
+    """Write a `.npz` file; arrays that get half as large and less are compressed."""
     with whole_file(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         for name, array in arrays.items():
-            member_name = f"{name}.npy"
-            # a member as such is stored as it stands
-            member = member_name if _shrinks(array) else zipfile.ZipInfo(member_name)
-            with archive.open(member, "w", force_zip64=True) as opened:
-                np.lib.format.write_array(opened, np.asanyarray(array), allow_pickle=False)
+            # what is opened by name is compressed, by a description of its own stored as it stands
+            entry = f"{name}.npy" if _shrinks(array) else zipfile.ZipInfo(f"{name}.npy")
+            with archive.open(entry, "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
 
 
 def _shrinks(array: NDArray[Any]) -> bool:

@@ -7,8 +7,8 @@ use crate::{Cancel, Result};
 
 /// Points that may be followed for each that is asked about: less work than to diffuse labels there.
 const FOLLOWED_A_POINT: usize = 16;
-/// Points that may be followed for a single one.
-const MOST_FOLLOWED: usize = 4096;
+/// As many more, so that a few points may be followed far.
+const FOLLOWED_ANYWAY: usize = 4096;
 
 /// What is known of some labels at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +17,7 @@ enum Known {
     /// What flows to it is being looked at.
     Met,
     Equal,
-    /// Seeds differ at a point that flows to it.
+    /// Seeds differ at a point that flows to it, or too many points do.
     Unequal,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Followed<'a> {
         least: f32,
         cancel: &Cancel,
     ) -> Result<Vec<u32>> {
-        let most = MOST_FOLLOWED + FOLLOWED_A_POINT * points.len();
+        let most = FOLLOWED_ANYWAY + FOLLOWED_A_POINT * points.len();
         let (mut equal, mut followed) = (Vec::new(), 0);
         for &point in points {
             if self.known[point as usize] == Known::Nothing && followed < most {
@@ -75,7 +75,7 @@ impl<'a> Followed<'a> {
         Ok(equal)
     }
 
-    /// Finds out about a point, unless `most` others flow to it; how many were followed.
+    /// Finds out about a point, where no more than `most` flow to it; how many were followed.
     fn follow(&mut self, from: u32, labels: &[u32], least: f32, most: usize) -> Result<usize> {
         self.meet(from, 0)?;
         let mut at = 0;
@@ -137,8 +137,8 @@ impl<'a> Followed<'a> {
 mod tests {
     use super::*;
 
-    /// Points that each have an edge from themselves and from those named, of weight 0.25, and seeds 0.5 of labels 1 and 2 or of one.
-    /// Where, of `points`, both labels are equal.
+    /// Where, of `points`, labels 1 and 2 are equal: each point of the graph has edges of weight 0.25 from itself and from those that
+    /// `edges` names, and `seeds` of 0.5.
     fn equal_at(edges: &[&[u32]], seeds: &[&[u32]], points: &[u32]) -> Vec<u32> {
         let rows: Vec<Vec<u32>> = (0..)
             .zip(edges)
@@ -157,13 +157,11 @@ mod tests {
             mass: vec![1.0; seeds.len()],
         };
         let mut followed = Followed::new(&a, &b, Cancel::never()).unwrap();
-        let twice = [0.0, 0.0].map(|least| {
-            let found = followed.equal_at(points, &[1, 2], least, Cancel::never());
-            found.unwrap()
-        });
-        assert_eq!(twice[0], twice[1], "nothing is left of the first time");
+        let mut find = || followed.equal_at(points, &[1, 2], 0.0, Cancel::never());
+        let (first, second) = (find().unwrap(), find().unwrap());
+        assert_eq!(first, second, "nothing is left of the first time");
         assert!(followed.known.iter().all(|known| *known == Known::Nothing));
-        twice[0].clone()
+        first
     }
 
     const BOTH: &[u32] = &[1, 2];
@@ -185,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_long_way_is_followed_where_many_points_are_asked_about() {
-        let n = 2 * MOST_FOLLOWED as u32;
+        let n = 2 * FOLLOWED_ANYWAY as u32;
         let edges: Vec<Vec<u32>> = (0..n).map(|i| vec![(i + 1) % n]).collect();
         let edges: Vec<&[u32]> = edges.iter().map(Vec::as_slice).collect();
         let seeds = vec![BOTH; n as usize];

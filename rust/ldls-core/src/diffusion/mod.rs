@@ -70,17 +70,16 @@ pub fn diffuse(
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
     // as many labels may be equal at a point, and all of them are kept
-    if b.largest_overlap()[0] < FEW_RANKS as f64 {
-        diffuse_ranked::<FEW_RANKS>(a, b, n_labels, iterations, exact, cancel)
+    if b.largest_shares().all < FEW_RANKS as f64 {
+        diffuse_ranked::<FEW_RANKS>((a, b), n_labels, iterations, exact, cancel)
     } else {
-        diffuse_ranked::<MANY_RANKS>(a, b, n_labels, iterations, exact, cancel)
+        diffuse_ranked::<MANY_RANKS>((a, b), n_labels, iterations, exact, cancel)
     }
 }
 
 /// The same, with so many labels kept of each point.
 fn diffuse_ranked<const RANKS: usize>(
-    a: &PointGraph,
-    b: &PixelLabels,
+    (a, b): (&PointGraph, &PixelLabels),
     n_labels: usize,
     iterations: Option<usize>,
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,

@@ -8,6 +8,7 @@ use super::series::Series;
 use super::sweep::{Step, take_steps};
 use super::values::Values;
 use crate::graph::PointGraph;
+use crate::masks::Shares;
 use crate::memory::tabulate;
 use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
@@ -205,13 +206,13 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         tabulate(self.a.len(), error, cancel).map(Some)
     }
 
-    /// True if at most `most_left_out` is left out, no likelihood is negative or more than `one`, the largest share of pixel edges that
-    /// counts for a label, and those of no point sum to more than `overlap`, the most labels that its pixel edges count for.
-    pub(super) fn is_sound(&self, most_left_out: f64, [overlap, one]: [f64; 2]) -> bool {
+    /// True if at most `most_left_out` is left out, no likelihood is negative or larger than the `largest` share of one label, and
+    /// those of no point sum to more than that of all labels.
+    pub(super) fn is_sound(&self, most_left_out: f64, largest: Shares) -> bool {
         let groups: Vec<_> = self.groups().collect();
         let zeros = [T::default(); WIDTH];
         let row_is_sound = |i: usize| {
-            let (mut sums, mut least, mut largest) = (zeros, zeros, zeros);
+            let (mut sums, mut least, mut most) = (zeros, zeros, zeros);
             for (values, _, counts) in &groups {
                 for lane in 0..WIDTH {
                     let value = counts[lane] * values[i][lane];
@@ -221,17 +222,19 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
                     } else {
                         least[lane]
                     };
-                    largest[lane] = if value > largest[lane] {
+                    most[lane] = if value > most[lane] {
                         value
                     } else {
-                        largest[lane]
+                        most[lane]
                     };
                 }
             }
             let sum: f64 = sums.iter().map(|sum| sum.to_f64()).sum();
             let negative = least.iter().any(|value| value.to_f64() < -SLACK);
-            let beyond = largest.iter().any(|value| value.to_f64() > one + SLACK);
-            sum.is_finite() && sum <= overlap + SLACK && !negative && !beyond
+            let beyond = most
+                .iter()
+                .any(|value| value.to_f64() > largest.one + SLACK);
+            sum.is_finite() && sum <= largest.all + SLACK && !negative && !beyond
         };
         let points = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
         self.convergence.error <= most_left_out && points.all(row_is_sound)
@@ -257,7 +260,13 @@ mod tests {
         let seeds = Seeds::new(&b, vec![Some(0), Some(1)], never).unwrap();
         let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1), never).unwrap();
         pass.convergence.error = error;
-        pass.is_sound(1e-3, [overlap, 1.0])
+        pass.is_sound(
+            1e-3,
+            Shares {
+                all: overlap,
+                one: 1.0,
+            },
+        )
     }
 
     #[test]

@@ -38,6 +38,7 @@ pub(super) fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
         series.truncate(1);
     }
     let schedule = schedule?;
+    let largest = b.largest_shares();
     let mut convergence = Convergence::default();
     for lanes in plan(b, labels, WIDTH, probed) {
         let seeds = Seeds::new(b, lanes, cancel)?;
@@ -45,7 +46,7 @@ pub(super) fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
             |series: &[Series]| Pass::run(a, &schedule, &seeds, series.last(), iterations, cancel);
         let mut pass = run(&series)?;
         while let Some(tried) = series.last() {
-            if pass.is_sound(tried.most_left_out, b.largest_overlap()) {
+            if pass.is_sound(tried.most_left_out, largest) {
                 break;
             }
             series.pop();

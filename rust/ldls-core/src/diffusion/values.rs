@@ -1,7 +1,7 @@
 //! The values of all lanes at all points, which threads read while others write other rows of them.
 //!
-//! They are kept group by group: where a group holds nothing but zeros, a sweep leaves it out
-//! and does not touch its memory.
+//! They are kept group by group: where a group holds nothing but zeros, a sweep leaves it out and does not touch its
+//! memory.
 
 #![expect(unsafe_code, reason = "threads share values by rows")]
 
@@ -74,6 +74,8 @@ unsafe impl<T: Send, const WIDTH: usize> Sync for SharedValues<'_, T, WIDTH> {}
 
 impl<'a, T: Real, const WIDTH: usize> SharedValues<'a, T, WIDTH> {
     pub(super) fn new(values: &'a mut Values<T, WIDTH>) -> Self {
+        // before there are pointers, which nobody may borrow beside
+        let points = values.groups().next().map_or(0, <[_]>::len);
         let mut groups = [std::ptr::null_mut(); MOST_GROUPS];
         for (group, shared) in groups.iter_mut().take(values.groups.len()).enumerate() {
             *shared = values.group_mut(group).as_mut_ptr();
@@ -81,7 +83,7 @@ impl<'a, T: Real, const WIDTH: usize> SharedValues<'a, T, WIDTH> {
         Self {
             groups,
             count: values.groups.len(),
-            points: values.groups().next().map_or(0, <[_]>::len),
+            points,
             borrowed: PhantomData,
         }
     }

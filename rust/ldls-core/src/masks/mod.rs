@@ -11,4 +11,5 @@ mod rle;
 pub use instance_masks::InstanceMasks;
 pub use label_image::LabelImage;
 pub use pixel_labels::PixelLabels;
+pub(crate) use pixel_labels::Shares;
 pub use rle::Rle;

@@ -23,6 +23,15 @@ pub struct PixelLabels<T = f32> {
     pub mass: Vec<T>,
 }
 
+/// What labels weigh at a point, as shares of the weight of its pixel edges.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shares {
+    /// All labels together: 1 where masks do not overlap.
+    pub(crate) all: f64,
+    /// A single one.
+    pub(crate) one: f64,
+}
+
 impl LabelImage {
     /// The pixel edges of points that fall on the pixels `uv`: each point is joined to the pixels of the `window` x
     /// `window` square centred on its nearest pixel that lie in the image, each with weight `pixel_weight`. Only the labels
@@ -238,21 +247,28 @@ impl<T: Real> PixelLabels<T> {
         })
     }
 
-    /// Most labels that the pixel edges of a point count for on average, 1 where masks do not overlap; and the largest share of
-    /// them that counts for one label, no less than 1.
-    pub(crate) fn largest_overlap(&self) -> [f64; 2] {
-        let overlap = |i: usize| {
+    /// The largest shares that any point has, no less than 1.
+    pub(crate) fn largest_shares(&self) -> Shares {
+        let shares = |i: usize| {
             let mass = self.mass[i].to_f64();
             let weights = self.row(i).map(|(_, weight)| weight.to_f64());
             let [all, one] = weights.fold([0.0_f64; 2], |[all, one], weight| {
                 [all + weight, one.max(weight)]
             });
             // a point without pixel edges counts for none
-            [all, one].map(|weight| if all > 0.0 { weight / mass } else { 0.0 })
+            let share = |weight: f64| if all > 0.0 { weight / mass } else { 0.0 };
+            Shares {
+                all: share(all),
+                one: share(one),
+            }
         };
-        let larger = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.max(c), b.max(d)];
+        let larger = |a: Shares, b: Shares| Shares {
+            all: a.all.max(b.all),
+            one: a.one.max(b.one),
+        };
+        let least = Shares { all: 1.0, one: 1.0 };
         let points = (0..self.rows()).into_par_iter().with_min_len(POINTS_A_TASK);
-        points.map(overlap).reduce(|| [1.0; 2], larger)
+        points.map(shares).reduce(|| least, larger)
     }
 
     /// Number of points.
