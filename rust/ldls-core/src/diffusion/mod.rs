@@ -14,11 +14,13 @@ mod near_ties;
 mod pass;
 mod passes;
 mod phases;
+mod plan;
 mod products;
 mod reach;
 mod schedule;
 mod seeds;
 mod series;
+mod spread;
 mod sweep;
 mod values;
 mod winners;
@@ -131,9 +133,9 @@ pub fn likelihoods(
     let mut all = zeros(a.len().saturating_mul(n_labels), cancel)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let write = |pass: &Pass<f32, WIDTH_F32>| {
-        for (label, group, lane) in pass.labels() {
-            for (row, values) in all.chunks_mut(n_labels).zip(group) {
-                row[label as usize] = values[lane];
+        for (point, row) in all.chunks_mut(n_labels).enumerate() {
+            for (label, value) in pass.at(point) {
+                row[label as usize] = value;
             }
         }
         Ok(())
@@ -262,18 +264,18 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_too_large_for_the_cache_gets_the_likelihoods_of_plain_products() {
+    fn a_large_cloud_whose_labels_share_lanes_gets_the_likelihoods_of_plain_products() {
         // a strip, and far points that are joined to both of its ends
         let strip = (0..100_000).map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0]);
         let far = (0..40).map(|i| [2500.0, 3000.0 + f64::from(i % 2), f64::from(i)]);
         let points: Vec<[f64; 3]> = strip.chain(far).collect();
         let seen: Vec<(u32, u32)> = (0..points.len() as u32)
-            .map(|i| (1 + i / 7000 % 2, i % 26))
+            .map(|i| (1 + i / 9000 % 12, i % 26))
             .collect();
         let (a, b) = system::<f32>(&points, &seen, 0.01);
-        let (found, _) = likelihoods(&a, &b, 3, Some(60), Cancel::never()).unwrap();
+        let (found, _) = likelihoods(&a, &b, 13, Some(60), Cancel::never()).unwrap();
         let (a, b) = system::<f64>(&points, &seen, 0.01);
-        let expected = plain_products(&a, &b, 3, 60);
+        let expected = plain_products(&a, &b, 13, 60);
         let largest = found
             .iter()
             .zip(&expected)

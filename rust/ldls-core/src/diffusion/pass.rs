@@ -2,8 +2,9 @@
 
 use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
 use super::lanes::{Lane, Lanes};
+use super::plan::BACKGROUND_LANE;
 use super::schedule::{Activity, ROWS_A_TASK, Schedule};
-use super::seeds::{BACKGROUND_LANE, Seeds};
+use super::seeds::Seeds;
 use super::series::Series;
 use super::sweep::{Step, take_steps};
 use super::values::Values;
@@ -15,9 +16,6 @@ use rayon::prelude::*;
 
 /// How far likelihoods may leave [0, 1], and their sum what the seeds allow.
 const SLACK: f64 = 1e-3;
-
-/// Values of a group at all points, labels of its lanes, and one for each that has a label.
-type Group<'a, T, const WIDTH: usize> = (&'a [Lanes<T, WIDTH>], &'a [Option<u32>], [T; WIDTH]);
 
 /// The values of the lanes of one pass at all points, and how far they have come.
 pub(super) struct Pass<'a, T, const WIDTH: usize> {
@@ -68,6 +66,16 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         Ok(pass)
     }
 
+    /// Most steps that [`Self::run`] takes.
+    pub(super) fn steps(series: Option<&Series>, iterations: Option<usize>) -> usize {
+        match (series, iterations) {
+            // one more for the residual
+            (Some(series), products) => series.degree() + usize::from(products.is_none()),
+            (None, Some(products)) => products.saturating_sub(1),
+            (None, None) => usize::MAX,
+        }
+    }
+
     /// z = `scale` * s, with the probe's seeds as they are.
     fn new(
         a: &'a PointGraph<T>,
@@ -76,7 +84,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         scale: T,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let groups = seeds.lanes.len().div_ceil(WIDTH).max(1);
+        let groups = seeds.plan.groups;
         let [mut z, previous] = Values::zeros(a.len(), groups, cancel)?;
         let rows = z.group_mut(0).par_chunks_mut(ROWS_A_TASK);
         let rows = rows.zip(seeds.background.par_chunks(ROWS_A_TASK));
@@ -89,7 +97,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         for &(i, lane, weight) in seeds.of_rows(0..a.len()) {
             z.group_mut(lane as usize / WIDTH)[i as usize][lane as usize % WIDTH] = scale * weight;
         }
-        if let Some(lane) = seeds.probe_lane() {
+        if let Some(lane) = seeds.plan.probe {
             let rows = z.group_mut(lane / WIDTH).par_iter_mut().zip(&seeds.probe);
             rows.with_min_len(ROWS_A_TASK)
                 .for_each(|(row, &weight)| row[lane % WIDTH] = weight);
@@ -149,27 +157,38 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         self.previous = Values::none();
     }
 
-    /// Label, values of its group at all points and lane within the group of each label.
-    pub(super) fn labels(&self) -> impl Iterator<Item = (u32, &[Lanes<T, WIDTH>], usize)> {
-        let lanes = self.seeds.labels();
-        lanes.map(|(label, lane)| (label, self.z.group(lane / WIDTH), lane % WIDTH))
+    /// The labels that may have come to a point, and their values.
+    pub(super) fn at(&self, point: usize) -> impl Iterator<Item = (u32, T)> {
+        let groups = self.z.groups().enumerate();
+        groups.flat_map(move |(group, values)| {
+            let labels = self.labels_at(point, group).zip(*values[point]);
+            labels.filter_map(|(label, value)| Some((label?, value)))
+        })
     }
 
-    /// Values at all points and labels of the lanes of each group, no label for the probe, and one for each lane that has a
-    /// label, zero for the others.
-    pub(super) fn groups(&self) -> impl Iterator<Item = Group<'_, T, WIDTH>> {
-        let groups = self.z.groups().zip(self.seeds.lanes.chunks(WIDTH));
-        groups.map(|(values, labels)| {
-            let mut counts = [T::default(); WIDTH];
-            for (count, label) in counts.iter_mut().zip(labels) {
-                *count = T::from_f64(if label.is_some() { 1.0 } else { 0.0 });
+    /// Label of each lane of a group at a point, if it has one there.
+    #[inline]
+    pub(super) fn labels_at(
+        &self,
+        point: usize,
+        group: usize,
+    ) -> impl Iterator<Item = Option<u32>> {
+        self.seeds.plan.labels_at(point, group)
+    }
+
+    /// Values of each group at all points, and one for each of its lanes, zero for that of the probe.
+    pub(super) fn groups(&self) -> impl Iterator<Item = (&[Lanes<T, WIDTH>], [T; WIDTH])> {
+        self.z.groups().enumerate().map(|(group, values)| {
+            let mut counts = [T::from_f64(1.0); WIDTH];
+            if let Some(lane) = self.seeds.plan.probe.filter(|lane| lane / WIDTH == group) {
+                counts[lane % WIDTH] = T::default();
             }
-            (values, labels, counts)
+            (values, counts)
         })
     }
 
     fn largest_change(&self) -> f64 {
-        let probe = self.seeds.probe_lane();
+        let probe = self.seeds.plan.probe;
         let of_group = |group: usize| {
             let change_at = |(z, previous): (&Lanes<T, WIDTH>, &Lanes<T, WIDTH>)| {
                 let lanes = (0..WIDTH).filter(|lane| Some(group * WIDTH + lane) != probe);
@@ -188,7 +207,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     /// What the series may leave out at a point, going by the probe there; none where there is no series or no probe.
     fn error(&self, point: usize) -> Option<f64> {
-        let lane = self.seeds.probe_lane().filter(|_| self.left_out > 0.0)?;
+        let lane = self.seeds.plan.probe.filter(|_| self.left_out > 0.0)?;
         Some(
             self.left_out
                 * self.z.group(lane / WIDTH)[point][lane % WIDTH]
@@ -213,7 +232,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         let zeros = [T::default(); WIDTH];
         let row_is_sound = |i: usize| {
             let (mut sums, mut least, mut most) = (zeros, zeros, zeros);
-            for (values, _, counts) in &groups {
+            for (values, counts) in &groups {
                 for lane in 0..WIDTH {
                     let value = counts[lane] * values[i][lane];
                     sums[lane] += value;
@@ -243,6 +262,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::plan::Passes;
     use super::*;
     use crate::masks::PixelLabels;
 
@@ -257,7 +277,14 @@ mod tests {
         };
         let never = Cancel::never();
         let schedule = Schedule::new(&a, never).unwrap();
-        let seeds = Seeds::new(&b, vec![Some(0), Some(1)], never).unwrap();
+        let passes = Passes {
+            schedule: &schedule,
+            width: 8,
+            probe: false,
+            steps: 0,
+        };
+        let plan = passes.plan((&a, &b), &[0, 1], never).unwrap().remove(0);
+        let seeds = Seeds::new(&b, plan, never).unwrap();
         let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1), never).unwrap();
         pass.convergence.error = error;
         pass.is_sound(

@@ -3,8 +3,9 @@
 use super::convergence::Convergence;
 use super::lanes::{Lane, WIDTH_F32};
 use super::pass::Pass;
+use super::plan::Passes;
 use super::schedule::Schedule;
-use super::seeds::{Seeds, plan};
+use super::seeds::Seeds;
 use super::series::Series;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
@@ -40,23 +41,30 @@ pub(super) fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
     let schedule = schedule?;
     let largest = b.largest_shares();
     let mut convergence = Convergence::default();
-    for lanes in plan(b, labels, WIDTH, probed) {
-        let seeds = Seeds::new(b, lanes, cancel)?;
-        let run =
-            |series: &[Series]| Pass::run(a, &schedule, &seeds, series.last(), iterations, cancel);
-        let mut pass = run(&series)?;
-        while let Some(tried) = series.last() {
-            if pass.is_sound(tried.most_left_out, largest) {
-                break;
+    let (mut labels, mut probe) = (labels.to_vec(), probed);
+    'planned: loop {
+        let passes = Passes {
+            schedule: &schedule,
+            width: WIDTH,
+            probe,
+            steps: Pass::<T, WIDTH>::steps(series.last(), iterations),
+        };
+        for plan in passes.plan((a, b), &labels, cancel)? {
+            let seeds = Seeds::new(b, plan, cancel)?;
+            let mut pass = Pass::run(a, &schedule, &seeds, series.last(), iterations, cancel)?;
+            let tried = series.last();
+            if tried.is_some_and(|tried| !pass.is_sound(tried.most_left_out, largest)) {
+                // another takes more steps, in which labels come farther
+                series.pop();
+                continue 'planned;
             }
-            series.pop();
-            drop(pass);
-            pass = run(&series)?;
+            cancel.check()?;
+            pass.drop_previous();
+            done(&pass)?;
+            convergence.merge(pass.convergence);
+            probe = false;
+            labels.retain(|label| seeds.plan.lanes.iter().all(|(other, _)| other != label));
         }
-        cancel.check()?;
-        pass.drop_previous();
-        done(&pass)?;
-        convergence.merge(pass.convergence);
+        return Ok((convergence, series));
     }
-    Ok((convergence, series))
 }

@@ -5,8 +5,9 @@
 
 use super::lanes::WIDTH_F64;
 use super::pass::Pass;
+use super::plan::Passes;
 use super::schedule::Schedule;
-use super::seeds::{Seeds, plan};
+use super::seeds::Seeds;
 use super::series::Series;
 use super::winners::EQUAL;
 use crate::graph::PointGraph;
@@ -80,14 +81,18 @@ impl Reach {
         let steps = self.ends.len() - 2;
         let schedule = Schedule::narrowing(a, self.ends[..steps].iter().rev().copied(), cancel)?;
         let mut found = vec![Vec::new(); self.ends[0]];
-        for lanes in plan(b, labels, WIDTH_F64, false) {
-            let seeds = Seeds::new(b, lanes, cancel)?;
+        let passes = Passes {
+            schedule: &schedule,
+            width: WIDTH_F64,
+            probe: false,
+            steps,
+        };
+        for plan in passes.plan((a, b), labels, cancel)? {
+            let seeds = Seeds::new(b, plan, cancel)?;
             let pass: Pass<f64, WIDTH_F64> =
                 Pass::run(a, &schedule, &seeds, series, Some(iterations), cancel)?;
-            for (label, group, lane) in pass.labels() {
-                for (of_point, values) in found.iter_mut().zip(group) {
-                    of_point.push((label, values[lane]));
-                }
+            for (point, of_point) in found.iter_mut().enumerate() {
+                of_point.extend(pass.at(point));
             }
         }
         let leader = |of_point: &Vec<(u32, f64)>| {

@@ -135,7 +135,7 @@ impl Schedule {
         let mut edges = Vec::new();
         // at which tile each was last met
         let mut met = filled(u32::MAX, self.rows.div_ceil(TILE), cancel)?;
-        for block in 0..self.rows.div_ceil(BLOCK) {
+        for block in 0..self.blocks() {
             let tile = (block * BLOCK / TILE) as u32;
             met[tile as usize] = tile;
             for &target in self.targets(block) {
@@ -148,8 +148,13 @@ impl Schedule {
         Ok(edges)
     }
 
+    /// Number of blocks.
+    pub(super) fn blocks(&self) -> usize {
+        self.rows.div_ceil(BLOCK)
+    }
+
     /// The blocks other than `block` with a row that has an edge from a row of `block`.
-    fn targets(&self, block: usize) -> &[u32] {
+    pub(super) fn targets(&self, block: usize) -> &[u32] {
         let [start, end] = [block, block + 1].map(|at| self.target_offsets[at] as usize);
         &self.targets[start..end]
     }

@@ -6,8 +6,9 @@
 )]
 
 use super::lanes::{Lane, Lanes, Vector};
+use super::plan::{BACKGROUND_LANE, MOST_GROUPS};
 use super::schedule::{Activity, BLOCK, Schedule};
-use super::seeds::{BACKGROUND_LANE, MOST_GROUPS, Seeds};
+use super::seeds::Seeds;
 use super::values::{SharedValues, Values};
 use crate::graph::PointGraph;
 use crate::{Cancel, Real, Result};

@@ -6,7 +6,7 @@
 #![expect(unsafe_code, reason = "threads share values by rows")]
 
 use super::lanes::Lanes;
-use super::seeds::MOST_GROUPS;
+use super::plan::MOST_GROUPS;
 use crate::memory;
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;

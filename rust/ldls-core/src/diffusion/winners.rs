@@ -89,7 +89,7 @@ pub(super) fn update<const RANKS: usize>(
     let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
     points.for_each(|(i, best)| {
         let (mut sums, mut largest) = ([0.0; WIDTH_F32], [best.values[0]; WIDTH_F32]);
-        for (values, _, counts) in &groups {
+        for (values, counts) in &groups {
             let values = &values[i];
             for lane in 0..WIDTH_F32 {
                 let value = counts[lane] * values[lane];
@@ -105,11 +105,11 @@ pub(super) fn update<const RANKS: usize>(
         let largest = largest.iter().fold(0.0, |one: f32, other| one.max(*other));
         // most labels are far behind, and cannot win
         let far_behind = if largest > least { largest / 2.0 } else { 0.0 };
-        for (values, labels, counts) in &groups {
+        for (group, (values, counts)) in groups.iter().enumerate() {
             let values = &values[i];
             let may_win = |lane: usize| counts[lane] * values[lane] > far_behind;
             if (0..WIDTH_F32).fold(false, |any, lane| any | may_win(lane)) {
-                let lanes = labels.iter().enumerate();
+                let lanes = pass.labels_at(i, group).enumerate();
                 for (lane, label) in lanes.filter(|(lane, _)| may_win(*lane)) {
                     best.offer(label.unwrap_or_default(), values[lane]);
                 }
@@ -173,8 +173,8 @@ pub(super) fn candidates(ties: &[NearTie], n_labels: usize) -> Vec<u32> {
 /// Keeps in `refined` the best label of each of `points` and its value; of [`EQUAL`] ones the lowest.
 pub(super) fn refine(points: &[u32], refined: &mut [(u32, f64)], pass: &Pass<f64, WIDTH_F64>) {
     for (&point, best) in points.iter().zip(refined) {
-        for (label, group, lane) in pass.labels() {
-            offer(best, label, group[point as usize][lane]);
+        for (label, value) in pass.at(point as usize) {
+            offer(best, label, value);
         }
     }
 }

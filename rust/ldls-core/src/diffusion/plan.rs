@@ -1,0 +1,284 @@
+//! Which label each lane of each pass over the graph stands for, and where.
+//!
+//! A label comes one edge farther with every step. In a large cloud most stay far from most others, and those that never come to
+//! the same block share a lane: a pass holds more of them, and fewer groups of lanes are in use at any place.
+
+use super::schedule::{BLOCK, Schedule};
+use super::spread::{Blocks, spread};
+use crate::graph::PointGraph;
+use crate::masks::PixelLabels;
+use crate::memory::filled;
+use crate::{Cancel, Real, Result};
+use rayon::prelude::*;
+use std::cmp::Reverse;
+use std::ops::Range;
+
+/// Most groups of a pass: one bit each says which of them are in use.
+pub(super) const MOST_GROUPS: usize = 8;
+/// Points from which on a pass has a single group: each takes 64 bytes a point.
+const MANY_POINTS: usize = 1 << 20;
+/// Blocks from which on lanes are shared: in a frame of one camera most labels come to most of it.
+const SHARED_FROM: usize = (1 << 15) / BLOCK;
+/// Lane of the background in the pass that has it.
+pub(super) const BACKGROUND_LANE: usize = 0;
+/// Label of a lane where it has none.
+const NONE: u32 = u32::MAX;
+
+/// The lanes of one pass.
+#[derive(Debug)]
+pub(super) struct Plan {
+    /// Each label, and the lane that it has wherever it comes.
+    pub(super) lanes: Vec<(u32, usize)>,
+    /// Lane of the probe, where the pass has it.
+    pub(super) probe: Option<usize>,
+    /// Number of groups of lanes.
+    pub(super) groups: usize,
+    width: usize,
+    /// Label of each lane: block after block, or once for all of them where none is shared.
+    labels: Vec<u32>,
+    /// Distance of the labels of a block from those of the next.
+    stride: usize,
+}
+
+/// What the passes are planned by, beside the labels and their seeds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Passes<'a> {
+    pub(super) schedule: &'a Schedule,
+    /// Lanes of a group.
+    pub(super) width: usize,
+    /// Whether the first has the probe: all labels with random signs, of which only the last term of the series is summed. It
+    /// shows how large the terms left out may be.
+    pub(super) probe: bool,
+    /// Most steps of each.
+    pub(super) steps: usize,
+}
+
+impl Passes<'_> {
+    /// The passes that `labels` take over the graph `a` from their seeds in `b`. Labels without a seed need no lane.
+    ///
+    /// The first group, which the background keeps busy everywhere, takes the labels with the most seeds; the others follow in
+    /// the order of where they lie, so that the labels of a group are neighbours and the group is zero over most of the cloud.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+    pub(super) fn plan<T: Real>(
+        &self,
+        (a, b): (&PointGraph<T>, &PixelLabels<T>),
+        labels: &[u32],
+        cancel: &Cancel,
+    ) -> Result<Vec<Plan>> {
+        let background = labels.contains(&0);
+        let probe = self.probe.then_some(usize::from(background));
+        let own = usize::from(background) + usize::from(self.probe);
+        let in_first = if own > 0 { self.width - own } else { 0 };
+        let seeded = in_order(b, labels, in_first);
+        let blocks = self.schedule.blocks();
+        let are_shared = blocks >= SHARED_FROM && own + seeded.len() > self.width;
+        let mut lanes = vec![Shared::default(); own];
+        if background {
+            lanes[BACKGROUND_LANE].labels.push((0, None));
+        }
+        if are_shared {
+            for (label, come) in
+                seeded
+                    .iter()
+                    .zip(spread((a, b), self.schedule, &seeded, self.steps, cancel)?)
+            {
+                let is_free = |lane: &Shared| !lane.blocks.meet(&come);
+                let free = lanes[own..].iter().position(is_free);
+                let lane = free.map_or(lanes.len(), |at| own + at);
+                if lane == lanes.len() {
+                    lanes.push(Shared::default());
+                }
+                lanes[lane].blocks.add(&come);
+                lanes[lane].labels.push((*label, Some(come)));
+            }
+        } else {
+            lanes.extend(seeded.into_iter().map(|label| Shared {
+                labels: vec![(label, None)],
+                ..Shared::default()
+            }));
+        }
+        let most_groups = if b.rows() < MANY_POINTS {
+            MOST_GROUPS
+        } else {
+            1
+        };
+        let passes = lanes.chunks(most_groups * self.width).enumerate();
+        let of_pass = |(at, lanes): (usize, &[Shared])| {
+            let probe = probe.filter(|_| at == 0);
+            let blocks = if are_shared { blocks } else { 1 };
+            Plan::of_lanes(lanes, probe, self.width, blocks, cancel)
+        };
+        passes.map(of_pass).collect()
+    }
+}
+
+impl Plan {
+    fn of_lanes(
+        lanes: &[Shared],
+        probe: Option<usize>,
+        width: usize,
+        blocks: usize,
+        cancel: &Cancel,
+    ) -> Result<Self> {
+        let groups = lanes.len().div_ceil(width);
+        let stride = groups * width;
+        let mut labels = filled(NONE, blocks * stride, cancel)?;
+        let mut lane_of = Vec::new();
+        for (lane, shared) in lanes.iter().enumerate() {
+            for (label, come) in &shared.labels {
+                lane_of.push((*label, lane));
+                let mut put = |block: usize| labels[block * stride + lane] = *label;
+                match come {
+                    Some(come) => come.iter().for_each(put),
+                    None => (0..blocks).for_each(&mut put),
+                }
+            }
+        }
+        Ok(Self {
+            lanes: lane_of,
+            probe,
+            groups,
+            width,
+            labels,
+            stride: if blocks > 1 { stride } else { 0 },
+        })
+    }
+
+    /// Label of each lane of `group` at a row, if it has one there.
+    #[inline]
+    pub(super) fn labels_at(&self, row: usize, group: usize) -> impl Iterator<Item = Option<u32>> {
+        let first = row / BLOCK * self.stride + group * self.width;
+        let labels = self.labels[first..first + self.width].iter();
+        labels.map(|&label| (label != NONE).then_some(label))
+    }
+}
+
+/// Those of `labels` other than the background that have seeds: the `most_seeds` with the most first, then by where they lie.
+fn in_order<T: Real>(b: &PixelLabels<T>, labels: &[u32], most_seeds: usize) -> Vec<u32> {
+    let (counts, row_sums) = count_seeds(b, labels);
+    let count = |label: &u32| counts[*label as usize];
+    // rows are in the order of the tree: near rows are near points
+    let middle = |label: &u32| row_sums[*label as usize] / count(label);
+    let is_seeded = |label: &u32| *label > 0 && count(label) > 0;
+    let mut seeded: Vec<u32> = labels.iter().copied().filter(is_seeded).collect();
+    seeded.sort_by_key(|label| Reverse(count(label)));
+    if let Some(rest) = seeded.get_mut(most_seeds..) {
+        rest.sort_by_key(|label| (middle(label), *label));
+    }
+    seeded
+}
+
+/// Number of the seeds of each label up to the highest of `labels`, and the sum of their rows.
+fn count_seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> (Vec<u64>, Vec<u64>) {
+    let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
+    let none = || (vec![0; n_labels], vec![0; n_labels]);
+    let of_rows = |rows: Range<usize>| {
+        let (mut counts, mut row_sums) = none();
+        for i in rows {
+            for (label, _) in b.row(i).filter(|&(label, _)| label < n_labels) {
+                counts[label] += 1;
+                row_sums[label] += i as u64;
+            }
+        }
+        (counts, row_sums)
+    };
+    let both = |(mut counts, mut row_sums): (Vec<u64>, Vec<u64>), other: (Vec<u64>, Vec<u64>)| {
+        counts.iter_mut().zip(other.0).for_each(|(a, b)| *a += b);
+        row_sums.iter_mut().zip(other.1).for_each(|(a, b)| *a += b);
+        (counts, row_sums)
+    };
+    let tasks = 4 * rayon::current_num_threads();
+    let size = b.rows().div_ceil(tasks).max(1);
+    let tasks = (0..b.rows().div_ceil(size)).into_par_iter();
+    let tasks = tasks.map(|task| of_rows(task * size..b.rows().min((task + 1) * size)));
+    tasks.reduce(none, both)
+}
+
+/// What shares a lane.
+#[derive(Debug, Clone, Default)]
+struct Shared {
+    /// Labels, and the blocks that each may come to; none named where it is alone.
+    labels: Vec<(u32, Option<Blocks>)>,
+    /// All of these blocks.
+    blocks: Blocks,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The lanes of `labels` of points in a row, each with edges to those beside it; label l has one seed, at `seeds[l]`.
+    fn planned(points: usize, seeds: &[usize], probe: bool, steps: usize) -> Vec<Plan> {
+        let rows = (0..points).map(|i| i.saturating_sub(1)..points.min(i + 2));
+        let columns: Vec<u32> = rows.clone().flatten().map(|j| j as u32).collect();
+        let offsets = rows.scan(0, |end, row| {
+            *end += row.len();
+            Some(*end)
+        });
+        let offsets = [0].into_iter().chain(offsets).collect();
+        let weights = vec![0.25; columns.len()];
+        let a = PointGraph::<f32>::from_csr(offsets, columns, weights).unwrap();
+        let mut at: Vec<(usize, u32)> = seeds.iter().copied().zip(0..).collect();
+        at.sort_unstable();
+        let b = PixelLabels {
+            offsets: (0..=points)
+                .map(|i| at.iter().filter(|(seed, _)| *seed < i).count())
+                .collect(),
+            labels: at.iter().map(|(_, label)| *label).collect(),
+            weights: vec![0.25; seeds.len()],
+            mass: vec![0.25; points],
+        };
+        let passes = Passes {
+            schedule: &Schedule::new(&a, Cancel::never()).unwrap(),
+            width: 4,
+            probe,
+            steps,
+        };
+        let labels: Vec<u32> = (0..seeds.len() as u32).collect();
+        passes.plan((&a, &b), &labels, Cancel::never()).unwrap()
+    }
+
+    /// Labels of group 0 at a row.
+    fn at(plan: &Plan, row: usize) -> Vec<Option<u32>> {
+        plan.labels_at(row, 0).collect()
+    }
+
+    #[test]
+    fn in_a_small_cloud_each_label_has_a_lane_everywhere() {
+        let plans = planned(100, &[0, 50, 99, 20, 70], true, 3);
+        let [plan] = &plans[..] else {
+            panic!("one pass")
+        };
+        assert_eq!((plan.groups, plan.probe), (2, Some(1)));
+        // of labels with as many seeds the lowest first, and then by place
+        assert_eq!(at(plan, 0), [Some(0), None, Some(1), Some(2)]);
+        assert_eq!(at(plan, 99), at(plan, 0));
+        let second: Vec<_> = plan.labels_at(0, 1).collect();
+        assert_eq!(second, [Some(3), Some(4), None, None]);
+    }
+
+    #[test]
+    fn labels_that_do_not_meet_share_a_lane() {
+        let far = SHARED_FROM * BLOCK;
+        let seeds = [0, 100, 5000, 110, 9000, 13000];
+        let plans = planned(far, &seeds, false, 30);
+        let [plan] = &plans[..] else {
+            panic!("one pass")
+        };
+        assert_eq!(plan.groups, 1);
+        assert_eq!(plan.lanes, [(0, 0), (1, 1), (2, 1), (4, 1), (5, 1), (3, 2)]);
+        assert_eq!(at(plan, 100), [Some(0), Some(1), Some(3), None]);
+        assert_eq!(at(plan, 5000), [Some(0), Some(2), None, None]);
+        assert_eq!(at(plan, 7000), [Some(0), None, None, None]);
+    }
+
+    #[test]
+    fn labels_that_come_far_enough_to_meet_do_not() {
+        let far = SHARED_FROM * BLOCK;
+        let lanes = |steps| planned(far, &[0, 100, 300, 500, 700], false, steps)[0].groups;
+        assert_eq!((lanes(50), lanes(120)), (1, 1));
+        assert_eq!(lanes(usize::MAX), 2);
+    }
+}
