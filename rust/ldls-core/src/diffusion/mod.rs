@@ -32,16 +32,11 @@ use self::errors::Errors;
 use self::lanes::WIDTH_F32;
 use self::pass::Pass;
 use self::passes::for_each_pass;
-use self::winners::Best;
+use self::winners::Winners;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{filled, tabulate, zeros};
+use crate::memory::{tabulate, zeros};
 use crate::{Cancel, Result};
-
-/// Labels kept of each point where few masks overlap, one more than are told apart.
-const FEW_RANKS: usize = 4;
-/// The same where many do.
-const MANY_RANKS: usize = 10;
 
 /// The winning label of every point.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,31 +66,11 @@ pub fn diffuse(
     cancel: &Cancel,
 ) -> Result<Diffused> {
     b.check(a.len(), n_labels)?;
-    // as many labels may be equal at a point, and all of them are kept
-    if b.largest_shares().all < FEW_RANKS as f64 {
-        diffuse_ranked::<FEW_RANKS>((a, b), n_labels, iterations, exact, cancel)
-    } else {
-        diffuse_ranked::<MANY_RANKS>((a, b), n_labels, iterations, exact, cancel)
-    }
-}
-
-/// The same, with so many labels kept of each point.
-fn diffuse_ranked<const RANKS: usize>(
-    (a, b): (&PointGraph, &PixelLabels),
-    n_labels: usize,
-    iterations: Option<usize>,
-    exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
-    cancel: &Cancel,
-) -> Result<Diffused> {
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let (mut best, mut probed, mut error) = (Vec::new(), Vec::new(), 0.0);
+    let (mut winners, mut probed, mut error) = (Winners::default(), Vec::new(), 0.0);
     let choose = |pass: &Pass<f32, WIDTH_F32>| {
-        if best.is_empty() {
-            // not before, since a pass takes the most memory while it runs
-            best = filled(Best::<RANKS>::default(), a.len(), cancel)?;
-        }
         error = pass.convergence.error.max(error);
-        winners::update(&mut best, pass, error);
+        winners.update(pass, error, cancel)?;
         if let Some(errors) = pass.errors(cancel)? {
             probed = errors;
         }
@@ -104,15 +79,15 @@ fn diffuse_ranked<const RANKS: usize>(
     let (mut convergence, trusted) = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
     convergence.refined = near_ties::decide(
         (a, b),
-        &mut best,
+        &mut winners,
         (&Errors { a, probed }, convergence.error),
-        n_labels,
         (iterations, &trusted),
         exact,
         cancel,
     )?;
+    let best = winners.best;
     Ok(Diffused {
-        labels: tabulate(best.len(), |i| best[i].labels[0], cancel)?,
+        labels: tabulate(best.len(), |i| best[i].label, cancel)?,
         confidence: tabulate(best.len(), |i| best[i].confidence(), cancel)?,
         convergence,
     })

@@ -12,10 +12,10 @@ use super::pass::Pass;
 use super::passes::{TOLERANCE_F64, for_each_pass};
 use super::reach::Reach;
 use super::series::Series;
-use super::winners::{Best, NearTie, candidates, near_ties, refine};
+use super::winners::{Best, NearTies, Winners, candidates, refine};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect, filled, push};
+use crate::memory::{collect, filled};
 use crate::{Cancel, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -27,21 +27,21 @@ const LEAD: f64 = 0.05;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
 const NEGLIGIBLE: f32 = 1e-18;
 
-/// Puts the winner first in `best` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
+/// Puts right the best of `winners` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
 /// points. `largest` is the largest error, and `trusted` are the series that served in single precision or would have, the
 /// longest first. Other arguments as in [`super::diffuse`].
-pub(super) fn decide<const RANKS: usize>(
+pub(super) fn decide(
     (a, b): (&PointGraph, &PixelLabels),
-    best: &mut [Best<RANKS>],
+    winners: &mut Winners,
     (errors, largest): (&Errors, f64),
-    n_labels: usize,
     (iterations, trusted): (Option<usize>, &[Series]),
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
     cancel: &Cancel,
 ) -> Result<usize> {
     let error = |point: u32| errors.at(point as usize);
-    let mut ties = near_ties(best, largest, error)?;
-    let contested = ties.len();
+    let mut ties = winners.near_ties(largest, error)?;
+    let best = &mut winners.best;
+    let contested = ties.values().map(Vec::len).sum();
     settle_equal((a, b), best, &mut ties, cancel)?;
     // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
     let first = (trusted.last(), FIRST_TOLERANCE, LEAD);
@@ -50,59 +50,57 @@ pub(super) fn decide<const RANKS: usize>(
         if ties.is_empty() {
             break;
         }
-        let candidates = candidates(&ties, n_labels);
+        let candidates = candidates(&ties);
         let series = alike.zip(iterations);
         let series = series.and_then(|(alike, products)| alike.within(tolerance, products));
         let series = series.as_ref();
-        let points: Vec<u32> = ties.iter().map(|tie| tie.point).collect();
+        let mut points: Vec<u32> = ties.values().flatten().copied().collect();
+        points.sort_unstable();
         let leaders = leaders(a, &points, &candidates, series, iterations, &exact, cancel)?;
-        let mut leaders = leaders.into_iter();
-        ties.retain(|&NearTie { point, .. }| {
-            let (label, lead) = leaders.next().unwrap_or_default();
+        let leaders: BTreeMap<u32, (u32, f64)> = points.into_iter().zip(leaders).collect();
+        let mut is_open = |point: &u32| {
+            let (label, lead) = leaders[point];
             // labels that differ in no bit are equal: what the first series leaves out is smaller where they differ less
-            let is_open = lead > 0.0 && lead < share * error(point);
+            let is_open = lead > 0.0 && lead < share * error(*point);
             if !is_open {
-                best[point as usize].labels[0] = label;
+                best[*point as usize].label = label;
             }
             is_open
-        });
+        };
+        let sets = ties.values_mut();
+        sets.for_each(|points| points.retain(&mut is_open));
+        ties.retain(|_, points| !points.is_empty());
     }
     Ok(contested)
 }
 
-/// Puts the lowest label first at those of `ties` at which all that may win are equal, and leaves the others.
-fn settle_equal<const RANKS: usize>(
+/// Makes the lowest label the best at those of `ties` at which all that may win are equal, and leaves the others.
+fn settle_equal(
     (a, b): (&PointGraph, &PixelLabels),
-    best: &mut [Best<RANKS>],
-    ties: &mut Vec<NearTie>,
+    best: &mut [Best],
+    ties: &mut NearTies,
     cancel: &Cancel,
 ) -> Result<()> {
-    let mut sets: BTreeMap<&[u32], Vec<u32>> = BTreeMap::new();
-    for tie in &*ties {
-        if let Some(rivals) = &tie.rivals {
-            push(sets.entry(rivals).or_default(), tie.point)?;
-        }
-    }
-    let sets: Vec<_> = sets.into_iter().collect();
-    let shares = sets.par_chunks(sets.len().div_ceil(rayon::current_num_threads()).max(1));
-    let settled_by_set = shares.map(|sets| {
+    let mut sets: Vec<(&Vec<u32>, &mut Vec<u32>)> = ties.iter_mut().collect();
+    let size = sets.len().div_ceil(rayon::current_num_threads()).max(1);
+    let settled_by_set = sets.par_chunks_mut(size).map(|sets| {
         let mut followed = Followed::new(a, b, cancel)?;
-        let equal = |(labels, points): &(&[u32], Vec<u32>)| {
-            let values = points.iter().map(|&point| best[point as usize].value());
+        let settle = |(labels, points): &mut (&Vec<u32>, &mut Vec<u32>)| {
+            let values = points.iter().map(|&point| best[point as usize].value);
             let least = NEGLIGIBLE * values.fold(1.0, f32::min);
-            Ok((labels[0], followed.equal_at(points, labels, least, cancel)?))
+            let equal = followed.equal_at(points, labels, least, cancel)?;
+            points.retain(|point| equal.binary_search(point).is_err());
+            Ok((labels[0], equal))
         };
-        sets.iter().map(equal).collect::<Result<Vec<_>>>()
+        sets.iter_mut().map(settle).collect::<Result<Vec<_>>>()
     });
-    let mut settled = Vec::new();
-    for (lowest, points) in settled_by_set.collect::<Result<Vec<_>>>()?.concat() {
-        for &point in &points {
-            best[point as usize].labels[0] = lowest;
+    let settled_by_set = settled_by_set.collect::<Result<Vec<_>>>()?.concat();
+    for (lowest, points) in settled_by_set {
+        for point in points {
+            best[point as usize].label = lowest;
         }
-        settled.extend(points);
     }
-    settled.sort_unstable();
-    ties.retain(|tie| settled.binary_search(&tie.point).is_err());
+    ties.retain(|_, points| !points.is_empty());
     Ok(())
 }
 

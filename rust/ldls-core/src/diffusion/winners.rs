@@ -1,11 +1,12 @@
 //! The label that wins at each point, and the points at which single precision cannot decide.
 
-use super::lanes::{WIDTH_F32, WIDTH_F64};
+use super::lanes::{Lanes, WIDTH_F32, WIDTH_F64};
 use super::pass::Pass;
 use super::schedule::ROWS_A_TASK;
-use crate::Result;
-use crate::memory::push;
+use crate::memory::{filled, push};
+use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Rounding of single precision, as a share of the largest likelihood of a point: 1e-5 on real frames, no bound.
 const ROUNDING: f32 = 2.5e-5;
@@ -16,83 +17,157 @@ const SMALL_ERROR: f64 = 1.0 / 32.0;
 /// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
 pub(super) const EQUAL: f64 = 1e-13;
 
-/// The best labels of a point so far. All but the last are told apart: where that may win too, all labels are looked at.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Best<const RANKS: usize> {
-    /// The winner first; of equal ones the lowest.
-    pub(super) labels: [u32; RANKS],
-    /// Their values.
-    values: [f32; RANKS],
+/// The best label of a point so far.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Best {
+    /// Of equal ones the lowest.
+    pub(super) label: u32,
+    pub(super) value: f32,
+    /// Of the values of all labels.
     sum: f32,
 }
 
-impl<const RANKS: usize> Default for Best<RANKS> {
-    fn default() -> Self {
-        Self {
-            labels: [0; RANKS],
-            values: [0.0; RANKS],
-            sum: 0.0,
-        }
-    }
-}
-
-impl<const RANKS: usize> Best<RANKS> {
+impl Best {
     #[inline]
-    fn offer(&mut self, mut label: u32, mut value: f32) {
-        for (other, best) in self.labels.iter_mut().zip(&mut self.values) {
-            if value > *best || (value == *best && label < *other) {
-                std::mem::swap(other, &mut label);
-                std::mem::swap(best, &mut value);
-            }
+    fn offer(&mut self, label: u32, value: f32) {
+        if value > self.value || (value == self.value && label < self.label) {
+            (self.label, self.value) = (label, value);
         }
-    }
-
-    /// True if the value at `rank` may really be the largest, where each may be off by `error`.
-    pub(super) fn may_win(&self, rank: usize, error: f64) -> bool {
-        let behind = f64::from(self.values[0] - self.values[rank]);
-        self.values[rank] > 0.0 && behind <= f64::from(ROUNDING * self.values[0]) + 2.0 * error
-    }
-
-    /// Value of the best label.
-    pub(super) fn value(&self) -> f32 {
-        self.values[0]
-    }
-
-    /// The labels that may win, ascending; none where there are more than are told apart.
-    pub(super) fn rivals(&self, error: f64) -> Option<Vec<u32>> {
-        if self.may_win(RANKS - 1, error) {
-            return None;
-        }
-        let may_win = (0..RANKS - 1).filter(|&rank| self.may_win(rank, error));
-        let mut labels: Vec<u32> = may_win.map(|rank| self.labels[rank]).collect();
-        labels.sort_unstable();
-        Some(labels)
     }
 
     pub(super) fn confidence(&self) -> f32 {
         if self.sum > 0.0 {
-            (self.values[0] / self.sum).min(1.0)
+            (self.value / self.sum).min(1.0)
         } else {
             0.0
         }
     }
 }
 
-/// Offers the values of a pass to the best labels of all points, where each may be off by `error`.
-pub(super) fn update<const RANKS: usize>(
-    best: &mut [Best<RANKS>],
-    pass: &Pass<f32, WIDTH_F32>,
+/// A label that may win at a point, where another may too.
+#[derive(Debug, Clone, Copy)]
+struct Rival {
+    point: u32,
+    label: u32,
+    value: f32,
+}
+
+/// True if `value` may really be the largest at a point where `best` is, and each may be off by `error`.
+fn may_win(value: f32, best: f32, error: f64) -> bool {
+    value > 0.0 && f64::from(best - value) <= f64::from(ROUNDING * best) + 2.0 * error
+}
+
+/// The best label of every point, and those that single precision cannot tell from it.
+#[derive(Debug, Default)]
+pub(super) struct Winners {
+    pub(super) best: Vec<Best>,
+    /// Of each share of the points, pass after pass; some of the earlier ones may be far behind since.
+    rivals: Vec<Vec<Rival>>,
+}
+
+impl Winners {
+    /// Offers the values of a pass, where each may be off by `error`.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+    pub(super) fn update(
+        &mut self,
+        pass: &Pass<f32, WIDTH_F32>,
+        error: f64,
+        cancel: &Cancel,
+    ) -> Result<()> {
+        let offers = Offers {
+            pass,
+            groups: pass.groups().collect(),
+            error,
+        };
+        if self.best.is_empty() {
+            // not before, since a pass takes the most memory while it runs
+            self.best = filled(Best::default(), offers.points(), cancel)?;
+            self.rivals = vec![Vec::new(); offers.points().div_ceil(ROWS_A_TASK)];
+        }
+        let shares = self.best.par_chunks_mut(ROWS_A_TASK);
+        let shares = shares.zip(&mut self.rivals).enumerate();
+        shares.try_for_each(|(share, (best, rivals))| {
+            cancel.check()?;
+            let mut points = (share * ROWS_A_TASK..).zip(best);
+            points.try_for_each(|(point, best)| offers.put_to(point, best, rivals))
+        })
+    }
+
+    /// All near-ties, where each value may be off by the `error` of the point, none by more than the `largest`.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn near_ties(
+        &mut self,
+        largest: f64,
+        error: impl Fn(u32) -> f64 + Sync,
+    ) -> Result<NearTies> {
+        let best = &self.best;
+        let of_share = |rivals: &mut Vec<Rival>| {
+            rivals.sort_by_key(|rival| rival.point);
+            let (mut ties, mut labels) = (NearTies::new(), Vec::new());
+            for rivals in rivals.chunk_by(|one, other| one.point == other.point) {
+                let point = rivals[0].point;
+                let best = best[point as usize].value;
+                let within = |error: f64| {
+                    let rivals = rivals.iter();
+                    rivals.filter(move |rival| may_win(rival.value, best, error))
+                };
+                // to find the error at a point takes a look around
+                let error = if within(0.0).count() == within(largest).count() {
+                    0.0
+                } else {
+                    error(point).min(largest)
+                };
+                labels.clear();
+                labels.extend(within(error).map(|rival| rival.label));
+                labels.sort_unstable();
+                labels.dedup();
+                if labels.len() > 1 {
+                    if !ties.contains_key(&labels) {
+                        ties.insert(labels.clone(), Vec::new());
+                    }
+                    if let Some(points) = ties.get_mut(&labels) {
+                        push(points, point)?;
+                    }
+                }
+            }
+            Ok(ties)
+        };
+        let shares = self.rivals.par_iter_mut().map(of_share);
+        let mut all = NearTies::new();
+        for (labels, points) in shares.collect::<Result<Vec<_>>>()?.into_iter().flatten() {
+            let of_labels = all.entry(labels).or_default();
+            for point in points {
+                push(of_labels, point)?;
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// The values of a pass, each of which may be off by `error`.
+struct Offers<'a> {
+    pass: &'a Pass<'a, f32, WIDTH_F32>,
+    /// As [`Pass::groups`] has them.
+    groups: Vec<(&'a [Lanes<f32, WIDTH_F32>], [f32; WIDTH_F32])>,
     error: f64,
-) {
-    let groups: Vec<_> = pass.groups().collect();
-    let least = (error / SMALL_ERROR) as f32;
-    let points = best.par_iter_mut().enumerate().with_min_len(ROWS_A_TASK);
-    points.for_each(|(i, best)| {
-        let (mut sums, mut largest) = ([0.0; WIDTH_F32], [best.values[0]; WIDTH_F32]);
-        for (values, counts) in &groups {
-            let values = &values[i];
+}
+
+impl Offers<'_> {
+    fn points(&self) -> usize {
+        self.groups.first().map_or(0, |(values, _)| values.len())
+    }
+
+    /// Puts all labels to a point, and those that may win to its `rivals` where there are several.
+    #[inline]
+    fn put_to(&self, point: usize, best: &mut Best, rivals: &mut Vec<Rival>) -> Result<()> {
+        let (mut sums, mut largest) = ([0.0; WIDTH_F32], [best.value; WIDTH_F32]);
+        for (values, counts) in &self.groups {
             for lane in 0..WIDTH_F32 {
-                let value = counts[lane] * values[lane];
+                let value = counts[lane] * values[point][lane];
                 sums[lane] += value;
                 largest[lane] = if value > largest[lane] {
                     value
@@ -103,71 +178,48 @@ pub(super) fn update<const RANKS: usize>(
         }
         best.sum += sums.iter().sum::<f32>();
         let largest = largest.iter().fold(0.0, |one: f32, other| one.max(*other));
+        let (before, met) = (*best, rivals.len());
+        let mut offer = |label: u32, value: f32| {
+            best.offer(label, value);
+            if may_win(value, largest, self.error) {
+                let point = point as u32;
+                let rival = Rival {
+                    point,
+                    label,
+                    value,
+                };
+                push(rivals, rival)?;
+            }
+            Ok::<(), Error>(())
+        };
+        offer(before.label, before.value)?;
         // most labels are far behind, and cannot win
-        let far_behind = if largest > least { largest / 2.0 } else { 0.0 };
-        for (group, (values, counts)) in groups.iter().enumerate() {
-            let values = &values[i];
-            let may_win = |lane: usize| counts[lane] * values[lane] > far_behind;
-            if (0..WIDTH_F32).fold(false, |any, lane| any | may_win(lane)) {
-                let lanes = pass.labels_at(i, group).enumerate();
-                for (lane, label) in lanes.filter(|(lane, _)| may_win(*lane)) {
-                    best.offer(label.unwrap_or_default(), values[lane]);
+        let is_sure = f64::from(largest) * SMALL_ERROR > self.error;
+        let far_behind = if is_sure { largest / 2.0 } else { 0.0 };
+        for (group, (values, counts)) in self.groups.iter().enumerate() {
+            let values = &values[point];
+            let is_near = |lane: usize| counts[lane] * values[lane] > far_behind;
+            if (0..WIDTH_F32).fold(false, |any, lane| any | is_near(lane)) {
+                let lanes = self.pass.labels_at(point, group).enumerate();
+                for (lane, label) in lanes.filter(|(lane, _)| is_near(*lane)) {
+                    offer(label.unwrap_or_default(), values[lane])?;
                 }
             }
         }
-    });
-}
-
-/// A point at which single precision cannot decide.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct NearTie {
-    pub(super) point: u32,
-    /// The labels that may win, ascending; none where there are more than are told apart.
-    pub(super) rivals: Option<Vec<u32>>,
-}
-
-/// All near-ties by point, where each value may be off by the `error` of the point, none by more than the `largest`.
-pub(super) fn near_ties<const RANKS: usize>(
-    best: &[Best<RANKS>],
-    largest: f64,
-    error: impl Fn(u32) -> f64 + Sync,
-) -> Result<Vec<NearTie>> {
-    let of_task = |task: usize| {
-        let mut ties = Vec::new();
-        for at in task * ROWS_A_TASK..best.len().min((task + 1) * ROWS_A_TASK) {
-            // the largest leaves few to be looked at more closely
-            if best[at].may_win(1, largest) {
-                let (point, error) = (at as u32, error(at as u32));
-                if best[at].may_win(1, error) {
-                    let rivals = best[at].rivals(error);
-                    push(&mut ties, NearTie { point, rivals })?;
-                }
-            }
+        if rivals.len() - met == 1 {
+            rivals.pop();
         }
-        Ok(ties)
-    };
-    let tasks = (0..best.len().div_ceil(ROWS_A_TASK)).into_par_iter();
-    let ties = tasks.map(of_task).collect::<Result<Vec<_>>>()?;
-    Ok(ties.into_iter().flatten().collect())
+        Ok(())
+    }
 }
+
+/// The points at which single precision cannot decide, ascending, by the labels that may win there, ascending too.
+pub(super) type NearTies = BTreeMap<Vec<u32>, Vec<u32>>;
 
 /// The labels that may win at any of `ties`, ascending.
-pub(super) fn candidates(ties: &[NearTie], n_labels: usize) -> Vec<u32> {
-    let mut labels = Vec::new();
-    for tie in ties {
-        let Some(rivals) = &tie.rivals else {
-            return (0..n_labels as u32).collect();
-        };
-        labels.extend(rivals);
-        // most have the same
-        if labels.len() > 2 * n_labels {
-            labels.sort_unstable();
-            labels.dedup();
-        }
-    }
-    labels.sort_unstable();
-    labels.dedup();
-    labels
+pub(super) fn candidates(ties: &NearTies) -> Vec<u32> {
+    let labels: BTreeSet<u32> = ties.keys().flatten().copied().collect();
+    labels.into_iter().collect()
 }
 
 /// Keeps in `refined` the best label of each of `points` and its value; of [`EQUAL`] ones the lowest.
@@ -191,21 +243,32 @@ fn offer((best, largest): &mut (u32, f64), label: u32, value: f64) {
 mod tests {
     use super::*;
 
-    /// Near-ties where each value may be off by as much.
-    fn ties_of(best: &[Best<4>], error: f64) -> Vec<NearTie> {
-        near_ties(best, error, |_| error).unwrap()
-    }
-
-    fn tied(best: &[Best<4>], error: f64) -> Vec<u32> {
-        ties_of(best, error).iter().map(|tie| tie.point).collect()
-    }
-
-    fn best(values: &[(u32, f32)]) -> Best<4> {
-        let mut best = Best::default();
-        for &(label, value) in values {
-            best.offer(label, value);
+    /// Near-ties of points with these labels and values, each of which may be off by as much.
+    fn ties_of(points: &[&[(u32, f32)]], error: f64) -> NearTies {
+        let (mut winners, mut rivals) = (Winners::default(), Vec::new());
+        for (point, values) in (0..).zip(points) {
+            let mut best = Best::default();
+            for &(label, value) in *values {
+                best.offer(label, value);
+                rivals.push(Rival {
+                    point,
+                    label,
+                    value,
+                });
+            }
+            winners.best.push(best);
         }
-        best
+        winners.rivals.push(rivals);
+        winners.near_ties(error, |_| error).unwrap()
+    }
+
+    fn tied(points: &[&[(u32, f32)]], error: f64) -> Vec<u32> {
+        let mut tied = ties_of(points, error)
+            .into_values()
+            .collect::<Vec<_>>()
+            .concat();
+        tied.sort_unstable();
+        tied
     }
 
     #[test]
@@ -214,7 +277,11 @@ mod tests {
             [(0, 0.5), (3, 0.5), (7, 0.25)],
             [(7, 0.25), (3, 0.5), (0, 0.5)],
         ] {
-            assert_eq!(best(&values).labels[..3], [0, 3, 7]);
+            let mut best = Best::default();
+            for (label, value) in values {
+                best.offer(label, value);
+            }
+            assert_eq!((best.label, best.value), (0, 0.5));
         }
     }
 
@@ -240,32 +307,33 @@ mod tests {
 
     #[test]
     fn values_within_twice_their_error_are_near_ties() {
-        let points = [
-            best(&[(1, 0.500), (2, 0.499)]),
-            best(&[(1, 0.5), (2, 0.25)]),
-        ];
+        let points: [&[(u32, f32)]; 2] = [&[(1, 0.500), (2, 0.499)], &[(1, 0.5), (2, 0.25)]];
         assert!(
             tied(&points, 0.0).is_empty(),
             "far more than rounding apart"
         );
         assert_eq!(tied(&points, 0.001), [0]);
         assert_eq!(tied(&points, 0.2), [0, 1]);
-        assert_eq!(tied(&[best(&[(1, 0.5), (2, 0.5)])], 0.0), [0]);
+        assert_eq!(tied(&[&[(1, 0.5), (2, 0.5)]], 0.0), [0]);
     }
 
     #[test]
-    fn a_label_that_nothing_reached_is_no_candidate() {
-        assert!(tied(&[best(&[(1, 0.5)])], 1.0).is_empty());
-        assert!(tied(&[Best::default()], 1.0).is_empty());
+    fn a_label_that_nothing_reached_is_no_rival() {
+        assert!(tied(&[&[(1, 0.5), (2, 0.0)]], 1.0).is_empty());
+        assert!(tied(&[&[]], 1.0).is_empty());
     }
 
     #[test]
-    fn where_a_fourth_label_may_win_all_are_candidates() {
-        let two = best(&[(1, 0.5), (4, 0.5), (6, 0.1)]);
-        let four = best(&[(1, 0.5), (4, 0.5), (6, 0.5), (8, 0.5)]);
-        assert_eq!(candidates(&ties_of(&[two], 0.0), 9), [1, 4]);
-        assert_eq!(candidates(&ties_of(&[two], 0.2), 9), [1, 4, 6]);
-        let all: Vec<u32> = (0..9).collect();
-        assert_eq!(candidates(&ties_of(&[two, four], 0.0), 9), all);
+    fn points_are_named_by_the_labels_that_may_win() {
+        let points: [&[(u32, f32)]; 3] = [
+            &[(4, 0.5), (1, 0.5), (6, 0.1)],
+            &[(1, 0.5), (4, 0.5), (6, 0.5), (8, 0.5)],
+            &[(1, 0.5), (4, 0.5), (1, 0.5)],
+        ];
+        let ties = ties_of(&points, 0.0);
+        assert_eq!(ties[&vec![1, 4]], [0, 2]);
+        assert_eq!(ties[&vec![1, 4, 6, 8]], [1]);
+        assert_eq!(candidates(&ties), [1, 4, 6, 8]);
+        assert_eq!(candidates(&ties_of(&points[..1], 0.2)), [1, 4, 6]);
     }
 }
