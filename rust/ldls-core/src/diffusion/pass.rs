@@ -3,7 +3,7 @@
 use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
 use super::lanes::{Lane, Lanes};
 use super::plan::BACKGROUND_LANE;
-use super::schedule::{Activity, ROWS_A_TASK, Schedule};
+use super::schedule::{Activity, BLOCK, ROWS_A_TASK, Schedule};
 use super::seeds::Seeds;
 use super::series::Series;
 use super::sweep::{Step, take_steps};
@@ -94,8 +94,10 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             rows.for_each(|(row, &weight)| row[BACKGROUND_LANE] = scale * weight);
             Ok::<(), Error>(())
         })?;
-        for &(i, lane, weight) in seeds.of_rows(0..a.len()) {
-            z.group_mut(lane as usize / WIDTH)[i as usize][lane as usize % WIDTH] = scale * weight;
+        for block in 0..schedule.blocks() {
+            for (row, lane, weight) in seeds.of_block(block) {
+                z.group_mut(lane / WIDTH)[block * BLOCK + row][lane % WIDTH] = scale * weight;
+            }
         }
         if let Some(lane) = seeds.plan.probe {
             let rows = z.group_mut(lane / WIDTH).par_iter_mut().zip(&seeds.probe);

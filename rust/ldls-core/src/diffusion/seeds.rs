@@ -6,7 +6,6 @@ use crate::masks::PixelLabels;
 use crate::memory::{push, tabulate, with_room, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// The seeds of the labels of one pass by lane, row after row.
 #[derive(Debug)]
@@ -16,8 +15,10 @@ pub(super) struct Seeds<T> {
     pub(super) background: Vec<T>,
     /// Seeds of the probe, where the pass has it.
     pub(super) probe: Vec<T>,
-    /// Row, lane and weight of each other seed; those of row i at `offsets[i]..offsets[i + 1]`.
-    entries: Vec<(u32, u32, T)>,
+    /// Row within its block and lane of each other seed, block after block.
+    places: Vec<[u8; 2]>,
+    weights: Vec<T>,
+    /// Where those of each block begin.
     offsets: Vec<u32>,
     /// Values up to this magnitude are too small to matter.
     pub(super) least: T,
@@ -30,7 +31,7 @@ impl<T: Real> Seeds<T> {
         let n_labels = plan.lanes.iter().map(|&(label, _)| label as usize + 1);
         let mut lane_of = vec![None; n_labels.max().unwrap_or(0)];
         for &(label, lane) in plan.lanes.iter().filter(|(label, _)| *label > 0) {
-            lane_of[label as usize] = Some(lane as u32);
+            lane_of[label as usize] = Some(lane as u8);
         }
         let background = |i: usize| {
             let weight = b.row(i).find(|&(label, _)| label == 0);
@@ -50,36 +51,40 @@ impl<T: Real> Seeds<T> {
         let of_task = |task: usize| {
             cancel.check()?;
             let rows = task * ROWS_A_TASK..b.rows().min((task + 1) * ROWS_A_TASK);
-            let (mut entries, mut ends) = (Vec::new(), with_room(rows.len())?);
-            for i in rows {
+            let (mut places, mut weights, mut ends) = (Vec::new(), Vec::new(), Vec::new());
+            for i in rows.clone() {
                 for (label, weight) in b.row(i) {
                     if let Some(lane) = lane_of.get(label).copied().flatten() {
-                        push(&mut entries, (i as u32, lane, weight))?;
+                        push(&mut places, [(i % BLOCK) as u8, lane])?;
+                        push(&mut weights, weight)?;
                     }
                 }
-                ends.push(entries.len() as u32);
+                if (i + 1) % BLOCK == 0 || i + 1 == rows.end {
+                    ends.push(places.len() as u32);
+                }
             }
-            Ok((entries, ends))
+            Ok((places, weights, ends))
         };
         let tasks = (0..b.rows().div_ceil(ROWS_A_TASK)).into_par_iter();
         let parts = tasks.map(of_task).collect::<Result<Vec<_>>>()?;
-        let mut entries = with_room(parts.iter().map(|(entries, _)| entries.len()).sum())?;
-        let mut offsets = with_room(b.rows() + 1)?;
+        let count = parts.iter().map(|(places, ..)| places.len()).sum();
+        let (mut places, mut weights) = (with_room(count)?, with_room(count)?);
+        let mut offsets = with_room(b.rows().div_ceil(BLOCK) + 1)?;
         offsets.push(0);
-        for (own, ends) in parts {
-            let before = entries.len() as u32;
+        for (of_places, of_weights, ends) in parts {
+            let before = places.len() as u32;
             offsets.extend(ends.iter().map(|end| before + end));
-            entries.extend(own);
+            places.extend(of_places);
+            weights.extend(of_weights);
         }
-        let weights = b.weights.par_iter().with_min_len(ROWS_A_TASK);
-        let largest = weights
-            .map(|weight| weight.to_f64())
-            .reduce(|| 0.0, f64::max);
+        let all = b.weights.par_iter().with_min_len(ROWS_A_TASK);
+        let largest = all.map(|weight| weight.to_f64()).reduce(|| 0.0, f64::max);
         Ok(Self {
             plan,
             background,
             probe,
-            entries,
+            places,
+            weights,
             offsets,
             least: T::from_f64(T::NEGLIGIBLE * largest),
         })
@@ -87,25 +92,23 @@ impl<T: Real> Seeds<T> {
 
     /// For each block of rows, bit g where lanes of group g have seeds.
     pub(super) fn groups(&self, width: usize, cancel: &Cancel) -> Result<Vec<u8>> {
-        let rows = self.background.len();
         let probed = self.plan.probe.map_or(0, |lane| 1 << (lane / width));
         let background = self.background.par_iter().with_min_len(ROWS_A_TASK);
         let full = background.any(|&weight| weight > T::default());
         let everywhere = probed | u8::from(full) << (BACKGROUND_LANE / width);
         let of_block = |block: usize| {
-            let of_block = block * BLOCK..rows.min((block + 1) * BLOCK);
-            let seeds = self.of_rows(of_block).iter();
-            seeds.fold(everywhere, |bits, (_, lane, _)| {
-                bits | 1 << (*lane as usize / width)
-            })
+            let lanes = self.of_block(block).map(|(_, lane, _)| lane);
+            lanes.fold(everywhere, |bits, lane| bits | 1 << (lane / width))
         };
-        tabulate(rows.div_ceil(BLOCK), of_block, cancel)
+        tabulate(self.offsets.len() - 1, of_block, cancel)
     }
 
-    /// Row, lane and weight of each seed of `rows`, but for the background's and the probe's.
+    /// Row within the block, lane and weight of each seed of `block`, but for the background's and the probe's.
     #[inline(always)]
-    pub(super) fn of_rows(&self, rows: Range<usize>) -> &[(u32, u32, T)] {
-        &self.entries[self.offsets[rows.start] as usize..self.offsets[rows.end] as usize]
+    pub(super) fn of_block(&self, block: usize) -> impl Iterator<Item = (usize, usize, T)> {
+        let own = self.offsets[block] as usize..self.offsets[block + 1] as usize;
+        let places = self.places[own.clone()].iter().zip(&self.weights[own]);
+        places.map(|(&[row, lane], &weight)| (row.into(), lane.into(), weight))
     }
 }
 

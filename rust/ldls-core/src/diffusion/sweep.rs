@@ -81,22 +81,21 @@ unsafe fn sweep<T: Lane<WIDTH>, const WIDTH: usize>(
 ) {
     let blocks = all.start / BLOCK..all.end.div_ceil(BLOCK);
     let rows_of = |blocks: Range<usize>| blocks.start * BLOCK..all.end.min(blocks.end * BLOCK);
+    let begins = values[1].begins();
     let mut first = blocks.start;
     while first < blocks.end {
         // blocks of the same groups take the step as one
         let active = activity.active(first);
         let differs = |block: &usize| activity.active(*block) != active;
         let end = (first + 1..blocks.end).find(differs).unwrap_or(blocks.end);
-        let rows = rows_of(first..end);
         // SAFETY: as the caller promises
-        unsafe { step_active(a, seeds, step, active, values, &rows) };
-        for &(i, lane, weight) in seeds.of_rows(rows) {
-            let (group, lane) = (lane as usize / WIDTH, lane as usize % WIDTH);
-            // SAFETY: as the caller promises; a seed lies in one of the rows
-            let next = unsafe { &mut *values[1].begin(group).add(i as usize) };
-            next[lane] += step.seeds * weight;
-        }
+        unsafe { step_active(a, seeds, step, active, values, &rows_of(first..end)) };
         for block in first..end {
+            for (row, lane, weight) in seeds.of_block(block) {
+                let (row, begin) = (block * BLOCK + row, begins[lane / WIDTH].cast::<T>());
+                // SAFETY: as the caller promises; a seed lies in one of the rows, and in a lane of the values
+                unsafe { *begin.add(row * WIDTH + lane % WIDTH) += step.seeds * weight };
+            }
             // SAFETY: as the caller promises
             let rows = |group| unsafe { values[1].rows(group, &rows_of(block..block + 1)) };
             let unfilled = groups_in(active & !activity.filled(block));

@@ -95,6 +95,12 @@ impl<'a, T: Real, const WIDTH: usize> SharedValues<'a, T, WIDTH> {
         self.groups[group]
     }
 
+    /// The same of every group; null where there is none.
+    #[inline(always)]
+    pub(super) fn begins(&self) -> [*mut Lanes<T, WIDTH>; MOST_GROUPS] {
+        self.groups
+    }
+
     /// `rows` of `group`.
     ///
     /// # Safety
