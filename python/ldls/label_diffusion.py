@@ -148,17 +148,20 @@ def result_of(
     own = range(len(views)) if own is None else own
     numbered = enumerate(arrays.objects, start=1)
     instances = tuple(_instance(label, parts, views, own) for label, parts in numbered)
-    sightings = [(in_view - start, pixels) for in_view, pixels in (arrays.sightings[number] for number in own)]
-    first, last = np.searchsorted(arrays.in_view, (start, end))
+    sightings = [arrays.sightings[number] for number in own]
+    in_view = arrays.in_view
+    if rows is not None:
+        sightings = [(seen - start, pixels) for seen, pixels in sightings]
+        in_view = in_view[slice(*np.searchsorted(in_view, rows))] - start
     seen = _seen([views[number] for number in own], sightings, instances)
     return Segmentation(
         labels=arrays.labels[start:end],
         diffused_labels=arrays.diffused_labels[start:end],
         confidence=arrays.confidence[start:end],
-        in_view=arrays.in_view[first:last] - start,
+        in_view=in_view,
         instances=instances,
         views=seen,
-        report=_report(arrays, len(points), int(last - first), seen, instances),
+        report=_report(arrays, len(points), len(in_view), seen, instances),
         timings=arrays.timings,
         points=points,
         params=params,
@@ -245,13 +248,13 @@ def _warn(result: Segmentation, report: Mapping[str, Any]) -> None:
     if len(cloud) and report["n_nonfinite"] == len(cloud):
         _warning(f"points: 0 of {len(cloud)} rows are finite; nothing is labelled", NoUsablePoints)
         return
-    low, high = (np.array(bound) for bound in report["bounds"])
-    farthest = float(np.abs([low, high]).max()) if len(cloud) else 0.0
+    low, high = report["bounds"]
+    farthest = max(abs(bound) for bound in (*low, *high)) if len(cloud) else 0.0
     step = float(np.spacing(np.float32(farthest)))
     if cloud.dtype == np.float32 and step > COARSEST_STEP_M:
         message = f"points: float32 spacing at {farthest:.1e} is {step:.2g} m; pass float64 or subtract an origin"
         _warning(message, PrecisionWarning)
-    extent = float((high - low).max()) if len(cloud) else 0.0
+    extent = max(most - least for least, most in zip(low, high, strict=True)) if len(cloud) else 0.0
     if extent > WIDEST_CLOUD_M:
         _warning(f"points: extent is {extent:.3g} m, over 10 km; are they in metres?", ScaleWarning)
     if report["only_islands"]:
