@@ -79,20 +79,8 @@ impl Passes<'_> {
             lanes[BACKGROUND_LANE].labels.push((0, None));
         }
         if are_shared {
-            for (label, come) in
-                seeded
-                    .iter()
-                    .zip(spread((a, b), self.schedule, &seeded, self.steps, cancel)?)
-            {
-                let is_free = |lane: &Shared| !lane.blocks.meet(&come);
-                let free = lanes[own..].iter().position(is_free);
-                let lane = free.map_or(lanes.len(), |at| own + at);
-                if lane == lanes.len() {
-                    lanes.push(Shared::default());
-                }
-                lanes[lane].blocks.add(&come);
-                lanes[lane].labels.push((*label, Some(come)));
-            }
+            let come = spread((a, b), self.schedule, &seeded, self.steps, cancel)?;
+            lanes.extend(share(&seeded, come));
         } else {
             lanes.extend(seeded.into_iter().map(|label| Shared {
                 labels: vec![(label, None)],
@@ -194,6 +182,21 @@ fn count_seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> (Vec<u64>, Vec<u6
     let tasks = (0..b.rows().div_ceil(size)).into_par_iter();
     let tasks = tasks.map(|task| of_rows(task * size..b.rows().min((task + 1) * size)));
     tasks.reduce(none, both)
+}
+
+/// Lanes for `labels`, each in the first that is free in all blocks to which it may `come`.
+fn share(labels: &[u32], come: Vec<Blocks>) -> Vec<Shared> {
+    let mut lanes: Vec<Shared> = Vec::new();
+    for (&label, come) in labels.iter().zip(come) {
+        let free = lanes.iter().position(|lane| !lane.blocks.meet(&come));
+        let lane = free.unwrap_or(lanes.len());
+        if lane == lanes.len() {
+            lanes.push(Shared::default());
+        }
+        lanes[lane].blocks.add(&come);
+        lanes[lane].labels.push((label, Some(come)));
+    }
+    lanes
 }
 
 /// What shares a lane.

@@ -25,6 +25,8 @@ pub(super) struct Seeds<T> {
 }
 
 impl<T: Real> Seeds<T> {
+    /// The seeds in `b` of the labels of `plan`.
+    ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
     pub(super) fn new(b: &PixelLabels<T>, plan: Plan, cancel: &Cancel) -> Result<Self> {

@@ -202,7 +202,9 @@ impl Offers<'_> {
             if (0..WIDTH_F32).fold(false, |any, lane| any | is_near(lane)) {
                 let lanes = self.pass.labels_at(point, group).enumerate();
                 for (lane, label) in lanes.filter(|(lane, _)| is_near(*lane)) {
-                    offer(label.unwrap_or_default(), values[lane])?;
+                    if let Some(label) = label {
+                        offer(label, values[lane])?;
+                    }
                 }
             }
         }
