@@ -1,5 +1,5 @@
 //! For tests of several images, a wall of points before cameras whose masks are rectangles; for those of diffusion, a graph of
-//! two points.
+//! two points, and pixel labels of one seed each.
 
 use crate::{
     Camera, Cancel, Cloud, InstanceMasks, Params, PixelLabels, PointGraph, Rle, Segmentation, View,
@@ -65,4 +65,18 @@ pub(crate) fn pair() -> (PointGraph, PixelLabels) {
         mass: vec![0.5; 2],
     };
     (a, b)
+}
+
+/// Pixel labels of so many points of which each label has one seed, label l at point `seeds[l]`.
+pub(crate) fn one_seed_each(points: usize, seeds: &[usize]) -> PixelLabels {
+    let mut at: Vec<(usize, u32)> = seeds.iter().copied().zip(0..).collect();
+    at.sort_unstable();
+    PixelLabels {
+        offsets: (0..=points)
+            .map(|i| at.iter().filter(|(seed, _)| *seed < i).count())
+            .collect(),
+        labels: at.iter().map(|(_, label)| *label).collect(),
+        weights: vec![0.25; seeds.len()],
+        mass: vec![0.25; points],
+    }
 }

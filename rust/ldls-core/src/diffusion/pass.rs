@@ -108,7 +108,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             a,
             schedule,
             seeds,
-            activity: Activity::new(schedule, &seeds.groups(WIDTH, cancel)?),
+            activity: Activity::new(schedule, &seeds.groups(cancel)?),
             z,
             previous,
             left_out: 0.0,
@@ -264,7 +264,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::plan::Passes;
+    use super::super::plan::Planner;
     use super::*;
     use crate::masks::PixelLabels;
 
@@ -279,13 +279,13 @@ mod tests {
         };
         let never = Cancel::never();
         let schedule = Schedule::new(&a, never).unwrap();
-        let passes = Passes {
+        let planner = Planner {
             schedule: &schedule,
             width: 8,
             probe: false,
             steps: 0,
         };
-        let plan = passes.plan((&a, &b), &[0, 1], never).unwrap().remove(0);
+        let plan = planner.plan((&a, &b), &[0, 1], never).unwrap().remove(0);
         let seeds = Seeds::new(&b, plan, never).unwrap();
         let mut pass = Pass::<f32, 8>::run(&a, &schedule, &seeds, None, Some(1), never).unwrap();
         pass.convergence.error = error;

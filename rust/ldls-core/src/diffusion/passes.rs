@@ -3,7 +3,7 @@
 use super::convergence::Convergence;
 use super::lanes::{Lane, WIDTH_F32};
 use super::pass::Pass;
-use super::plan::Passes;
+use super::plan::Planner;
 use super::schedule::Schedule;
 use super::seeds::Seeds;
 use super::series::Series;
@@ -43,13 +43,13 @@ pub(super) fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
     let mut convergence = Convergence::default();
     let (mut labels, mut probe) = (labels.to_vec(), probed);
     'planned: loop {
-        let passes = Passes {
+        let planner = Planner {
             schedule: &schedule,
             width: WIDTH,
             probe,
             steps: Pass::<T, WIDTH>::steps(series.last(), iterations),
         };
-        for plan in passes.plan((a, b), &labels, cancel)? {
+        for plan in planner.plan((a, b), &labels, cancel)? {
             let seeds = Seeds::new(b, plan, cancel)?;
             let mut pass = Pass::run(a, &schedule, &seeds, series.last(), iterations, cancel)?;
             let tried = series.last();

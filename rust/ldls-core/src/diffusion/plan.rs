@@ -33,16 +33,17 @@ pub(super) struct Plan {
     pub(super) probe: Option<usize>,
     /// Number of groups of lanes.
     pub(super) groups: usize,
-    width: usize,
+    /// Lanes of a group.
+    pub(super) width: usize,
     /// Label of each lane: block after block, or once for all of them where none is shared.
     labels: Vec<u32>,
     /// Distance of the labels of a block from those of the next.
     stride: usize,
 }
 
-/// What the passes are planned by, beside the labels and their seeds.
+/// What makes the plans of passes, from labels and their seeds.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Passes<'a> {
+pub(super) struct Planner<'a> {
     pub(super) schedule: &'a Schedule,
     /// Lanes of a group.
     pub(super) width: usize,
@@ -53,7 +54,7 @@ pub(super) struct Passes<'a> {
     pub(super) steps: usize,
 }
 
-impl Passes<'_> {
+impl Planner<'_> {
     /// The passes that `labels` take over the graph `a` from their seeds in `b`. Labels without a seed need no lane.
     ///
     /// The first group, which the background keeps busy everywhere, takes the labels with the most seeds; the others follow in
@@ -211,6 +212,7 @@ struct Shared {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_support::one_seed_each;
 
     /// The lanes of `labels` of points in a row, each with edges to those beside it; label l has one seed, at `seeds[l]`.
     fn planned(points: usize, seeds: &[usize], probe: bool, steps: usize) -> Vec<Plan> {
@@ -223,24 +225,15 @@ mod tests {
         let offsets = [0].into_iter().chain(offsets).collect();
         let weights = vec![0.25; columns.len()];
         let a = PointGraph::<f32>::from_csr(offsets, columns, weights).unwrap();
-        let mut at: Vec<(usize, u32)> = seeds.iter().copied().zip(0..).collect();
-        at.sort_unstable();
-        let b = PixelLabels {
-            offsets: (0..=points)
-                .map(|i| at.iter().filter(|(seed, _)| *seed < i).count())
-                .collect(),
-            labels: at.iter().map(|(_, label)| *label).collect(),
-            weights: vec![0.25; seeds.len()],
-            mass: vec![0.25; points],
-        };
-        let passes = Passes {
+        let b = one_seed_each(points, seeds);
+        let planner = Planner {
             schedule: &Schedule::new(&a, Cancel::never()).unwrap(),
             width: 4,
             probe,
             steps,
         };
         let labels: Vec<u32> = (0..seeds.len() as u32).collect();
-        passes.plan((&a, &b), &labels, Cancel::never()).unwrap()
+        planner.plan((&a, &b), &labels, Cancel::never()).unwrap()
     }
 
     /// Labels of group 0 at a row.

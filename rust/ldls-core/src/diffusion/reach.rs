@@ -5,7 +5,7 @@
 
 use super::lanes::WIDTH_F64;
 use super::pass::Pass;
-use super::plan::Passes;
+use super::plan::Planner;
 use super::schedule::Schedule;
 use super::seeds::Seeds;
 use super::series::Series;
@@ -81,13 +81,13 @@ impl Reach {
         let steps = self.ends.len() - 2;
         let schedule = Schedule::narrowing(a, self.ends[..steps].iter().rev().copied(), cancel)?;
         let mut found = vec![Vec::new(); self.ends[0]];
-        let passes = Passes {
+        let planner = Planner {
             schedule: &schedule,
             width: WIDTH_F64,
             probe: false,
             steps,
         };
-        for plan in passes.plan((a, b), labels, cancel)? {
+        for plan in planner.plan((a, b), labels, cancel)? {
             let seeds = Seeds::new(b, plan, cancel)?;
             let pass: Pass<f64, WIDTH_F64> =
                 Pass::run(a, &schedule, &seeds, series, Some(iterations), cancel)?;

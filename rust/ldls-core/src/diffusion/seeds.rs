@@ -7,9 +7,10 @@ use crate::memory::{push, tabulate, with_room, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 
-/// The seeds of the labels of one pass by lane, row after row.
+/// The seeds of the labels of one pass by lane.
 #[derive(Debug)]
 pub(super) struct Seeds<T> {
+    /// The lanes of the labels.
     pub(super) plan: Plan,
     /// Seeds of the background, which nearly every row has; zeros where it is in another pass.
     pub(super) background: Vec<T>,
@@ -17,6 +18,7 @@ pub(super) struct Seeds<T> {
     pub(super) probe: Vec<T>,
     /// Row within its block and lane of each other seed, block after block.
     places: Vec<[u8; 2]>,
+    /// Their weights.
     weights: Vec<T>,
     /// Where those of each block begin.
     offsets: Vec<u32>,
@@ -93,7 +95,8 @@ impl<T: Real> Seeds<T> {
     }
 
     /// For each block of rows, bit g where lanes of group g have seeds.
-    pub(super) fn groups(&self, width: usize, cancel: &Cancel) -> Result<Vec<u8>> {
+    pub(super) fn groups(&self, cancel: &Cancel) -> Result<Vec<u8>> {
+        let width = self.plan.width;
         let probed = self.plan.probe.map_or(0, |lane| 1 << (lane / width));
         let background = self.background.par_iter().with_min_len(ROWS_A_TASK);
         let full = background.any(|&weight| weight > T::default());

@@ -4,7 +4,7 @@ use super::schedule::{BLOCK, Schedule};
 use crate::bits::ones;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{filled, push, tabulate, zeros};
+use crate::memory::{push, tabulate, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
 use std::mem::take;
@@ -97,8 +97,8 @@ impl<'a, T: Real> Spread<'a, T> {
             a,
             schedule,
             come: tabulate(b.rows(), of_row, cancel)?,
-            full: filled(0, blocks, cancel)?,
-            near: filled(0, blocks, cancel)?,
+            full: Vec::new(),
+            near: zeros(blocks, cancel)?,
             awake: Vec::new(),
         };
         spread.full = tabulate(blocks, |block| spread.come_to_all(block), cancel)?;
@@ -177,22 +177,14 @@ impl<'a, T: Real> Spread<'a, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_support::one_seed_each;
 
     /// The blocks that labels come to in a ring of points with edges from the one before each, where each label has one seed.
     fn blocks(points: u32, seeds: &[usize], steps: usize) -> Vec<Vec<usize>> {
         let columns = (0..points).map(|i| (i + points - 1) % points).collect();
         let offsets = (0..=points as usize).collect();
         let a = PointGraph::<f32>::from_csr(offsets, columns, vec![0.5; points as usize]).unwrap();
-        let mut at: Vec<(usize, u32)> = seeds.iter().copied().zip(0..).collect();
-        at.sort_unstable();
-        let b = PixelLabels {
-            offsets: (0..=points as usize)
-                .map(|i| at.iter().filter(|(seed, _)| *seed < i).count())
-                .collect(),
-            labels: at.iter().map(|(_, label)| *label).collect(),
-            weights: vec![0.25; seeds.len()],
-            mass: vec![0.25; points as usize],
-        };
+        let b = one_seed_each(points as usize, seeds);
         let labels: Vec<u32> = (0..seeds.len() as u32).collect();
         let schedule = Schedule::new(&a, Cancel::never()).unwrap();
         let come = spread((&a, &b), &schedule, &labels, steps, Cancel::never()).unwrap();

@@ -126,11 +126,9 @@ impl Winners {
                 labels.sort_unstable();
                 labels.dedup();
                 if labels.len() > 1 {
-                    if !ties.contains_key(&labels) {
-                        ties.insert(labels.clone(), Vec::new());
-                    }
-                    if let Some(points) = ties.get_mut(&labels) {
-                        push(points, point)?;
+                    match ties.get_mut(&labels) {
+                        Some(points) => push(points, point)?,
+                        None => _ = ties.insert(labels.clone(), vec![point]),
                     }
                 }
             }
