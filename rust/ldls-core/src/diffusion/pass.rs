@@ -2,8 +2,7 @@
 
 use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
 use super::lanes::{Lane, Lanes};
-use super::plan::BACKGROUND_LANE;
-use super::schedule::{Activity, BLOCK, ROWS_A_TASK, Schedule};
+use super::schedule::{Activity, ROWS_A_TASK, Schedule};
 use super::seeds::Seeds;
 use super::series::Series;
 use super::sweep::{Step, take_steps};
@@ -84,25 +83,14 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         scale: T,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let groups = seeds.plan.groups;
-        let [mut z, previous] = Values::zeros(a.len(), groups, cancel)?;
-        let rows = z.group_mut(0).par_chunks_mut(ROWS_A_TASK);
-        let rows = rows.zip(seeds.background.par_chunks(ROWS_A_TASK));
-        rows.try_for_each(|(rows, weights)| {
-            cancel.check()?;
-            let rows = rows.iter_mut().zip(weights);
-            rows.for_each(|(row, &weight)| row[BACKGROUND_LANE] = scale * weight);
-            Ok::<(), Error>(())
-        })?;
-        for block in 0..schedule.blocks() {
-            for (row, lane, weight) in seeds.of_block(block) {
-                z.group_mut(lane / WIDTH)[block * BLOCK + row][lane % WIDTH] = scale * weight;
-            }
-        }
-        if let Some(lane) = seeds.plan.probe {
-            let rows = z.group_mut(lane / WIDTH).par_iter_mut().zip(&seeds.probe);
-            rows.with_min_len(ROWS_A_TASK)
-                .for_each(|(row, &weight)| row[lane % WIDTH] = weight);
+        let [mut z, previous] = Values::zeros(a.len(), seeds.plan.groups, cancel)?;
+        for group in 0..seeds.plan.groups {
+            let tasks = z.group_mut(group).par_chunks_mut(ROWS_A_TASK).enumerate();
+            tasks.try_for_each(|(task, rows)| {
+                cancel.check()?;
+                seeds.put(group, task * ROWS_A_TASK, rows, scale);
+                Ok::<(), Error>(())
+            })?;
         }
         Ok(Self {
             a,

@@ -1,7 +1,12 @@
 //! The seeds of the labels that share a pass over the graph, by the lane of each label.
+//!
+//! They are added in every step. In most blocks nearly all rows have one seed, and in the same lanes: that of the background far
+//! from all masks, that of a mask within it, or of several. These are added with the other terms; the rest one by one.
 
+use super::lanes::Lanes;
 use super::plan::{BACKGROUND_LANE, Plan};
 use super::schedule::{BLOCK, ROWS_A_TASK};
+use crate::bits::ones;
 use crate::masks::PixelLabels;
 use crate::memory::{push, tabulate, with_room, zeros};
 use crate::{Cancel, Real, Result};
@@ -12,18 +17,25 @@ use rayon::prelude::*;
 pub(super) struct Seeds<T> {
     /// The lanes of the labels.
     pub(super) plan: Plan,
-    /// Seeds of the background, which nearly every row has; zeros where it is in another pass.
-    pub(super) background: Vec<T>,
+    /// Of each block the lanes in which most rows have their largest seed, a bit each.
+    pub(super) common: Vec<u64>,
+    /// Of each row the seed that it has in all of these; zero where there is no such.
+    pub(super) in_common: Vec<T>,
+    others: Others<T>,
     /// Seeds of the probe, where the pass has it.
-    pub(super) probe: Vec<T>,
-    /// Row within its block and lane of each other seed, block after block.
-    places: Vec<[u8; 2]>,
-    /// Their weights.
-    weights: Vec<T>,
-    /// Where those of each block begin.
-    offsets: Vec<u32>,
+    probe: Vec<T>,
     /// Values up to this magnitude are too small to matter.
     pub(super) least: T,
+}
+
+/// The seeds that rows do not have in common lanes, block after block.
+#[derive(Debug)]
+struct Others<T> {
+    /// Row within its block and lane of each.
+    places: Vec<[u8; 2]>,
+    weights: Vec<T>,
+    /// Where those of each block end.
+    ends: Vec<u32>,
 }
 
 impl<T: Real> Seeds<T> {
@@ -34,62 +46,59 @@ impl<T: Real> Seeds<T> {
     pub(super) fn new(b: &PixelLabels<T>, plan: Plan, cancel: &Cancel) -> Result<Self> {
         let n_labels = plan.lanes.iter().map(|&(label, _)| label as usize + 1);
         let mut lane_of = vec![None; n_labels.max().unwrap_or(0)];
-        for &(label, lane) in plan.lanes.iter().filter(|(label, _)| *label > 0) {
+        for &(label, lane) in &plan.lanes {
             lane_of[label as usize] = Some(lane as u8);
         }
-        let background = |i: usize| {
-            let weight = b.row(i).find(|&(label, _)| label == 0);
-            weight.map_or(T::default(), |(_, weight)| weight)
+        let of_row = |row: usize| {
+            let seeds = b.row(row);
+            seeds.filter_map(|(label, weight)| Some(((*lane_of.get(label)?)?, weight)))
         };
-        let background = if plan.lanes.contains(&(0, BACKGROUND_LANE)) {
-            tabulate(b.rows(), background, cancel)?
-        } else {
-            zeros(b.rows(), cancel)?
+        let mut common = zeros(b.rows().div_ceil(BLOCK), cancel)?;
+        let mut in_common = zeros(b.rows(), cancel)?;
+        let of_task = |(task, (common, in_common)): (usize, (&mut [u64], &mut [T]))| {
+            cancel.check()?;
+            let mut others = Others::with_room(0, common.len())?;
+            let blocks = common.iter_mut().zip(in_common.chunks_mut(BLOCK));
+            for ((common, in_common), first) in blocks.zip((task * ROWS_A_TASK..).step_by(BLOCK)) {
+                let rows = first..first + in_common.len();
+                let mut largest = [Largest::default(); BLOCK];
+                let largest = &mut largest[..rows.len()];
+                let of_rows = largest.iter_mut().zip(rows.clone());
+                of_rows.for_each(|(largest, row)| *largest = Largest::of(of_row(row)));
+                *common = most_common(largest);
+                for ((at, seed), largest) in in_common.iter_mut().enumerate().zip(largest) {
+                    if largest.lanes == *common && largest.are_all {
+                        *seed = largest.seed;
+                        continue;
+                    }
+                    *seed = seed_in_all(*common, of_row(first + at));
+                    for (lane, weight) in of_row(first + at) {
+                        if *common >> lane & 1 == 0 || weight != *seed {
+                            others.push([at as u8, lane], weight)?;
+                        }
+                    }
+                }
+                others.ends.push(others.places.len() as u32);
+            }
+            Ok(others)
         };
+        let tasks = common.par_chunks_mut(ROWS_A_TASK / BLOCK);
+        let tasks = tasks.zip(in_common.par_chunks_mut(ROWS_A_TASK)).enumerate();
+        let others = Others::concat(tasks.map(of_task).collect::<Result<_>>()?)?;
         let signed = |(label, weight): (usize, T)| T::from_f64(random_sign(label)) * weight;
         let probe = if plan.probe.is_some() {
             tabulate(b.rows(), |i| b.row(i).map(signed).sum(), cancel)?
         } else {
             Vec::new()
         };
-        let of_task = |task: usize| {
-            cancel.check()?;
-            let rows = task * ROWS_A_TASK..b.rows().min((task + 1) * ROWS_A_TASK);
-            let (mut places, mut weights, mut ends) = (Vec::new(), Vec::new(), Vec::new());
-            for i in rows.clone() {
-                for (label, weight) in b.row(i) {
-                    if let Some(lane) = lane_of.get(label).copied().flatten() {
-                        push(&mut places, [(i % BLOCK) as u8, lane])?;
-                        push(&mut weights, weight)?;
-                    }
-                }
-                if (i + 1) % BLOCK == 0 || i + 1 == rows.end {
-                    ends.push(places.len() as u32);
-                }
-            }
-            Ok((places, weights, ends))
-        };
-        let tasks = (0..b.rows().div_ceil(ROWS_A_TASK)).into_par_iter();
-        let parts = tasks.map(of_task).collect::<Result<Vec<_>>>()?;
-        let count = parts.iter().map(|(places, ..)| places.len()).sum();
-        let (mut places, mut weights) = (with_room(count)?, with_room(count)?);
-        let mut offsets = with_room(b.rows().div_ceil(BLOCK) + 1)?;
-        offsets.push(0);
-        for (of_places, of_weights, ends) in parts {
-            let before = places.len() as u32;
-            offsets.extend(ends.iter().map(|end| before + end));
-            places.extend(of_places);
-            weights.extend(of_weights);
-        }
         let all = b.weights.par_iter().with_min_len(ROWS_A_TASK);
         let largest = all.map(|weight| weight.to_f64()).reduce(|| 0.0, f64::max);
         Ok(Self {
             plan,
-            background,
+            common,
+            in_common,
+            others,
             probe,
-            places,
-            weights,
-            offsets,
             least: T::from_f64(T::NEGLIGIBLE * largest),
         })
     }
@@ -97,23 +106,145 @@ impl<T: Real> Seeds<T> {
     /// For each block of rows, bit g where lanes of group g have seeds.
     pub(super) fn groups(&self, cancel: &Cancel) -> Result<Vec<u8>> {
         let width = self.plan.width;
-        let probed = self.plan.probe.map_or(0, |lane| 1 << (lane / width));
-        let background = self.background.par_iter().with_min_len(ROWS_A_TASK);
-        let full = background.any(|&weight| weight > T::default());
-        let everywhere = probed | u8::from(full) << (BACKGROUND_LANE / width);
+        // what is nearly everywhere counts as everywhere
+        let background = self.plan.lanes.contains(&(0, BACKGROUND_LANE));
+        let everywhere = background.then_some(BACKGROUND_LANE);
+        let everywhere = everywhere.into_iter().chain(self.plan.probe);
+        let everywhere = everywhere.fold(0, |lanes, lane| lanes | 1 << lane);
         let of_block = |block: usize| {
-            let lanes = self.of_block(block).map(|(_, lane, _)| lane);
-            lanes.fold(everywhere, |bits, lane| bits | 1 << (lane / width))
+            let common = everywhere | self.common[block];
+            let lanes = self
+                .others(block)
+                .fold(common, |lanes, (_, lane, _)| lanes | 1 << lane);
+            ones(lanes).fold(0, |groups, lane| groups | 1 << (lane / width))
         };
-        tabulate(self.offsets.len() - 1, of_block, cancel)
+        tabulate(self.common.len(), of_block, cancel)
     }
 
-    /// Row within the block, lane and weight of each seed of `block`, but for the background's and the probe's.
+    /// Puts those of `group` times `scale`, and those of the probe as they are, to the `values` of some rows, the first of which
+    /// is `first`, that of a block.
+    pub(super) fn put<const WIDTH: usize>(
+        &self,
+        group: usize,
+        first: usize,
+        values: &mut [Lanes<T, WIDTH>],
+        scale: T,
+    ) {
+        let lane_of = |lane: usize| (lane / WIDTH == group).then_some(lane % WIDTH);
+        for (block, values) in (first / BLOCK..).zip(values.chunks_mut(BLOCK)) {
+            for lane in ones(self.common[block]).filter_map(lane_of) {
+                let values = values.iter_mut().zip(&self.in_common[block * BLOCK..]);
+                values.for_each(|(value, &seed)| value[lane] = scale * seed);
+            }
+            for (row, lane, weight) in self.others(block) {
+                if let Some(lane) = lane_of(lane) {
+                    values[row][lane] = scale * weight;
+                }
+            }
+        }
+        if let Some(lane) = self.plan.probe.and_then(lane_of) {
+            let values = values.iter_mut().zip(&self.probe[first..]);
+            values.for_each(|(value, &seed)| value[lane] = seed);
+        }
+    }
+
+    /// Row within the block, lane and weight of each seed of `block` that is not in common lanes, but for the probe's.
     #[inline(always)]
-    pub(super) fn of_block(&self, block: usize) -> impl Iterator<Item = (usize, usize, T)> {
-        let own = self.offsets[block] as usize..self.offsets[block + 1] as usize;
+    pub(super) fn others(&self, block: usize) -> impl Iterator<Item = (usize, usize, T)> {
+        self.others.of_block(block)
+    }
+}
+
+impl<T: Real> Others<T> {
+    /// None yet, and room for so many of so many blocks.
+    fn with_room(seeds: usize, blocks: usize) -> Result<Self> {
+        Ok(Self {
+            places: with_room(seeds)?,
+            weights: with_room(seeds)?,
+            ends: with_room(blocks)?,
+        })
+    }
+
+    fn push(&mut self, place: [u8; 2], weight: T) -> Result<()> {
+        push(&mut self.places, place)?;
+        push(&mut self.weights, weight)
+    }
+
+    fn concat(parts: Vec<Self>) -> Result<Self> {
+        let sum = |len: fn(&Self) -> usize| parts.iter().map(len).sum();
+        let mut all = Self::with_room(sum(|part| part.places.len()), sum(|part| part.ends.len()))?;
+        for part in parts {
+            let before = all.places.len() as u32;
+            all.ends.extend(part.ends.iter().map(|end| before + end));
+            all.places.extend(part.places);
+            all.weights.extend(part.weights);
+        }
+        Ok(all)
+    }
+
+    #[inline(always)]
+    fn of_block(&self, block: usize) -> impl Iterator<Item = (usize, usize, T)> {
+        let start = if block == 0 { 0 } else { self.ends[block - 1] };
+        let own = start as usize..self.ends[block] as usize;
         let places = self.places[own.clone()].iter().zip(&self.weights[own]);
         places.map(|(&[row, lane], &weight)| (row.into(), lane.into(), weight))
+    }
+}
+
+/// The largest seed of a row.
+#[derive(Debug, Clone, Copy, Default)]
+struct Largest<T> {
+    seed: T,
+    /// The lanes that have it, a bit each.
+    lanes: u64,
+    /// Whether no other lane has a seed.
+    are_all: bool,
+}
+
+impl<T: Real> Largest<T> {
+    fn of(seeds: impl Iterator<Item = (u8, T)>) -> Self {
+        let (mut seed, mut lanes, mut all) = (T::default(), 0_u64, 0_u64);
+        for (lane, weight) in seeds {
+            if weight > seed {
+                (seed, lanes) = (weight, 0);
+            }
+            lanes |= u64::from(weight == seed) << lane;
+            all |= 1 << lane;
+        }
+        Self {
+            seed,
+            lanes,
+            are_all: lanes == all,
+        }
+    }
+}
+
+/// The most common lanes of some rows, of as common ones the first.
+fn most_common<T>(rows: &[Largest<T>]) -> u64 {
+    let (mut best, mut most) = (0, 0);
+    for (at, row) in rows.iter().enumerate() {
+        if most == 0 || row.lanes != best {
+            let same = rows[at..].iter().filter(|other| other.lanes == row.lanes);
+            let count = same.count();
+            if count > most {
+                (best, most) = (row.lanes, count);
+            }
+        }
+    }
+    best
+}
+
+/// The seed that a row of these `seeds` has in all of the `common` lanes; zero where there is no such.
+fn seed_in_all<T: Real>(common: u64, seeds: impl Iterator<Item = (u8, T)>) -> T {
+    let mut seeds = seeds.filter(|(lane, _)| common >> lane & 1 == 1);
+    let Some((_, first)) = seeds.next() else {
+        return T::default();
+    };
+    let others = seeds.filter(|(_, weight)| *weight == first).count() as u32;
+    if 1 + others == common.count_ones() {
+        first
+    } else {
+        T::default()
     }
 }
 
@@ -122,4 +253,84 @@ fn random_sign(label: usize) -> f64 {
     // the multiplier of Knuth's multiplicative hash
     let hash = (label as u32).wrapping_add(1).wrapping_mul(2_654_435_769);
     if hash & 0x8000 == 0 { 1.0 } else { -1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::Planner;
+    use super::super::schedule::Schedule;
+    use super::*;
+    use crate::graph::PointGraph;
+    use proptest::prelude::*;
+
+    fn largest(seeds: &[(u8, f32)]) -> Largest<f32> {
+        Largest::of(seeds.iter().copied())
+    }
+
+    #[test]
+    fn lanes_with_the_largest_seed_are_common_where_most_rows_have_it_there() {
+        let of_background = largest(&[(0, 0.5)]);
+        let of_two = largest(&[(0, 0.125), (3, 0.5), (9, 0.5)]);
+        assert_eq!((of_background.lanes, of_background.are_all), (1, true));
+        assert_eq!((of_two.lanes, of_two.are_all), (1 << 3 | 1 << 9, false));
+        let rows = [of_background, of_two, of_two, of_background, of_two];
+        assert_eq!(most_common(&rows), of_two.lanes);
+        assert_eq!(most_common(&rows[..2]), of_background.lanes);
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_common_and_what_is_not_are_all_seeds(
+            rows in proptest::collection::vec(
+                proptest::collection::btree_map(0_u32..20, 1_u8..3, 0..4),
+                1..70,
+            ),
+        ) {
+            let ends = rows.iter().scan(0, |end, row| {
+                *end += row.len();
+                Some(*end)
+            });
+            let b = PixelLabels {
+                offsets: [0].into_iter().chain(ends).collect(),
+                labels: rows.iter().flat_map(|row| row.keys().copied()).collect(),
+                weights: rows.iter().flat_map(|row| row.values().map(|&w| f32::from(w))).collect(),
+                mass: vec![0.0; rows.len()],
+            };
+            let n = rows.len() as u32;
+            let a = PointGraph::from_csr((0..=rows.len()).collect(), (0..n).collect(), vec![0.5; rows.len()]);
+            let (a, never) = (a.unwrap(), Cancel::never());
+            let schedule = Schedule::new(&a, never).unwrap();
+            let planner = Planner { schedule: &schedule, width: 8, probe: false, steps: 1 };
+            let labels: Vec<u32> = (0..20).collect();
+            let plan = planner.plan((&a, &b), &labels, never).unwrap().remove(0);
+            let seeds = Seeds::new(&b, plan, never).unwrap();
+            let mut expected = vec![vec![0.0; 8 * seeds.plan.groups]; rows.len()];
+            for &(label, lane) in &seeds.plan.lanes {
+                for (expected, row) in expected.iter_mut().zip(&rows) {
+                    expected[lane] = row.get(&label).map_or(0.0, |&weight| f32::from(weight));
+                }
+            }
+            let mut put = vec![vec![0.0; 8 * seeds.plan.groups]; rows.len()];
+            for group in 0..seeds.plan.groups {
+                let mut values = vec![bytemuck::Zeroable::zeroed(); rows.len()];
+                seeds.put::<8>(group, 0, &mut values, 0.5);
+                for (put, values) in put.iter_mut().zip(&values) {
+                    put[8 * group..][..8].copy_from_slice(&values[..]);
+                }
+            }
+            let half = expected.iter().map(|row| row.iter().map(|weight| 0.5 * weight).collect());
+            prop_assert_eq!(put, half.collect::<Vec<Vec<f32>>>());
+            // as a step adds them
+            let mut added = vec![vec![0.0; 8 * seeds.plan.groups]; rows.len()];
+            for (row, added) in added.iter_mut().enumerate() {
+                for lane in ones(seeds.common[row / BLOCK]) {
+                    added[lane] += seeds.in_common[row];
+                }
+                for (_, lane, weight) in seeds.others(row / BLOCK).filter(|other| other.0 == row % BLOCK) {
+                    added[lane] += weight;
+                }
+            }
+            prop_assert_eq!(added, expected);
+        }
+    }
 }

@@ -6,7 +6,7 @@
 )]
 
 use super::lanes::{Lane, Lanes, Vector};
-use super::plan::{BACKGROUND_LANE, MOST_GROUPS};
+use super::plan::MOST_GROUPS;
 use super::schedule::{Activity, BLOCK, Schedule};
 use super::seeds::Seeds;
 use super::values::{SharedValues, Values};
@@ -84,14 +84,16 @@ unsafe fn sweep<T: Lane<WIDTH>, const WIDTH: usize>(
     let begins = values[1].begins();
     let mut first = blocks.start;
     while first < blocks.end {
-        // blocks of the same groups take the step as one
-        let active = activity.active(first);
-        let differs = |block: &usize| activity.active(*block) != active;
+        // blocks of the same groups and common lanes take the step as one
+        let (active, common) = (activity.active(first), seeds.common[first]);
+        let differs =
+            |&block: &usize| activity.active(block) != active || seeds.common[block] != common;
         let end = (first + 1..blocks.end).find(differs).unwrap_or(blocks.end);
+        let rows = rows_of(first..end);
         // SAFETY: as the caller promises
-        unsafe { step_active(a, seeds, step, active, values, &rows_of(first..end)) };
+        unsafe { step_active(a, seeds, step, (active, common), values, &rows) };
         for block in first..end {
-            for (row, lane, weight) in seeds.of_block(block) {
+            for (row, lane, weight) in seeds.others(block) {
                 let (row, begin) = (block * BLOCK + row, begins[lane / WIDTH].cast::<T>());
                 // SAFETY: as the caller promises; a seed lies in one of the rows, and in a lane of the values
                 unsafe { *begin.add(row * WIDTH + lane % WIDTH) += step.seeds * weight };
@@ -121,7 +123,8 @@ fn in_use<T: Real, const WIDTH: usize>(rows: &[Lanes<T, WIDTH>]) -> bool {
     sums != [T::default(); WIDTH]
 }
 
-/// Computes the groups of `rows` whose bits are set in `active`, three at a time.
+/// Computes the groups of `rows` whose bits are set in `active`, three at a time. The lanes whose bits are set in `common` are
+/// those of the rows.
 ///
 /// # Safety
 /// As of [`sweep`].
@@ -129,7 +132,7 @@ unsafe fn step_active<T: Lane<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,
-    active: u8,
+    (active, common): (u8, u64),
     values: [&SharedValues<T, WIDTH>; 2],
     rows: &Range<usize>,
 ) {
@@ -139,10 +142,12 @@ unsafe fn step_active<T: Lane<WIDTH>, const WIDTH: usize>(
         unsafe {
             match (groups.next(), groups.next()) {
                 (Some(second), Some(third)) => {
-                    step_groups(a, seeds, step, [first, second, third], values, rows);
+                    step_groups(a, seeds, step, common, [first, second, third], values, rows);
                 }
-                (Some(second), None) => step_groups(a, seeds, step, [first, second], values, rows),
-                _ => step_groups(a, seeds, step, [first], values, rows),
+                (Some(second), None) => {
+                    step_groups(a, seeds, step, common, [first, second], values, rows);
+                }
+                _ => step_groups(a, seeds, step, common, [first], values, rows),
             }
         }
     }
@@ -157,29 +162,35 @@ unsafe fn step_groups<T: Lane<WIDTH>, const WIDTH: usize, const GROUPS: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     step: Step<T>,
+    common: u64,
     groups: [usize; GROUPS],
     [z, next]: [&SharedValues<T, WIDTH>; 2],
     rows: &Range<usize>,
 ) {
     let values = groups.map(|group| (z.begin(group).cast_const(), next.begin(group)));
-    let mut background = Lanes::zeroed();
-    if groups[0] == BACKGROUND_LANE / WIDTH {
-        background[BACKGROUND_LANE] = step.seeds;
-    }
+    let common = groups.map(|group| {
+        let mut times = Lanes::zeroed();
+        for lane in 0..WIDTH {
+            if common >> (group * WIDTH + lane) & 1 == 1 {
+                times[lane] = step.seeds;
+            }
+        }
+        times
+    });
     match_target! {
         // SAFETY: as the caller promises
         "x86_64+avx2+fma" => unsafe {
-            step_rows::<T, WIDTH, T::Register, GROUPS>(a, seeds, step, values, &background, rows);
+            step_rows::<T, WIDTH, T::Register, GROUPS>(a, seeds, step, values, &common, rows);
         },
         // SAFETY: the same
         _ => unsafe {
-            step_rows::<T, WIDTH, Lanes<T, WIDTH>, GROUPS>(a, seeds, step, values, &background, rows);
+            step_rows::<T, WIDTH, Lanes<T, WIDTH>, GROUPS>(a, seeds, step, values, &common, rows);
         },
     }
 }
 
-/// The same with vectors of one kind. `values` says where z and next of each group begin, and the lane of `background` where
-/// the first group has it by how much its seeds are multiplied.
+/// The same with vectors of one kind. `values` says where z and next of each group begin, and `common` by how much
+/// in each lane the seed is multiplied that a row has in the common ones.
 ///
 /// # Safety
 /// As of [`sweep`].
@@ -189,7 +200,7 @@ unsafe fn step_rows<T, const WIDTH: usize, V, const GROUPS: usize>(
     seeds: &Seeds<T>,
     step: Step<T>,
     values: [(*const Lanes<T, WIDTH>, *mut Lanes<T, WIDTH>); GROUPS],
-    background: &Lanes<T, WIDTH>,
+    common: &[Lanes<T, WIDTH>; GROUPS],
     rows: &Range<usize>,
 ) where
     T: Real,
@@ -197,7 +208,7 @@ unsafe fn step_rows<T, const WIDTH: usize, V, const GROUPS: usize>(
 {
     let uniform = a.degree() == Some(PAPER_DEGREE);
     let (all_columns, all_weights) = a.slices(0..a.len());
-    for (i, &seed) in rows.clone().zip(&seeds.background[rows.clone()]) {
+    for (i, &seed) in rows.clone().zip(&seeds.in_common[rows.clone()]) {
         let (sums, own_weight): ([V; GROUPS], T) = if uniform {
             // a number of edges known beforehand leaves no loop over them
             let start = i * PAPER_DEGREE;
@@ -225,10 +236,7 @@ unsafe fn step_rows<T, const WIDTH: usize, V, const GROUPS: usize>(
             // first what does not wait for the sum
             let mut value = V::zero().plus_product(stay, V::load(own));
             value = value.plus_product(V::splat(step.back), V::load(row));
-            if group == 0 {
-                // added to all lanes at once, since a single lane would have to wait for the row to reach memory
-                value = value.plus_product(V::splat(seed), V::load(background));
-            }
+            value = value.plus_product(V::splat(seed), V::load(&common[group]));
             value = value.plus_product(V::splat(step.along), sums[group]);
             value.or_zero(V::splat(seeds.least)).store(row);
         }
