@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;
 
-/// Most groups of a pass: one bit each says which of them are in use.
+/// Most groups of a pass: one bit each says which of them are in use, and one of 64 bits which of their lanes have a seed.
 pub(super) const MOST_GROUPS: usize = 8;
 /// Points from which on a pass has a single group: each takes 64 bytes a point.
 const MANY_POINTS: usize = 1 << 20;
@@ -57,8 +57,9 @@ pub(super) struct Planner<'a> {
 impl Planner<'_> {
     /// The passes that `labels` take over the graph `a` from their seeds in `b`. Labels without a seed need no lane.
     ///
-    /// The first group, which the background keeps busy everywhere, takes the labels with the most seeds; the others follow in
-    /// the order of where they lie, so that the labels of a group are neighbours and the group is zero over most of the cloud.
+    /// The first group, which the background keeps busy everywhere, takes the labels with the most seeds, or where lanes are
+    /// shared those that come farthest; the others follow in the order of where they lie, so that the labels of a group are
+    /// neighbours and the group is zero over most of the cloud.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
@@ -188,7 +189,10 @@ fn count_seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> (Vec<u64>, Vec<u6
 /// Lanes for `labels`, each in the first that is free in all blocks to which it may `come`.
 fn share(labels: &[u32], come: Vec<Blocks>) -> Vec<Shared> {
     let mut lanes: Vec<Shared> = Vec::new();
-    for (&label, come) in labels.iter().zip(come) {
+    // those that come far first, which leaves groups of lanes that are in use in few blocks
+    let mut labels: Vec<_> = labels.iter().zip(come).collect();
+    labels.sort_by_key(|(_, come)| Reverse(come.len()));
+    for (&label, come) in labels {
         let free = lanes.iter().position(|lane| !lane.blocks.meet(&come));
         let lane = free.unwrap_or(lanes.len());
         if lane == lanes.len() {

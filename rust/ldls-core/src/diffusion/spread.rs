@@ -24,6 +24,10 @@ impl Blocks {
         words.for_each(|(word, other)| *word |= other);
     }
 
+    pub(super) fn len(&self) -> usize {
+        self.0.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
     /// True if some block is among both.
     pub(super) fn meet(&self, others: &Self) -> bool {
         let mut words = self.0.iter().zip(&others.0);
