@@ -86,14 +86,18 @@ impl<'a> Followed<'a> {
             if self.differ_at(point as usize, labels) || self.walk.len() > most {
                 break Some(at);
             }
-            let mut flows_from = self.a.row(point as usize).filter(|edge| edge.1 > least);
-            if flows_from.any(|(column, _)| self.known[column] == Known::Unequal) {
-                break Some(at);
-            }
+            let mut is_unequal = false;
             for (column, weight) in self.a.row(point as usize) {
-                if weight > least && self.known[column] == Known::Nothing {
-                    self.meet(column as u32, at)?;
+                if weight > least {
+                    match self.known[column] {
+                        Known::Nothing => self.meet(column as u32, at)?,
+                        Known::Unequal => is_unequal = true,
+                        Known::Met | Known::Equal => {}
+                    }
                 }
+            }
+            if is_unequal {
+                break Some(at);
             }
             at += 1;
         };

@@ -18,7 +18,6 @@ use crate::masks::PixelLabels;
 use crate::memory::{collect, filled};
 use crate::{Cancel, Result};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 /// What the first series leaves out, as a share of the largest value: a hundredth of what that of single precision does.
 const FIRST_TOLERANCE: f64 = 1e-9;
@@ -54,12 +53,14 @@ pub(super) fn decide(
         let series = alike.zip(iterations);
         let series = series.and_then(|(alike, products)| alike.within(tolerance, products));
         let series = series.as_ref();
-        let mut points: Vec<u32> = ties.values().flatten().copied().collect();
-        points.sort_unstable();
+        let points: Vec<u32> = ties.values().flatten().copied().collect();
         let leaders = leaders(a, &points, &candidates, series, iterations, &exact, cancel)?;
-        let leaders: BTreeMap<u32, (u32, f64)> = points.into_iter().zip(leaders).collect();
+        let mut leaders = leaders.into_iter();
+        // all of them are asked about in this order
         let mut is_open = |point: &u32| {
-            let (label, lead) = leaders[point];
+            let Some((label, lead)) = leaders.next() else {
+                return false;
+            };
             // labels that differ in no bit are equal: what the first series leaves out is smaller where they differ less
             let is_open = lead > 0.0 && lead < share * error(*point);
             if !is_open {
