@@ -323,19 +323,23 @@ mod tests {
 
     #[test]
     fn a_series_that_grows_without_end_on_a_ring_of_one_way_is_given_up() {
-        let n = 9;
-        // what a point passes on, more goes one way than the other; few have pixel edges
-        let columns = (0..n).flat_map(|i| [(i + 1) % n, (i + n - 1) % n]);
-        let a = PointGraph::from_csr(
-            (0..=n as usize).map(|i| 2 * i).collect(),
-            columns.collect(),
-            [1.0_f32, 0.958].repeat(n as usize),
-        );
+        // of the edges of a point, which all weigh the same, more lead one way than the other; few points have pixel edges
+        let (n, forward, back) = (9, 25, 24);
+        let edges = (0..n).flat_map(|i| {
+            let others = std::iter::repeat_n((i + 1) % n, forward);
+            others.chain(std::iter::repeat_n((i + n - 1) % n, back))
+        });
+        let neighbors = Neighbors {
+            k: forward + back,
+            indices: edges.collect(),
+        };
+        let points = vec![[0.0; 3]; n as usize];
+        let a = PointGraph::from_neighbors(&points, &neighbors, 1.0, Cancel::never());
         let b = PixelLabels {
             offsets: vec![0, 1, 2, 2, 2, 2, 3, 3, 3, 3],
             labels: vec![0; 3],
-            weights: vec![0.024, 0.018, 0.004],
-            mass: vec![0.024, 0.018, 0.002, 0.0, 0.0, 0.004, 0.0, 0.0, 0.002],
+            weights: vec![0.6, 0.45, 0.1],
+            mass: vec![0.6, 0.45, 0.05, 0.0, 0.0, 0.1, 0.0, 0.0, 0.05],
         };
         let (mut a, mut b) = (a.unwrap(), b);
         a.normalize_rows(&mut b, Cancel::never()).unwrap();

@@ -47,7 +47,7 @@ pub(super) struct Planner<'a> {
     pub(super) schedule: &'a Schedule,
     /// Lanes of a group.
     pub(super) width: usize,
-    /// Whether the first has the probe: all labels with random signs, of which only the last term of the series is summed. It
+    /// Whether the first has the probe: all labels with random factors, of which only the last term of the series is summed. It
     /// shows how large the terms left out may be.
     pub(super) probe: bool,
     /// Most steps of each.

@@ -85,7 +85,7 @@ impl<T: Real> Seeds<T> {
         let tasks = common.par_chunks_mut(ROWS_A_TASK / BLOCK);
         let tasks = tasks.zip(in_common.par_chunks_mut(ROWS_A_TASK)).enumerate();
         let others = Others::concat(tasks.map(of_task).collect::<Result<_>>()?)?;
-        let signed = |(label, weight): (usize, T)| T::from_f64(random_sign(label)) * weight;
+        let signed = |(label, weight): (usize, T)| T::from_f64(random_factor(label)) * weight;
         let probe = if plan.probe.is_some() {
             tabulate(b.rows(), |i| b.row(i).map(signed).sum(), cancel)?
         } else {
@@ -248,11 +248,16 @@ fn seed_in_all<T: Real>(common: u64, seeds: impl Iterator<Item = (u8, T)>) -> T 
     }
 }
 
-/// Plus or minus one, without a pattern.
-fn random_sign(label: usize) -> f64 {
+/// A number of magnitude 0.5 to 1.5, without a pattern, so that masks which show the same do not cancel each other.
+fn random_factor(label: usize) -> f64 {
     // the multiplier of Knuth's multiplicative hash
     let hash = (label as u32).wrapping_add(1).wrapping_mul(2_654_435_769);
-    if hash & 0x8000 == 0 { 1.0 } else { -1.0 }
+    let magnitude = 0.5 + f64::from(hash >> 16) / f64::from(1 << 16);
+    if hash & 0x8000 == 0 {
+        magnitude
+    } else {
+        -magnitude
+    }
 }
 
 #[cfg(test)]

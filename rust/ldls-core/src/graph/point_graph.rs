@@ -11,6 +11,9 @@ use std::sync::Arc;
 /// Rows handled by one task of the thread pool.
 const ROWS_A_TASK: usize = 1024;
 
+/// Share of a weight up to which that of the way back may differ by the rounding of single precision.
+const SAME_WEIGHT: f64 = 1e-5;
+
 /// Weighted edges between points in compressed sparse rows: row i lists the points that label flows
 /// from to point i.
 #[derive(Debug, Clone, PartialEq)]
@@ -264,6 +267,28 @@ impl<T: Real> PointGraph<T> {
             Layout::Uniform { degree, .. } => Some(degree),
             Layout::Varied { .. } => None,
         }
+    }
+
+    /// True if this may be the graph of a cloud, normalised or not: no weight is negative or more than that of the point's edge
+    /// to itself, and two points with edges to each other are as near to each other.
+    pub(crate) fn may_be_of_cloud(&self) -> bool {
+        if self.degree().is_some() {
+            return true;
+        }
+        let weight = |from: usize, to: usize| {
+            let edges = self.row(from).filter(|(column, _)| *column == to);
+            edges.map(|(_, weight)| weight.to_f64()).sum::<f64>()
+        };
+        let row_may_be = |i: usize| {
+            let own = weight(i, i);
+            self.row(i).all(|(j, there)| {
+                let (there, back) = (there.to_f64() / own, weight(j, i) / weight(j, j));
+                let differ = (there - back).abs() > SAME_WEIGHT * there;
+                (0.0..=1.0 + SAME_WEIGHT).contains(&there) && !(back > 0.0 && differ)
+            })
+        };
+        let rows = (0..self.len()).into_par_iter().with_min_len(ROWS_A_TASK);
+        rows.map(row_may_be).all(|may_be| may_be)
     }
 
     /// Weight of the first edge of row `i`, which in the graph of a cloud is to the point itself: by how much normalising
