@@ -18,6 +18,7 @@ from rich.table import Table
 import ldls
 from benches.frames import Frame, frame, suite_frames, tiled_frame
 from benches.measuring import medians
+from ldls.evaluation import TrackingScores
 
 MISSING = "not measured: run pip install '.[bench]'"
 
@@ -379,6 +380,30 @@ def drives(measured: Frame, options: argparse.Namespace) -> Table:
     return table
 
 
+def long_drives(_measured: Frame, options: argparse.Namespace) -> Table:
+    """Numbers of objects over drives of which masks are left out."""
+    from benches import drives as simulated
+
+    table = _table(
+        f"{options.drives} drives of {simulated.LONG} sweeps of a VLP-16, twice each",
+        ["sweeps together", "S_assoc", "LSTQ", "switches a hundred", "switches of standing cars"],
+        f"masks in random order, {simulated.MISSED:.0%} of them left out and all of {simulated.GAP} sweeps in a row; "
+        "means of the drives, but switches of all object frames and of each drive",
+    )
+    found: dict[int, list[tuple[TrackingScores, int]]] = {1: [], 5: []}
+    for drive, of_cars in simulated.long_drives("vlp-16", options.drives):
+        for (size, scores), seed in itertools.product(found.items(), range(2)):
+            scores.append(simulated.long_scores(drive, of_cars, size, seed, options.threads))
+    for size, scores in found.items():
+        tracks, of_cars = zip(*scores, strict=True)
+        association = statistics.mean(of_drive.s_assoc or 0.0 for of_drive in tracks)
+        quality = statistics.mean(of_drive.lstq or 0.0 for of_drive in tracks)
+        switches = 100 * sum(t.id_switches for t in tracks) / sum(t.object_frames for t in tracks)
+        each = " ".join(str(count) for count in of_cars)
+        table.add_row(f"{size}", f"{association:.3f}", f"{quality:.3f}", f"{switches:.2f}", each)
+    return table
+
+
 SECTIONS = {
     "scipy": against_scipy,
     "suite": suite,
@@ -393,6 +418,7 @@ SECTIONS = {
     "cameras": cameras,
     "ground": ground,
     "drives": drives,
+    "long-drives": long_drives,
 }
 
 

@@ -15,28 +15,57 @@ import ldls
 from ldls.datasets import open_source
 from ldls.evaluation import ClassSet, Evaluation, Pair, TrackingScores, evaluate
 from ldls.labeling import Labeling
-from ldls.simulation import Drive, drive_folder, suite_folder, write_drive
+from ldls.simulation import Drive, drive_folder, drive_frame, suite_folder, write_drive
 from ldls.simulation.production import SUITE_SEGMENTER, SUITE_SENSORS
 
 FIRST_SEED = 4000
+FIRST_LONG_SEED = 3300
 KINDS = ("street", "campus")
 CLASSES = ("Car", "Pedestrian")
 
 OFF_M, OFF_DEG, OFF_S = 0.05, 0.3, 0.05
 """What wrong poses are off by."""
 
+LONG, MISSED, GAP = 200, 0.2, 10
+"""Sweeps of a long drive, share of its masks that are left out, and sweeps in a row without any."""
+
 Window = Sequence[tuple[ldls.Sweep, Labeling]]
 
 
-def drives(lidar: str, count: int, n_frames: int = 20) -> Iterator[list[tuple[ldls.Sweep, Labeling]]]:
-    """The sweeps of `count` drives and their truth, from files, which are made first where they are not there yet."""
-    folder = suite_folder().parent / "drives"
+def drives(lidar: str, count: int) -> Iterator[Window]:
+    """The sweeps of `count` drives and their truth."""
     for seed in track(range(FIRST_SEED, FIRST_SEED + count), description=f"drives of {lidar}"):
-        errors = {"segmenter": SUITE_SEGMENTER, "sensors": SUITE_SENSORS}
-        drive = Drive(n_frames=n_frames, seed=seed, kind=KINDS[seed % 2], lidar=lidar, **errors)  # type: ignore[arg-type]
-        for _ in write_drive(folder / lidar, drive, processes=2):
-            pass
-        yield list(_sweeps(drive_folder(folder / lidar, drive)))
+        yield list(_sweeps(_written(_drive(lidar, seed, n_frames=20))))
+
+
+def long_drives(lidar: str, count: int) -> Iterator[tuple[Window, Window]]:
+    """The sweeps of `count` long drives and their truth, and the same with cars that stand as the only objects."""
+    seeds = range(FIRST_LONG_SEED, FIRST_LONG_SEED + count)
+    for seed in track(seeds, description=f"long drives of {lidar}"):
+        drive = _drive(lidar, seed, n_frames=LONG)
+        whole = list(_sweeps(_written(drive)))
+        numbered = enumerate(drive_frame(drive, 0).objects, start=1)
+        stands = [number for number, thing in numbered if not any(thing.velocity_m_s)]
+        yield whole, [(sweep, _only_cars(truth, stands)) for sweep, truth in whole]
+
+
+def _drive(lidar: str, seed: int, n_frames: int) -> Drive:
+    kind = KINDS[seed % 2]
+    return Drive(n_frames=n_frames, seed=seed, kind=kind, lidar=lidar, segmenter=SUITE_SEGMENTER, sensors=SUITE_SENSORS)
+
+
+def _written(drive: Drive) -> Path:
+    """The folder of a drive, which is made first where it is not there yet."""
+    folder = suite_folder().parent / "drives" / drive.lidar
+    for _ in write_drive(folder, drive, processes=2):
+        pass
+    return drive_folder(folder, drive)
+
+
+def _only_cars(truth: Labeling, numbers: Sequence[int]) -> Labeling:
+    """The truth of the cars of these numbers; all else is background."""
+    kept = np.isin(truth.instances, numbers) & (truth.classes == truth.names.index("Car"))
+    return replace(truth, classes=np.where(kept, truth.classes, 0), instances=np.where(kept, truth.instances, 0))
 
 
 def _sweeps(folder: Path) -> Iterator[tuple[ldls.Sweep, Labeling]]:
@@ -49,6 +78,20 @@ def _sweeps(folder: Path) -> Iterator[tuple[ldls.Sweep, Labeling]]:
             raise RuntimeError(f"{folder}: frame {frame.name} has no pose, stamp or truth")
         in_view = np.isin(np.arange(len(frame.points)), seen)
         yield ldls.Sweep(frame.points, [view], frame.pose, frame.stamp), frame.truth.restricted(in_view)
+
+
+def with_masks_left_out(drive: Window, seed: int) -> Window:
+    """The drive with its masks in random order, `MISSED` of them left out, and all of `GAP` sweeps in a row."""
+    generator = np.random.default_rng(seed)
+    blind = int(generator.integers(0, len(drive) - GAP))
+    left = []
+    for at, (sweep, truth) in enumerate(drive):
+        (view,) = sweep.views
+        missed = 1.0 if blind <= at < blind + GAP else MISSED
+        kept = np.flatnonzero(generator.random(len(view.masks)) >= missed)
+        masks = view.masks.select(generator.permutation(kept))
+        left.append((replace(sweep, views=[replace(view, masks=masks)]), truth))
+    return left
 
 
 def with_wrong_poses(drive: Window, seed: int) -> Window:
@@ -68,26 +111,44 @@ def with_wrong_poses(drive: Window, seed: int) -> Window:
 
 def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evaluation, TrackingScores, float]:
     """Scores of windows of so many sweeps before tracking, those of tracks over all drives, and seconds a sweep."""
-    params, seconds, n_sweeps, pairs = ldls.Params(threads=threads), 0.0, 0, []
-    classes = ClassSet.kitti(CLASSES)
+    seconds, n_sweeps, pairs = 0.0, 0, []
     tracking = TrackingScores(CLASSES)
     for number, drive in enumerate(of_drives):
-        tracker, own = ldls.Tracker(), []
-        for first in range(0, len(drive), size):
-            window = drive[first : first + size]
-            sweeps = [sweep for sweep, _ in window]
-            start = time.perf_counter()
-            results = ldls.segment_sweeps(sweeps, params=params)
-            seconds += time.perf_counter() - start
-            tracked = tracker.track(sweeps, results)
-            for at, (result, numbered, (_, truth)) in enumerate(zip(results, tracked, window, strict=True)):
-                pairs.append(Pair(f"{number} {first + at}", _labeling(result), truth))
-                own.append(Pair(f"{number} {first + at}", _labeling(numbered), truth))
-        n_sweeps += len(drive)
-        of_drive = evaluate(own, classes=classes, track=True).tracking
-        assert of_drive is not None
-        tracking.merge(of_drive)
-    return evaluate(pairs, classes=classes), tracking, seconds / n_sweeps
+        results, tracked, of_drive = _tracked(drive, size, threads)
+        seconds, n_sweeps = seconds + of_drive, n_sweeps + len(drive)
+        for at, (result, (_, truth)) in enumerate(zip(results, drive, strict=True)):
+            pairs.append(Pair(f"{number} {at}", _labeling(result), truth))
+        tracking.merge(_tracking(tracked, drive))
+    return evaluate(pairs, classes=ClassSet.kitti(CLASSES)), tracking, seconds / n_sweeps
+
+
+def long_scores(drive: Window, of_cars: Window, size: int, seed: int, threads: int) -> tuple[TrackingScores, int]:
+    """Scores of the tracks of a long drive of which masks are left out, and id switches of the cars that stand."""
+    _, tracked, _ = _tracked(with_masks_left_out(drive, seed), size, threads)
+    return _tracking(tracked, drive), _tracking(tracked, of_cars).id_switches
+
+
+def _tracked(drive: Window, size: int, threads: int) -> tuple[list[ldls.Segmentation], list[ldls.Segmentation], float]:
+    """What windows of so many sweeps are labelled, the same with tracks, and the seconds that labelling took."""
+    params, tracker, seconds = ldls.Params(threads=threads), ldls.Tracker(), 0.0
+    results: list[ldls.Segmentation] = []
+    tracked: list[ldls.Segmentation] = []
+    for first in range(0, len(drive), size):
+        sweeps = [sweep for sweep, _ in drive[first : first + size]]
+        start = time.perf_counter()
+        window = ldls.segment_sweeps(sweeps, params=params)
+        seconds += time.perf_counter() - start
+        results += window
+        tracked += tracker.track(sweeps, window)
+    return results, tracked, seconds
+
+
+def _tracking(tracked: Sequence[ldls.Segmentation], drive: Window) -> TrackingScores:
+    rows = enumerate(zip(tracked, drive, strict=True))
+    pairs = [Pair(f"{at}", _labeling(result), truth) for at, (result, (_, truth)) in rows]
+    tracking = evaluate(pairs, classes=ClassSet.kitti(CLASSES), track=True).tracking
+    assert tracking is not None
+    return tracking
 
 
 def _labeling(result: ldls.Segmentation) -> Labeling:

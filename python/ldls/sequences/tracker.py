@@ -3,8 +3,8 @@
 Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds,
 moved to the moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
 Tracks of one object are joined. Within sweeps that were segmented together an object keeps its label, and so its
-number; a label that begins later goes on with a track that has none then. Sweeps whose images overlook an object have
-its label too (propagation.py).
+number; a label that begins later goes on with a track that no sweep has another label of beside it. Sweeps whose
+images overlook an object have its label too (propagation.py).
 """
 
 from __future__ import annotations
@@ -86,14 +86,7 @@ class Tracker:
         self._stamp = sweeps[-1].stamp
         instances = {instance.label: instance for instance in results[0].instances}
         seen = [_sightings(sweep, result) for sweep, result in zip(sweeps, results, strict=True)]
-        last = {label: at for at, labels in enumerate(seen) for label in labels}
-        by_label: dict[int, Track] = {}
-        for at, own in enumerate(seen):
-            taken = {track for label, track in by_label.items() if last[label] >= at}
-            new = {label: sighting for label, sighting in own.items() if label not in by_label}
-            by_label |= self._matched(instances, new, sweeps[at].stamp, taken)
-            for label, sighting in own.items():
-                by_label[label].advance(instances[label], sighting)
+        by_label = self._advanced(instances, [sweep.stamp for sweep in sweeps], seen)
         numbers = {label: track.number for label, track in by_label.items()}
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
         self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
@@ -120,19 +113,51 @@ class Tracker:
                 added.append(track.as_instance(replace(track.instance, label=of_number[number], sources=())))
         return added
 
-    def _matched(
-        self, instances: Mapping[int, Instance], sightings: Mapping[int, Sighting], stamp: float, taken: Set[Track]
+    def _advanced(
+        self, instances: Mapping[int, Instance], stamps: Sequence[float], seen: Sequence[Mapping[int, Sighting]]
     ) -> dict[int, Track]:
-        """The track of each label that is first seen at a moment: a known one that is not `taken`, or a new one."""
+        """The track of each label of sweeps that were segmented together, which it has gone through."""
+        sweeps_of = {label: {at for at, own in enumerate(seen) if label in own} for own in seen for label in own}
+        by_label: dict[int, Track] = {}
+        for at, (stamp, own) in enumerate(zip(stamps, seen, strict=True)):
+            new = {label: sighting for label, sighting in own.items() if label not in by_label}
+            going_on = {track for label, track in by_label.items() if max(sweeps_of[label]) >= at}
+            taken = {
+                label: {track for other, track in by_label.items() if sweeps_of[other] & sweeps_of[label]}
+                for label in new
+            }
+            by_label |= self._matched(instances, new, stamp, taken, going_on)
+            for label, sighting in own.items():
+                by_label[label].advance(instances[label], sighting)
+        return by_label
+
+    def _matched(
+        self,
+        instances: Mapping[int, Instance],
+        sightings: Mapping[int, Sighting],
+        stamp: float,
+        taken: Mapping[int, Set[Track]],
+        going_on: Set[Track],
+    ) -> dict[int, Track]:
+        """The track of each label that is first seen at a moment: a known one, or a new one.
+
+        Args:
+            instances: That of each label.
+            sightings: What is seen of each label.
+            stamp: The moment, in seconds.
+            taken: The tracks of other labels that some sweep has beside each label.
+            going_on: Tracks that have a label at the moment or later; they are not joined with others.
+        """
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
         labels = list(sightings)
         costs = np.full((len(labels), len(self._tracks)), np.inf)
         for j, track in enumerate(self._tracks):
             like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
-            if track in taken or not like:
+            able = [i for i in like if track not in taken[labels[i]]]
+            if not able:
                 continue
             there = track.at(stamp)
-            for i in like:
+            for i in able:
                 costs[i, j] = self._apart(sightings[labels[i]].footprint, there)
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
         rows, columns = self._assign(np.minimum(costs, NEAR_M))
@@ -140,6 +165,7 @@ class Tracker:
         lengths = [sightings[label].footprint.length for label in labels]
         of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
         same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
+        same &= np.array([track not in going_on for track in self._tracks], bool)
         known = {labels[i]: track for i, track in self._joined(pairs, same).items()}
         return {label: known.get(label) or self._begin(instances[label]) for label in labels}
 
@@ -152,7 +178,7 @@ class Tracker:
 
         Args:
             pairs: The track of each label, both by their place in the order.
-            same: (labels, tracks) whether they are too near to be two objects.
+            same: (labels, tracks) whether they are too near to be two objects, and the track has no label now.
         """
         free = set(range(len(self._tracks))) - set(pairs.values())
         joined, ended = {}, set()
