@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 import ldls
-from benches.frames import Frame, frame, suite_frames, tiled_frame
+from benches.frames import Frame, frame, suite_frames, tiled_frame, under_boxes
 from benches.measuring import medians
 from ldls.evaluation import TrackingScores
 
@@ -192,6 +192,27 @@ def instances(measured: Frame, options: argparse.Namespace) -> Table:
         tiled = tiled_frame(measured.in_view(), 100_000, count)
         run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
         table.add_row(str(count), f"{medians(run, runs=min(options.runs, 5))['ldls'] * 1e3:.1f}")
+    return table
+
+
+def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
+    """Time under random boxes that overlap, against the same boxes with each pixel left to one."""
+    n, params = min(options.most, 1_000_000), ldls.Params.paper(threads=options.threads)
+    table = _table(
+        f"{n:,} points under 20 random boxes, the paper's method",
+        ["seed of the boxes", "they overlap, s", "they do not, s", "ratio"],
+        f"medians; {options.threads} threads",
+    )
+    tiled = tiled_frame(measured.in_view(), n, 1)
+    for seed in range(8):
+        boxes = under_boxes(tiled, seed)
+        sides: dict[str, Callable[[], object]] = {
+            name: lambda masks=masks: ldls.segment(tiled.points, masks, tiled.camera, params=params)  # type: ignore[misc]
+            for name, masks in (("over", boxes.masks), ("alone", boxes.masks.resolve_overlaps("area")))
+        }
+        found = medians(sides, runs=min(options.runs, 5))
+        ratio = f"{found['over'] / found['alone']:.2f} x"
+        table.add_row(str(seed), f"{found['over']:.3f}", f"{found['alone']:.3f}", ratio)
     return table
 
 
@@ -411,6 +432,7 @@ SECTIONS = {
     "neighbors": neighbors,
     "growth": growth,
     "instances": instances,
+    "overlaps": overlaps,
     "threads": thread_scaling,
     "batch": batch,
     "runs": whole_runs,

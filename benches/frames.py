@@ -96,6 +96,18 @@ def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Fra
     return Frame(f"{n:,} points tiled", cloud, ldls.InstanceMasks.from_array(masks), camera)
 
 
+def under_boxes(tiled: Frame, seed: int, instances: int = 20) -> Frame:
+    """The same points under so many boxes at random over what they fill, which overlap."""
+    height, width = tiled.masks.image_size
+    _, pixels = ldls.stages.project(tiled.points, tiled.camera, image_size=(height, width))
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    corners = np.sort(np.random.default_rng(seed).uniform(low, high, (instances, 2, 2)), axis=1).astype(int)
+    masks = np.zeros((instances, height, width), bool)
+    for mask, ((left, top), (right, bottom)) in zip(masks, corners, strict=True):
+        mask[top : bottom + 1, left : right + 1] = True
+    return Frame(f"{tiled.name} under boxes {seed}", tiled.points, ldls.InstanceMasks.from_array(masks), tiled.camera)
+
+
 def _simulated() -> Frame:
     return _of_one_image("simulated street (LDLS_TEST_DATA is not set)", sample_frame())
 

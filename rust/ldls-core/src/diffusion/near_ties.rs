@@ -90,7 +90,9 @@ fn settle_equal(
             let values = points.iter().map(|&point| best[point as usize].value);
             let least = NEGLIGIBLE * values.fold(1.0, f32::min);
             let equal = followed.equal_at(points, labels, least, cancel)?;
-            points.retain(|point| equal.binary_search(point).is_err());
+            // they are in the order of the points
+            let mut next = equal.iter().peekable();
+            points.retain(|point| next.next_if_eq(&point).is_none());
             Ok((labels[0], equal))
         };
         sets.iter_mut().map(settle).collect::<Result<Vec<_>>>()
