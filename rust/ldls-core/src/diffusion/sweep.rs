@@ -123,7 +123,7 @@ fn in_use<T: Real, const WIDTH: usize>(rows: &[Lanes<T, WIDTH>]) -> bool {
     sums != [T::default(); WIDTH]
 }
 
-/// Computes the groups of `rows` whose bits are set in `active`, four at a time. The lanes whose bits are set in `common` are
+/// Computes the groups of `rows` whose bits are set in `active`, three at a time. The lanes whose bits are set in `common` are
 /// those of the rows.
 ///
 /// # Safety
@@ -140,15 +140,11 @@ unsafe fn step_active<T: Lane<WIDTH>, const WIDTH: usize>(
     while let Some(first) = groups.next() {
         // SAFETY: as the caller promises; groups differ
         unsafe {
-            match (groups.next(), groups.next(), groups.next()) {
-                (Some(second), Some(third), Some(fourth)) => {
-                    let groups = [first, second, third, fourth];
-                    step_groups(a, seeds, step, common, groups, values, rows);
-                }
-                (Some(second), Some(third), None) => {
+            match (groups.next(), groups.next()) {
+                (Some(second), Some(third)) => {
                     step_groups(a, seeds, step, common, [first, second, third], values, rows);
                 }
-                (Some(second), None, _) => {
+                (Some(second), None) => {
                     step_groups(a, seeds, step, common, [first, second], values, rows);
                 }
                 _ => step_groups(a, seeds, step, common, [first], values, rows),
