@@ -19,7 +19,7 @@ from ldls.simulation import Drive, drive_folder, drive_frame, suite_folder, writ
 from ldls.simulation.production import SUITE_SEGMENTER, SUITE_SENSORS
 
 FIRST_SEED = 4000
-FIRST_LONG_SEED = 3300
+FIRST_LONG_SEED = 3400
 KINDS = ("street", "campus")
 CLASSES = ("Car", "Pedestrian")
 
@@ -64,7 +64,7 @@ def _written(drive: Drive) -> Path:
 
 def _only_cars(truth: Labeling, numbers: Sequence[int]) -> Labeling:
     """The truth of the cars of these numbers; all else is background."""
-    kept = np.isin(truth.instances, numbers) & (truth.classes == truth.names.index("Car"))
+    kept = np.isin(truth.instances, numbers) & (np.array(truth.names)[truth.classes] == "Car")
     return replace(truth, classes=np.where(kept, truth.classes, 0), instances=np.where(kept, truth.instances, 0))
 
 

@@ -8,7 +8,6 @@ import pytest
 import ldls
 from conftest import pinhole
 from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES
-from ldls.sequences.track import Footprint, Sighting, Track
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
 WIDE = pinhole(100.0, (320.0, 240.0), T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -167,27 +166,22 @@ def test_tracks_joined_within_a_window_have_one_number_in_all_of_it():
     assert together == [[0, 0, 0, 1, 1], [1] * 5]
 
 
-@pytest.mark.parametrize("beside", [False, True])
-def test_two_labels_are_one_object_unless_a_sweep_has_them_beside_each_other(beside):
-    """The mask of one image shows an end of a car, those before and after the other end."""
-    sweeps = [car_at(0, 0, LEFT), car_at(1, 0, RIGHT), car_at(2, 0, LEFT)]
-    before, between, after = ldls.segment_sweeps(sweeps, params=PARAMS)
-    if not beside:
-        between = replace(between, labels=np.where(between.labels == 1, 0, between.labels))
-    tracked = ldls.Tracker().track(sweeps, [before, between, after])
-    left, right, last = (
-        result.instance_ids[result.labels[row]] for result, row in zip(tracked, (0, 624, 0), strict=True)
-    )
-    assert [left, right, last] == [1, 2 if beside else 1, 1]
+def test_a_second_label_in_the_place_of_an_object_is_the_object():
+    """In the second of three sweeps the even parts of a car have another label than the odd ones."""
+    sweeps = [car_at(k, 0, (*LEFT, 2, *RIGHT)) for k in range(3)]
+    results = []
+    for k, result in enumerate(ldls.segment_sweeps(sweeps, params=PARAMS)):
+        labels = result.labels.reshape(-1, 125).copy()
+        labels[::2] = 1 + (k == 1)
+        second = replace(result.instances[0], label=2)
+        results.append(replace(result, labels=labels.ravel(), instances=(*result.instances, second)))
+    for result in ldls.Tracker().track(sweeps, results):
+        assert result.instance_ids[1:].tolist() == [1, 1]
 
 
-def test_what_stands_has_no_velocity_though_few_of_its_points_are_seen_in_the_last_sweeps():
-    whole = np.stack(np.meshgrid(np.linspace(0, 4, 5), np.linspace(0, 1.6, 4)), axis=-1).reshape(-1, 2)
-    track = Track(1, ldls.Instance(label=1, category=3, name="car", score=1.0, sources=()))
-    for k in range(12):
-        points = whole if k < 6 else whole[-1:] + 0.5
-        track.advance(track.instance, Sighting(0.1 * k, Footprint(points), shown=True))
-    assert track.velocity.tolist() == [0, 0]
+def test_a_second_label_beside_an_object_is_another():
+    sweeps = [sweep_at(0.1 * k, [((8, 0), True), ((8, 1.2), k == 1)]) for k in range(3)]
+    assert tracks_of(ldls.Tracker(), sweeps, together=3)[1] == [1, 2]
 
 
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():

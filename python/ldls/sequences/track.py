@@ -18,9 +18,6 @@ SLOWEST_M_S = 0.5
 """What is slower stands still."""
 FASTEST_M_S = 60.0
 """What is faster is not one object at all times."""
-WELL_SEEN = 0.5
-"""Share of the most points seen at a moment from which on a sighting tells where the middle is: that of a few points is
-anywhere on the object."""
 MOVES = 0.5
 """Share of the distance between the points of two moments that a motion may leave: the middle of what is visible of a
 standing object moves too, but its points stay where they are."""
@@ -117,12 +114,7 @@ class Track:
 
 
 def _velocity(sightings: Sequence[Sighting]) -> Floats:
-    """The slope of a line through the middles, if the first points, moved so, lie on the last; zeros otherwise.
-
-    Sightings of few points say nothing.
-    """
-    least = WELL_SEEN * max(len(each.footprint.points) for each in sightings)
-    sightings = [each for each in sightings if len(each.footprint.points) >= least]
+    """The slope of a line through the middles, if the first points, moved so, lie on the last; zeros otherwise."""
     stamps = np.array([each.stamp for each in sightings])
     since = stamps - stamps.mean()
     spread = float(since @ since)

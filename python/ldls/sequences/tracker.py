@@ -3,7 +3,7 @@
 Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds,
 moved to the moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
 Tracks of one object are joined. Within sweeps that were segmented together an object keeps its label, and so its
-number; a label that begins later goes on with a track that no sweep has another label of beside it. Sweeps whose
+number; a label that begins later goes on with a track that has none then, or in whose very place it is. Sweeps whose
 images overlook an object have its label too (propagation.py).
 """
 
@@ -117,16 +117,12 @@ class Tracker:
         self, instances: Mapping[int, Instance], stamps: Sequence[float], seen: Sequence[Mapping[int, Sighting]]
     ) -> dict[int, Track]:
         """The track of each label of sweeps that were segmented together, which it has gone through."""
-        sweeps_of = {label: {at for at, own in enumerate(seen) if label in own} for own in seen for label in own}
+        last = {label: at for at, own in enumerate(seen) for label in own}
         by_label: dict[int, Track] = {}
         for at, (stamp, own) in enumerate(zip(stamps, seen, strict=True)):
             new = {label: sighting for label, sighting in own.items() if label not in by_label}
-            going_on = {track for label, track in by_label.items() if max(sweeps_of[label]) >= at}
-            taken = {
-                label: {track for other, track in by_label.items() if sweeps_of[other] & sweeps_of[label]}
-                for label in new
-            }
-            by_label |= self._matched(instances, new, stamp, taken, going_on)
+            going_on = {track for label, track in by_label.items() if last[label] >= at}
+            by_label |= self._matched(instances, new, stamp, going_on)
             for label, sighting in own.items():
                 by_label[label].advance(instances[label], sighting)
         return by_label
@@ -136,7 +132,6 @@ class Tracker:
         instances: Mapping[int, Instance],
         sightings: Mapping[int, Sighting],
         stamp: float,
-        taken: Mapping[int, Set[Track]],
         going_on: Set[Track],
     ) -> dict[int, Track]:
         """The track of each label that is first seen at a moment: a known one, or a new one.
@@ -145,28 +140,28 @@ class Tracker:
             instances: That of each label.
             sightings: What is seen of each label.
             stamp: The moment, in seconds.
-            taken: The tracks of other labels that some sweep has beside each label.
-            going_on: Tracks that have a label at the moment or later; they are not joined with others.
+            going_on: Tracks that have a label at the moment or later. Another label goes on with one if it is in its
+                place, and they are joined with no other.
         """
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
         labels = list(sightings)
         costs = np.full((len(labels), len(self._tracks)), np.inf)
         for j, track in enumerate(self._tracks):
             like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
-            able = [i for i in like if track not in taken[labels[i]]]
-            if not able:
+            if not like:
                 continue
             there = track.at(stamp)
-            for i in able:
+            for i in like:
                 costs[i, j] = self._apart(sightings[labels[i]].footprint, there)
-        # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
-        rows, columns = self._assign(np.minimum(costs, NEAR_M))
-        pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
         lengths = [sightings[label].footprint.length for label in labels]
         of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
         same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
-        same &= np.array([track not in going_on for track in self._tracks], bool)
-        known = {labels[i]: track for i, track in self._joined(pairs, same).items()}
+        goes_on = np.array([track in going_on for track in self._tracks], bool)
+        costs[~same & goes_on] = np.inf
+        # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
+        rows, columns = self._assign(np.minimum(costs, NEAR_M))
+        pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
+        known = {labels[i]: track for i, track in self._joined(pairs, same & ~goes_on).items()}
         return {label: known.get(label) or self._begin(instances[label]) for label in labels}
 
     def _joined(self, pairs: Mapping[int, int], same: NDArray[np.bool_]) -> dict[int, Track]:
