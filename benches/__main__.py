@@ -16,9 +16,8 @@ from rich.console import Console
 from rich.table import Table
 
 import ldls
-from benches.frames import Frame, frame, suite_frames, tiled_frame, under_boxes
+from benches.frames import Frame, frame, overlapping_boxes, suite_frames, tiled_frame
 from benches.measuring import medians
-from ldls.evaluation import TrackingScores
 
 MISSING = "not measured: run pip install '.[bench]'"
 
@@ -205,10 +204,10 @@ def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
     )
     tiled = tiled_frame(measured.in_view(), n, 1)
     for seed in range(8):
-        boxes = under_boxes(tiled, seed)
+        boxes = overlapping_boxes(tiled, 20, seed)
         sides: dict[str, Callable[[], object]] = {
             name: lambda masks=masks: ldls.segment(tiled.points, masks, tiled.camera, params=params)  # type: ignore[misc]
-            for name, masks in (("over", boxes.masks), ("alone", boxes.masks.resolve_overlaps("area")))
+            for name, masks in (("over", boxes), ("alone", boxes.resolve_overlaps("area")))
         }
         found = medians(sides, runs=min(options.runs, 5))
         ratio = f"{found['over'] / found['alone']:.2f} x"
@@ -411,16 +410,15 @@ def long_drives(_measured: Frame, options: argparse.Namespace) -> Table:
         f"masks in random order, {simulated.MISSED:.0%} of them left out and all of {simulated.GAP} sweeps in a row; "
         "means of the drives, but switches of all object frames and of each drive",
     )
-    found: dict[int, list[tuple[TrackingScores, int]]] = {1: [], 5: []}
-    for drive, of_cars in simulated.long_drives("vlp-16", options.drives):
-        for (size, scores), seed in itertools.product(found.items(), range(2)):
-            scores.append(simulated.long_scores(drive, of_cars, size, seed, options.threads))
-    for size, scores in found.items():
-        tracks, of_cars = zip(*scores, strict=True)
+    of_lidar = list(simulated.long_drives("vlp-16", options.drives))
+    for size in (1, 5):
+        twice = itertools.product(of_lidar, range(2))
+        scores = [simulated.long_scores(*drive, size, seed, options.threads) for drive, seed in twice]
+        tracks, of_standing = zip(*scores, strict=True)
         association = statistics.mean(of_drive.s_assoc or 0.0 for of_drive in tracks)
         quality = statistics.mean(of_drive.lstq or 0.0 for of_drive in tracks)
         switches = 100 * sum(t.id_switches for t in tracks) / sum(t.object_frames for t in tracks)
-        each = " ".join(str(count) for count in of_cars)
+        each = " ".join(str(count) for count in of_standing)
         table.add_row(f"{size}", f"{association:.3f}", f"{quality:.3f}", f"{switches:.2f}", each)
     return table
 

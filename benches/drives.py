@@ -122,10 +122,10 @@ def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evalua
     return evaluate(pairs, classes=ClassSet.kitti(CLASSES)), tracking, seconds / n_sweeps
 
 
-def long_scores(drive: Window, of_cars: Window, size: int, seed: int, threads: int) -> tuple[TrackingScores, int]:
+def long_scores(drive: Window, standing: Window, size: int, seed: int, threads: int) -> tuple[TrackingScores, int]:
     """Scores of the tracks of a long drive of which masks are left out, and id switches of the cars that stand."""
     _, tracked, _ = _tracked(with_masks_left_out(drive, seed), size, threads)
-    return _tracking(tracked, drive), _tracking(tracked, of_cars).id_switches
+    return _tracking(tracked, drive), _tracking(tracked, standing).id_switches
 
 
 def _tracked(drive: Window, size: int, threads: int) -> tuple[list[ldls.Segmentation], list[ldls.Segmentation], float]:

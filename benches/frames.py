@@ -96,16 +96,15 @@ def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Fra
     return Frame(f"{n:,} points tiled", cloud, ldls.InstanceMasks.from_array(masks), camera)
 
 
-def under_boxes(tiled: Frame, seed: int, instances: int = 20) -> Frame:
-    """The same points under so many boxes at random over what they fill, which overlap."""
-    height, width = tiled.masks.image_size
-    _, pixels = ldls.stages.project(tiled.points, tiled.camera, image_size=(height, width))
+def overlapping_boxes(tiled: Frame, count: int, seed: int) -> ldls.InstanceMasks:
+    """Boxes at random over what the points of a frame fill."""
+    _, pixels = ldls.stages.project(tiled.points, tiled.camera, image_size=tiled.masks.image_size)
     low, high = pixels.min(axis=0), pixels.max(axis=0)
-    corners = np.sort(np.random.default_rng(seed).uniform(low, high, (instances, 2, 2)), axis=1).astype(int)
-    masks = np.zeros((instances, height, width), bool)
+    corners = np.sort(np.random.default_rng(seed).uniform(low, high, (count, 2, 2)), axis=1).astype(int)
+    masks = np.zeros((count, *tiled.masks.image_size), bool)
     for mask, ((left, top), (right, bottom)) in zip(masks, corners, strict=True):
         mask[top : bottom + 1, left : right + 1] = True
-    return Frame(f"{tiled.name} under boxes {seed}", tiled.points, ldls.InstanceMasks.from_array(masks), tiled.camera)
+    return ldls.InstanceMasks.from_array(masks)
 
 
 def _simulated() -> Frame:

@@ -66,7 +66,8 @@ class Tracker:
 
         An object that images overlook has points where it was, or went by its velocity, within 1.2 s of a sweep that
         shows it: if ten images did before, or three where the images of the sweep show nothing at all. Confidence there
-        is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances.
+        is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances. Two
+        instances in one place are one object, and have one number.
 
         Args:
             sweeps: The next sweeps of the drive, in the order of their stamps.
@@ -173,7 +174,7 @@ class Tracker:
 
         Args:
             pairs: The track of each label, both by their place in the order.
-            same: (labels, tracks) whether they are too near to be two objects, and the track has no label now.
+            same: (labels, tracks) whether they are too near to be two objects, and the track has no label now or later.
         """
         free = set(range(len(self._tracks))) - set(pairs.values())
         joined, ended = {}, set()

@@ -46,8 +46,8 @@ impl<'a> Followed<'a> {
         })
     }
 
-    /// Those of `points` at which `labels` are equal, as far as edges of more than the `least` weight show it without being
-    /// followed far.
+    /// Those of `points`, in their order, at which `labels` are equal, as far as edges of more than the `least` weight show it
+    /// without being followed far.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].

@@ -90,7 +90,6 @@ fn settle_equal(
             let values = points.iter().map(|&point| best[point as usize].value);
             let least = NEGLIGIBLE * values.fold(1.0, f32::min);
             let equal = followed.equal_at(points, labels, least, cancel)?;
-            // they are in the order of the points
             let mut next = equal.iter().peekable();
             points.retain(|point| next.next_if_eq(&point).is_none());
             Ok((labels[0], equal))

@@ -52,6 +52,7 @@ impl Series {
         };
         let long = Self::on([low, high], iterations, tolerance);
         let mut series: Vec<Self> = long.into_iter().collect();
+        // a matrix that was read is asked for its values, which nothing decides again
         let of_cloud = a.degree().is_some() && iterations.is_some();
         if of_cloud && low < USUAL_LOW && USUAL_LOW < high && !series.is_empty() {
             let short = Self::on([USUAL_LOW, high], iterations, tolerance);
