@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 import ldls
-from benches.frames import Frame, frame, overlapping_boxes, suite_frames, tiled_frame
+from benches.frames import Frame, frame, overlapping_boxes, street_frame, suite_frames, tiled_frame
 from benches.measuring import medians
 
 MISSING = "not measured: run pip install '.[bench]'"
@@ -198,20 +198,20 @@ def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
     """Time under random boxes that overlap, against the same boxes with each pixel left to one."""
     n, params = min(options.most, 1_000_000), ldls.Params.paper(threads=options.threads)
     table = _table(
-        f"{n:,} points under 20 random boxes, the paper's method",
-        ["seed of the boxes", "they overlap, s", "they do not, s", "ratio"],
+        "20 random boxes, the paper's method",
+        ["frame", "seed of the boxes", "they overlap, s", "they do not, s", "ratio"],
         f"medians; {options.threads} threads",
     )
-    tiled = tiled_frame(measured.in_view(), n, 1)
-    for seed in range(8):
-        boxes = overlapping_boxes(tiled, 20, seed)
-        sides: dict[str, Callable[[], object]] = {
-            name: lambda masks=masks: ldls.segment(tiled.points, masks, tiled.camera, params=params)  # type: ignore[misc]
-            for name, masks in (("over", boxes), ("alone", boxes.resolve_overlaps("area")))
-        }
-        found = medians(sides, runs=min(options.runs, 5))
-        ratio = f"{found['over'] / found['alone']:.2f} x"
-        table.add_row(str(seed), f"{found['over']:.3f}", f"{found['alone']:.3f}", ratio)
+    for each, seeds in ((tiled_frame(measured.in_view(), n, 0), range(8)), (street_frame(n), range(3))):
+        for seed in seeds:
+            boxes = overlapping_boxes(each, 20, seed)
+            sides: dict[str, Callable[[], object]] = {
+                name: lambda masks=masks: ldls.segment(each.points, masks, each.camera, params=params)  # type: ignore[misc]  # noqa: B023
+                for name, masks in (("over", boxes), ("alone", boxes.resolve_overlaps("area")))
+            }
+            found = medians(sides, runs=min(options.runs, 5))
+            ratio = f"{found['over'] / found['alone']:.2f} x"
+            table.add_row(each.name, str(seed), f"{found['over']:.3f}", f"{found['alone']:.3f}", ratio)
     return table
 
 

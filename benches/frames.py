@@ -96,12 +96,28 @@ def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Fra
     return Frame(f"{n:,} points tiled", cloud, ldls.InstanceMasks.from_array(masks), camera)
 
 
-def overlapping_boxes(tiled: Frame, count: int, seed: int) -> ldls.InstanceMasks:
+def street_frame(n: int) -> Frame:
+    """`n` points of one street, all in view of one camera: its ground and walls hang together, as tiles do not."""
+    rng = np.random.default_rng(0)
+    ahead, side = rng.uniform(4, 80, n), np.where(rng.random(n) < 0.5, -1, 1)
+    ground = np.column_stack([ahead, rng.uniform(-0.8, 0.8, n) * ahead, rng.normal(-1.7, 0.02, n)])
+    walls = np.column_stack([ahead, 10 * side + rng.normal(0, 0.05, n), rng.uniform(-1.7, 0.2 * ahead)])
+    cloud = np.where(rng.random((n, 1)) < 0.5, ground, walls).astype(np.float32)
+    camera = ldls.Camera(
+        projection=[[720, 0, 620], [0, 720, 187], [0, 0, 1]],
+        T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]],
+    )
+    rows, _ = ldls.stages.project(cloud, camera, image_size=(375, 1242))
+    masks = ldls.InstanceMasks.from_array(np.zeros((0, 375, 1242), bool))
+    return Frame(f"{len(rows):,} points of a street", np.ascontiguousarray(cloud[rows]), masks, camera)
+
+
+def overlapping_boxes(frame: Frame, count: int, seed: int) -> ldls.InstanceMasks:
     """Boxes at random over what the points of a frame fill."""
-    _, pixels = ldls.stages.project(tiled.points, tiled.camera, image_size=tiled.masks.image_size)
+    _, pixels = ldls.stages.project(frame.points, frame.camera, image_size=frame.masks.image_size)
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     corners = np.sort(np.random.default_rng(seed).uniform(low, high, (count, 2, 2)), axis=1).astype(int)
-    masks = np.zeros((count, *tiled.masks.image_size), bool)
+    masks = np.zeros((count, *frame.masks.image_size), bool)
     for mask, ((left, top), (right, bottom)) in zip(masks, corners, strict=True):
         mask[top : bottom + 1, left : right + 1] = True
     return ldls.InstanceMasks.from_array(masks)

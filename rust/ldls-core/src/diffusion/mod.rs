@@ -22,6 +22,7 @@ mod seeds;
 mod series;
 mod spread;
 mod sweep;
+mod twins;
 mod values;
 mod winners;
 
@@ -121,7 +122,7 @@ pub fn likelihoods(
 
 #[cfg(test)]
 mod tests {
-    use super::passes::TOLERANCE_F32;
+    use super::passes::TOLERANCE;
     use super::series::Series;
     use super::*;
     use crate::Real;
@@ -343,7 +344,7 @@ mod tests {
         };
         let (mut a, mut b) = (a.unwrap(), b);
         a.normalize_rows(&mut b, Cancel::never()).unwrap();
-        assert!(!Series::of_graph(&a, None, TOLERANCE_F32).is_empty());
+        assert!(!Series::of_graph(&a, None, TOLERANCE).is_empty());
         let [plain, endless] = [Some(MANY), None].map(|iterations| {
             let found = likelihoods(&a, &b, 1, iterations, Cancel::never());
             found.unwrap().0

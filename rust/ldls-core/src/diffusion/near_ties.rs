@@ -2,27 +2,37 @@
 //!
 //! Labels of many of them are equal, as where several masks show all that anything flows from: their seeds are the same
 //! there. The others are decided in double precision: by the part of the graph that flows to them, with a series that
-//! leaves out little, and where this does not tell them apart, with one that leaves out next to nothing. Where what flows
-//! to them is much of the graph, all of it is diffused again.
+//! leaves out next to nothing. Where there are few, one that leaves out little comes first, and tells most of them apart. Where
+//! what flows to them is much of the graph, all of it is diffused again.
 
 use super::equal_labels::Followed;
 use super::errors::Errors;
 use super::lanes::WIDTH_F64;
 use super::pass::Pass;
-use super::passes::{TOLERANCE_F64, for_each_pass};
+use super::plan::Planner;
 use super::reach::Reach;
+use super::schedule::{ROWS_A_TASK, Schedule};
+use super::seeds::Seeds;
 use super::series::Series;
-use super::winners::{Best, NearTies, Winners, candidates, refine};
+use super::twins::without_twins;
+use super::winners::{Best, NearTies, Winners, candidates};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::{collect, filled};
+use crate::memory::filled;
 use crate::{Cancel, Result};
 use rayon::prelude::*;
 
-/// What the first series leaves out, as a share of the largest value: a hundredth of what that of single precision does.
+/// What the last series leaves out, as a share of the largest value.
+const TOLERANCE: f64 = 1e-13;
+/// What the first one does: a hundredth of what that of single precision does.
 const FIRST_TOLERANCE: f64 = 1e-9;
-/// By how much a label must be ahead for the first series to be believed, as a share of the error in single precision.
+/// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision.
 const LEAD: f64 = 0.05;
+/// Points up to which there is a first one. More are those of masks that lie over one another, whose labels differ so little
+/// that it would leave them open.
+const FEW: usize = 1 << 10;
+/// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
+const EQUAL: f64 = 1e-13;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
 const NEGLIGIBLE: f32 = 1e-18;
 
@@ -42,29 +52,28 @@ pub(super) fn decide(
     let best = &mut winners.best;
     let contested = ties.values().map(Vec::len).sum();
     settle_equal((a, b), best, &mut ties, cancel)?;
+    let open: usize = ties.values().map(Vec::len).sum();
+    let first = (open <= FEW).then_some((trusted.last(), FIRST_TOLERANCE, LEAD));
     // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
-    let first = (trusted.last(), FIRST_TOLERANCE, LEAD);
-    let last = (trusted.first(), TOLERANCE_F64, 0.0);
-    for (alike, tolerance, share) in [first, last] {
+    let last = (trusted.first(), TOLERANCE, 0.0);
+    for (alike, tolerance, share) in first.into_iter().chain([last]) {
         if ties.is_empty() {
             break;
         }
         let candidates = candidates(&ties);
-        let series = alike.zip(iterations);
-        let series = series.and_then(|(alike, products)| alike.within(tolerance, products));
-        let series = series.as_ref();
+        let series = alike.and_then(|alike| alike.within(tolerance, iterations));
+        let products = (series.as_ref(), iterations);
         let points: Vec<u32> = ties.values().flatten().copied().collect();
-        let leaders = leaders(a, &points, &candidates, series, iterations, &exact, cancel)?;
+        let leaders = leaders(a, &points, &candidates, products, &exact, cancel)?;
         let mut leaders = leaders.into_iter();
         // all of them are asked about in this order
         let mut is_open = |point: &u32| {
-            let Some((label, lead)) = leaders.next() else {
+            let Some(leader) = leaders.next() else {
                 return false;
             };
-            // labels that differ in no bit are equal: what the first series leaves out is smaller where they differ less
-            let is_open = lead > 0.0 && lead < share * error(*point);
+            let is_open = leader.lead() < share * error(*point);
             if !is_open {
-                best[*point as usize].label = label;
+                best[*point as usize].label = leader.label;
             }
             is_open
         };
@@ -106,33 +115,84 @@ fn settle_equal(
     Ok(())
 }
 
-/// Which of `candidates`, ascending, wins at each of `points` and by how much, in double precision, with `series` in the place
-/// of the products where there is one. Where nothing more can be said the lead is endless.
+/// The leader of `candidates` at each of `points`, in double precision, with `series` in the place of the products where there is
+/// one.
 fn leaders(
     a: &PointGraph,
     points: &[u32],
     candidates: &[u32],
-    series: Option<&Series>,
-    iterations: Option<usize>,
+    (series, iterations): (Option<&Series>, Option<usize>),
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
     cancel: &Cancel,
-) -> Result<Vec<(u32, f64)>> {
-    if let Some(products) = iterations {
-        let steps = series.map_or(products.saturating_sub(1), Series::degree);
-        if let Some(reach) = Reach::of(a, points, steps, cancel)? {
-            let (a, b) = exact(Some(&reach.points))?;
-            return reach.leaders((&a, &b), candidates, (series, products), cancel);
+) -> Result<Vec<Leader>> {
+    let steps = Pass::<f64, WIDTH_F64>::steps(series, iterations);
+    // endlessly many products reach everything, and ask for a residual of all points
+    let reach = match iterations {
+        Some(_) => Reach::of(a, points, steps, cancel)?,
+        None => None,
+    };
+    let (a, mut b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
+    if reach.is_some() && candidates.len() > WIDTH_F64 {
+        b = without_twins((&a, &b), candidates, cancel)?;
+    }
+    let schedule = match &reach {
+        Some(reach) => reach.schedule(&a, cancel)?,
+        None => Schedule::new(&a, cancel)?,
+    };
+    let planner = Planner {
+        schedule: &schedule,
+        width: WIDTH_F64,
+        probe: false,
+        steps,
+    };
+    let mut leaders = filled(Leader::default(), points.len(), cancel)?;
+    for plan in planner.plan((&a, &b), candidates, cancel)? {
+        let seeds = Seeds::new(&b, plan, cancel)?;
+        let pass: Pass<f64, WIDTH_F64> =
+            Pass::run(&a, &schedule, &seeds, series, iterations, cancel)?;
+        cancel.check()?;
+        let offer = |(at, leader): (usize, &mut Leader)| {
+            // points are the first of those that they reach
+            let row = reach.as_ref().map_or(points[at] as usize, |_| at);
+            pass.at(row)
+                .for_each(|(label, value)| leader.offer(label, value));
+        };
+        let leaders = leaders.par_iter_mut().with_min_len(ROWS_A_TASK);
+        leaders.enumerate().for_each(offer);
+    }
+    Ok(leaders)
+}
+
+/// The label that wins at a point in double precision.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Leader {
+    /// Of [`EQUAL`] ones the lowest.
+    label: u32,
+    value: f64,
+    /// The largest value that is not equal.
+    next: f64,
+}
+
+impl Leader {
+    fn offer(&mut self, label: u32, value: f64) {
+        if value > self.value * (1.0 + EQUAL) {
+            *self = Self {
+                label,
+                value,
+                next: self.value,
+            };
+        } else if value >= self.value * (1.0 - EQUAL) {
+            self.label = label.min(self.label);
+            self.value = value.max(self.value);
+        } else {
+            self.next = value.max(self.next);
         }
     }
-    let (a, b) = exact(None)?;
-    let mut refined = filled((0, f64::NEG_INFINITY), points.len(), cancel)?;
-    let choose = |pass: &Pass<f64, WIDTH_F64>| {
-        refine(points, &mut refined, pass);
-        Ok(())
-    };
-    for_each_pass(&a, &b, candidates, iterations, cancel, choose)?;
-    let leaders = refined.iter().map(|&(label, _)| (label, f64::INFINITY));
-    collect(leaders, cancel)
+
+    /// How far it is ahead.
+    fn lead(&self) -> f64 {
+        self.value - self.next
+    }
 }
 
 #[cfg(test)]
@@ -180,6 +240,69 @@ mod tests {
         let (a, b) = chain(weights, seeds);
         let found = diffuse(&a, &b, 8, Some(20), exact, Cancel::never()).unwrap();
         (found.labels, asked.get())
+    }
+
+    #[test]
+    fn of_values_that_rounding_tells_apart_the_lowest_label_leads_in_any_order() {
+        let leader = |values: &[(u32, f64)]| {
+            let mut leader = Leader::default();
+            let offers = values.iter();
+            offers.for_each(|&(label, value)| leader.offer(label, value));
+            (leader.label, leader.lead())
+        };
+        let below = 0.5 * (1.0 - f64::EPSILON);
+        for values in [
+            [(3, 0.5), (0, below), (7, 0.25)],
+            [(7, 0.25), (3, 0.5), (0, below)],
+            [(0, below), (7, 0.25), (3, 0.5)],
+        ] {
+            assert_eq!(leader(&values), (0, 0.25), "ahead of those that differ");
+        }
+        let below = 0.5 * (1.0 - 1e-12);
+        let (label, lead) = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
+        assert_eq!(
+            (label, lead),
+            (1, 0.5 - below),
+            "two are equal, the third is near"
+        );
+    }
+
+    #[test]
+    fn leaders_are_those_of_the_products_and_of_equal_labels_the_lowest() {
+        fn system<T: crate::Real>() -> System<T> {
+            let seeds: [&[(u32, f64)]; 5] = [
+                &[(3, 0.01)],
+                &[(1, 0.5)],
+                &[(1, 0.5), (2, 0.5)],
+                &[(2, 0.5)],
+                &[(0, 0.75)],
+            ];
+            let none: &[(u32, f64)] = &[];
+            let seeds: Vec<_> = seeds.into_iter().chain([none; 595]).collect();
+            chain(&[0.25; 600], &seeds)
+        }
+        let asked = std::cell::Cell::new(0);
+        let exact = |among: Option<&[u32]>| {
+            let (a, b) = system::<f64>();
+            let points = among.unwrap_or_default();
+            asked.set(points.len());
+            Ok((a.among(points), b.among(points)))
+        };
+        let labels_after = |products: usize, points: &[u32]| {
+            let (a, _) = system::<f32>();
+            let run = (None, Some(products));
+            let found = leaders(&a, points, &[0, 1, 2, 3], run, exact, Cancel::never());
+            let found = found.unwrap().into_iter();
+            found.map(|leader| leader.label).collect::<Vec<u32>>()
+        };
+        // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5
+        assert_eq!(labels_after(3, &[1, 2, 3, 5]), [1, 2, 2, 0]);
+        assert_eq!(
+            asked.get(),
+            8,
+            "points within as many edges as there are products"
+        );
+        assert_eq!(labels_after(1, &[2]), [1]);
     }
 
     #[test]

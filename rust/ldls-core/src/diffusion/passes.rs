@@ -1,7 +1,7 @@
-//! The passes over the graph that some labels take, by the shortest series that can be trusted.
+//! The passes over the graph that some labels take in single precision, by the shortest series that can be trusted.
 
 use super::convergence::Convergence;
-use super::lanes::{Lane, WIDTH_F32};
+use super::lanes::WIDTH_F32;
 use super::pass::Pass;
 use super::plan::Planner;
 use super::schedule::Schedule;
@@ -11,43 +11,35 @@ use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::{Cancel, Result};
 
-/// Share of the largest likelihood that a series in single precision may leave out.
-pub(super) const TOLERANCE_F32: f64 = 1e-7;
-/// The same in double precision.
-pub(super) const TOLERANCE_F64: f64 = 1e-13;
+/// Share of the largest likelihood that a series may leave out.
+pub(super) const TOLERANCE: f64 = 1e-7;
 
 /// Calls `done` with each pass over the graph that `labels` take; how far they came, and the series that could be trusted, the
 /// longest first.
-pub(super) fn for_each_pass<T: Lane<WIDTH>, const WIDTH: usize>(
-    a: &PointGraph<T>,
-    b: &PixelLabels<T>,
+pub(super) fn for_each_pass(
+    a: &PointGraph,
+    b: &PixelLabels,
     labels: &[u32],
     iterations: Option<usize>,
     cancel: &Cancel,
-    mut done: impl FnMut(&Pass<T, WIDTH>) -> Result<()>,
+    mut done: impl FnMut(&Pass<f32, WIDTH_F32>) -> Result<()>,
 ) -> Result<(Convergence, Vec<Series>)> {
-    // in single precision, a probe shows how large the terms left out may be
-    let probed = WIDTH == WIDTH_F32;
-    let tolerance = if probed { TOLERANCE_F32 } else { TOLERANCE_F64 };
     // parts of each are for one thread alone
     let (mut series, schedule) = rayon::join(
-        || Series::of_graph(a, iterations, tolerance),
+        || Series::of_graph(a, iterations, TOLERANCE),
         || Schedule::new(a, cancel),
     );
-    if !probed {
-        // the short one goes unwatched
-        series.truncate(1);
-    }
     let schedule = schedule?;
     let largest = b.largest_shares();
     let mut convergence = Convergence::default();
-    let (mut labels, mut probe) = (labels.to_vec(), probed);
+    // a probe shows how large the terms left out may be
+    let (mut labels, mut probe) = (labels.to_vec(), true);
     'planned: loop {
         let planner = Planner {
             schedule: &schedule,
-            width: WIDTH,
+            width: WIDTH_F32,
             probe,
-            steps: Pass::<T, WIDTH>::steps(series.last(), iterations),
+            steps: Pass::<f32, WIDTH_F32>::steps(series.last(), iterations),
         };
         for plan in planner.plan((a, b), &labels, cancel)? {
             let seeds = Seeds::new(b, plan, cancel)?;

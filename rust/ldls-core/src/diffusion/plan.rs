@@ -19,6 +19,9 @@ pub(super) const MOST_GROUPS: usize = 8;
 const MANY_POINTS: usize = 1 << 20;
 /// Blocks from which on lanes are shared: in a frame of one camera most labels come to most of it.
 const SHARED_FROM: usize = (1 << 15) / BLOCK;
+/// Share of the blocks, for each group that there would be, in which labels that are to share lanes may go on: to follow them
+/// through a block takes as long as two groups take for a step there, and not all groups are spared.
+const AWAKE_A_GROUP: f64 = 1.0 / 16.0;
 /// Lane of the background in the pass that has it.
 pub(super) const BACKGROUND_LANE: usize = 0;
 /// Label of a lane where it has none.
@@ -75,13 +78,19 @@ impl Planner<'_> {
         let in_first = if own > 0 { self.width - own } else { 0 };
         let seeded = in_order(b, labels, in_first);
         let blocks = self.schedule.blocks();
-        let are_shared = blocks >= SHARED_FROM && own + seeded.len() > self.width;
+        let groups = (own + seeded.len()).div_ceil(self.width);
+        let come = if blocks >= SHARED_FROM && groups > 1 {
+            let followed = (self.steps, AWAKE_A_GROUP * groups as f64);
+            spread((a, b), self.schedule, &seeded, followed, cancel)?
+        } else {
+            None
+        };
+        let are_shared = come.is_some();
         let mut lanes = vec![Shared::default(); own];
         if background {
             lanes[BACKGROUND_LANE].labels.push((0, None));
         }
-        if are_shared {
-            let come = spread((a, b), self.schedule, &seeded, self.steps, cancel)?;
+        if let Some(come) = come {
             lanes.extend(share(&seeded, come));
         } else {
             lanes.extend(seeded.into_iter().map(|label| Shared {

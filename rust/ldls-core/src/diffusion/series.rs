@@ -64,11 +64,11 @@ impl Series {
         series
     }
 
-    /// The series on the same interval that leaves out at most the share `tolerance`, if it takes fewer sweeps than the
-    /// `products`.
-    pub(super) fn within(&self, tolerance: f64, products: usize) -> Option<Self> {
+    /// The series on the same interval that leaves out at most the share `tolerance`, if it takes fewer sweeps than as many
+    /// `iterations`.
+    pub(super) fn within(&self, tolerance: f64, iterations: Option<usize>) -> Option<Self> {
         let ends = [self.middle - self.half_width, self.middle + self.half_width];
-        Self::on(ends, Some(products), tolerance)
+        Self::on(ends, iterations, tolerance)
     }
 
     /// The series on the interval from `low` to `high`, if there is one and it takes fewer sweeps.
@@ -280,9 +280,9 @@ mod tests {
             panic!("two series")
         };
         assert!(short.most_left_out > long.most_left_out);
-        let within = short.within(1e-9, 200).unwrap();
+        let within = short.within(1e-9, Some(200)).unwrap();
         assert!(short.degree() < within.degree() && within.degree() < 72);
-        assert!(short.within(1e-9, 10).is_none());
+        assert!(short.within(1e-9, Some(10)).is_none());
     }
 
     #[test]

@@ -13,6 +13,9 @@ use std::ops::Range;
 /// Labels that are followed together: one bit each.
 const TOGETHER: usize = u32::BITS as usize;
 
+/// Steps in which labels fill what is small, and stop there.
+const STEPS_TO_SETTLE: usize = 4;
+
 /// Some of the blocks of rows of a graph.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Blocks(Vec<u64>);
@@ -40,7 +43,8 @@ impl Blocks {
     }
 }
 
-/// The blocks with a row that each of `labels` reaches in at most so many steps over `a` from its seeds in `b`.
+/// The blocks with a row that each of `labels` reaches in at most so many steps over `a` from its seeds in `b`. None where it
+/// would cost too much to say: where after [`STEPS_TO_SETTLE`] some go on in more than the share `most_awake` of all blocks.
 ///
 /// # Errors
 /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
@@ -48,21 +52,26 @@ pub(super) fn spread<T: Real>(
     (a, b): (&PointGraph<T>, &PixelLabels<T>),
     schedule: &Schedule,
     labels: &[u32],
-    steps: usize,
+    (steps, most_awake): (usize, f64),
     cancel: &Cancel,
-) -> Result<Vec<Blocks>> {
+) -> Result<Option<Vec<Blocks>>> {
     let of_labels = |labels: &[u32]| {
         let mut spread = Spread::new((a, b), schedule, labels, cancel)?;
-        for _ in 0..steps {
+        for step in 0..steps {
             cancel.check()?;
+            let awake = spread.awake.len() as f64 / schedule.blocks() as f64;
+            if step == STEPS_TO_SETTLE && awake > most_awake {
+                return Ok(None);
+            }
             if !spread.advance()? {
                 break;
             }
         }
-        spread.blocks(labels.len(), cancel)
+        spread.blocks(labels.len(), cancel).map(Some)
     };
     let shares = labels.par_chunks(TOGETHER).map(of_labels);
-    Ok(shares.collect::<Result<Vec<_>>>()?.concat())
+    let shares = shares.collect::<Result<Option<Vec<_>>>>()?;
+    Ok(shares.map(|shares| shares.concat()))
 }
 
 /// How far some labels have come, a bit for each of them.
@@ -184,15 +193,19 @@ mod tests {
     use crate::test_support::one_seed_each;
 
     /// The blocks that labels come to in a ring of points with edges from the one before each, where each label has one seed.
-    fn blocks(points: u32, seeds: &[usize], steps: usize) -> Vec<Vec<usize>> {
+    fn followed(points: u32, seeds: &[usize], steps: (usize, f64)) -> Option<Vec<Vec<usize>>> {
         let columns = (0..points).map(|i| (i + points - 1) % points).collect();
         let offsets = (0..=points as usize).collect();
         let a = PointGraph::<f32>::from_csr(offsets, columns, vec![0.5; points as usize]).unwrap();
         let b = one_seed_each(points as usize, seeds);
         let labels: Vec<u32> = (0..seeds.len() as u32).collect();
         let schedule = Schedule::new(&a, Cancel::never()).unwrap();
-        let come = spread((&a, &b), &schedule, &labels, steps, Cancel::never()).unwrap();
-        come.iter().map(|blocks| blocks.iter().collect()).collect()
+        let come = spread((&a, &b), &schedule, &labels, steps, Cancel::never()).unwrap()?;
+        Some(come.iter().map(|blocks| blocks.iter().collect()).collect())
+    }
+
+    fn blocks(points: u32, seeds: &[usize], steps: usize) -> Vec<Vec<usize>> {
+        followed(points, seeds, (steps, 1.0)).unwrap()
     }
 
     #[test]
@@ -205,6 +218,14 @@ mod tests {
             blocks(100, &[last, 0], BLOCK + 1),
             [vec![0, 1, 2], vec![0, 1]]
         );
+    }
+
+    #[test]
+    fn labels_that_go_on_in_too_many_blocks_are_not_followed() {
+        // each of two goes on in two blocks of seven at most
+        assert!(followed(100, &[0, 50], (9, 0.6)).is_some());
+        assert!(followed(100, &[0, 50], (9, 0.2)).is_none());
+        assert!(followed(100, &[0, 50], (STEPS_TO_SETTLE, 0.2)).is_some());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The label that wins at each point, and the points at which single precision cannot decide.
 
-use super::lanes::{Lanes, WIDTH_F32, WIDTH_F64};
+use super::lanes::{Lanes, WIDTH_F32};
 use super::pass::Pass;
 use super::schedule::ROWS_A_TASK;
 use crate::memory::{filled, push};
@@ -13,9 +13,6 @@ const ROUNDING: f32 = 2.5e-5;
 
 /// Share of the largest value of a point that errors are at most where labels of less than half of it cannot win.
 const SMALL_ERROR: f64 = 1.0 / 32.0;
-
-/// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
-pub(super) const EQUAL: f64 = 1e-13;
 
 /// The best label of a point so far.
 #[derive(Debug, Clone, Copy, Default)]
@@ -222,23 +219,6 @@ pub(super) fn candidates(ties: &NearTies) -> Vec<u32> {
     labels.into_iter().collect()
 }
 
-/// Keeps in `refined` the best label of each of `points` and its value; of [`EQUAL`] ones the lowest.
-pub(super) fn refine(points: &[u32], refined: &mut [(u32, f64)], pass: &Pass<f64, WIDTH_F64>) {
-    for (&point, best) in points.iter().zip(refined) {
-        for (label, value) in pass.at(point as usize) {
-            offer(best, label, value);
-        }
-    }
-}
-
-fn offer((best, largest): &mut (u32, f64), label: u32, value: f64) {
-    if value > *largest * (1.0 + EQUAL) {
-        (*best, *largest) = (label, value);
-    } else if value >= *largest * (1.0 - EQUAL) {
-        (*best, *largest) = (label.min(*best), value.max(*largest));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -283,26 +263,6 @@ mod tests {
             }
             assert_eq!((best.label, best.value), (0, 0.5));
         }
-    }
-
-    #[test]
-    fn of_values_that_rounding_tells_apart_the_lowest_label_wins_in_any_order() {
-        let below = 0.5 * (1.0 - f64::EPSILON);
-        for values in [
-            [(3, 0.5), (0, below), (7, 0.5)],
-            [(7, 0.5), (3, 0.5), (0, below)],
-            [(0, below), (7, 0.5), (3, 0.25)],
-        ] {
-            let mut best = (0, f64::NEG_INFINITY);
-            for (label, value) in values {
-                offer(&mut best, label, value);
-            }
-            assert_eq!(best, (0, 0.5));
-        }
-        let mut best = (1, 0.5);
-        offer(&mut best, 0, 0.5 * (1.0 - 1e-12));
-        offer(&mut best, 2, 0.5 * (1.0 + 1e-12));
-        assert_eq!(best.0, 2);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Outlier removal: an instance keeps its largest connected component and the parts near it (method, step 7).
 
 use super::box_tree::BoxTree;
+use super::disjoint_sets::DisjointSets;
 use super::point_graph::PointGraph;
 use crate::memory::{collect, filled, push, zeros};
 use crate::{Cancel, Error, Result};
@@ -190,36 +191,6 @@ fn keep_parts(
     Ok(())
 }
 
-/// Union-find in which the root of a set is its lowest element.
-struct DisjointSets {
-    parents: Vec<u32>,
-}
-
-impl DisjointSets {
-    fn new(n: usize, cancel: &Cancel) -> Result<Self> {
-        Ok(Self {
-            parents: collect(0..n as u32, cancel)?,
-        })
-    }
-
-    fn root(&mut self, mut element: u32) -> u32 {
-        while self.parents[element as usize] != element {
-            let grandparent = self.parents[self.parents[element as usize] as usize];
-            self.parents[element as usize] = grandparent;
-            element = grandparent;
-        }
-        element
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        if self.parents[a as usize] == self.parents[b as usize] {
-            return;
-        }
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -246,19 +217,6 @@ mod tests {
             keep_largest(&chain(9), &labels),
             [0, 0, 0, 1, 1, 1, 2, 2, 0]
         );
-    }
-
-    #[test]
-    fn sets_are_joined_by_their_roots_whichever_elements_are_named() {
-        // 3 is no root: joined itself, it would leave 2 behind
-        for last in [[0, 3], [3, 0]] {
-            let mut sets = DisjointSets::new(5, Cancel::never()).unwrap();
-            for [a, b] in [[2, 3], [3, 4], last] {
-                sets.join(a, b);
-            }
-            let roots: Vec<u32> = (0..5).map(|i| sets.root(i)).collect();
-            assert_eq!(roots, [0, 1, 0, 0, 0]);
-        }
     }
 
     #[test]

@@ -2,8 +2,10 @@
 
 mod box_tree;
 mod components;
+mod disjoint_sets;
 mod point_graph;
 
 pub use components::remove_outliers;
 pub(crate) use components::remove_outliers_by_index;
+pub(crate) use disjoint_sets::DisjointSets;
 pub use point_graph::PointGraph;

@@ -110,28 +110,32 @@ impl PixelLabels {
     pub(crate) fn counted(
         &self,
         points: Option<&[u32]>,
-        scale: impl Fn(usize) -> f32,
+        scale: impl Fn(usize) -> f32 + Sync,
         pixel_weight: f64,
         cancel: &Cancel,
     ) -> Result<PixelLabels<f64>> {
         let count = points.map_or(self.rows(), <[_]>::len);
-        let mut all = PixelLabels::with_room(count)?;
-        for at in 0..count {
-            if at % POINTS_A_TASK == 0 {
-                cancel.check()?;
+        let of_task = |task: usize| {
+            cancel.check()?;
+            let places = task * POINTS_A_TASK..count.min((task + 1) * POINTS_A_TASK);
+            let mut some = PixelLabels::default();
+            for at in places {
+                let point = points.map_or(at, |points| points[at] as usize);
+                let pixel = f64::from(scale(point)) * pixel_weight;
+                let counted = |weight: f32| pixel_weight * (f64::from(weight) / pixel).round();
+                let row = self.offsets[point]..self.offsets[point + 1];
+                for (&label, &weight) in self.labels[row.clone()].iter().zip(&self.weights[row]) {
+                    push(&mut some.labels, label)?;
+                    push(&mut some.weights, counted(weight))?;
+                }
+                some.mass.push(counted(self.mass[point]));
+                some.offsets.push(some.labels.len());
             }
-            let point = points.map_or(at, |points| points[at] as usize);
-            let pixel = f64::from(scale(point)) * pixel_weight;
-            let counted = |weight: f32| pixel_weight * (f64::from(weight) / pixel).round();
-            let row = self.offsets[point]..self.offsets[point + 1];
-            for (&label, &weight) in self.labels[row.clone()].iter().zip(&self.weights[row]) {
-                push(&mut all.labels, label)?;
-                push(&mut all.weights, counted(weight))?;
-            }
-            all.mass.push(counted(self.mass[point]));
-            all.offsets.push(all.labels.len());
-        }
-        Ok(all)
+            Ok(some)
+        };
+        let tasks = (0..count.div_ceil(POINTS_A_TASK)).into_par_iter();
+        let parts = tasks.map(of_task).collect::<Result<Vec<_>>>()?;
+        PixelLabels::concatenate(&parts, cancel)
     }
 }
 
