@@ -175,8 +175,9 @@ def test_a_second_label_in_the_place_of_an_object_is_the_object():
         labels[::2] = 1 + (k == 1)
         second = replace(result.instances[0], label=2)
         results.append(replace(result, labels=labels.ravel(), instances=(*result.instances, second)))
-    for result in ldls.Tracker().track(sweeps, results):
+    for result, before in zip(ldls.Tracker().track(sweeps, results), results, strict=True):
         assert result.instance_ids[1:].tolist() == [1, 1]
+        np.testing.assert_array_equal(result.labels, np.minimum(before.labels, 1))
 
 
 def test_a_second_label_beside_an_object_is_another():

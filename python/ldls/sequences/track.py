@@ -114,13 +114,17 @@ class Track:
 
 
 def _velocity(sightings: Sequence[Sighting]) -> Floats:
-    """The slope of a line through the middles, if the first points, moved so, lie on the last; zeros otherwise."""
-    stamps = np.array([each.stamp for each in sightings])
-    since = stamps - stamps.mean()
-    spread = float(since @ since)
+    """The slope of a line through the middles, if the first points, moved so, lie on the last; zeros otherwise.
+
+    A middle counts by its points: that of a few is of some corner of the object.
+    """
+    stamps = np.array([each.stamp - sightings[-1].stamp for each in sightings])
+    counts = np.array([len(each.footprint.points) for each in sightings])
+    since = stamps - np.average(stamps, weights=counts)
+    spread = float(counts * since @ since)
     if spread == 0:
         return np.zeros(2)
-    slope: Floats = since @ np.array([each.footprint.middle for each in sightings]) / spread
+    slope: Floats = counts * since @ np.array([each.footprint.middle for each in sightings]) / spread
     first, last = sightings[0], sightings[-1]
     way = slope * (last.stamp - first.stamp)
     begin, end = first.footprint.points, last.footprint.points

@@ -67,7 +67,7 @@ class Tracker:
         An object that images overlook has points where it was, or went by its velocity, within 1.2 s of a sweep that
         shows it: if ten images did before, or three where the images of the sweep show nothing at all. Confidence there
         is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances. Two
-        instances in one place are one object, and have one number.
+        instances in one place are one object: they have one number, and the points of both the label of the first.
 
         Args:
             sweeps: The next sweeps of the drive, in the order of their stamps.
@@ -92,12 +92,16 @@ class Tracker:
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
         self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
         found = [overlooked(moment, self._moments, self._tracks) for moment in moments]
-        of_number = {number: label for label, number in numbers.items()}
+        of_number = {number: label for label, number in sorted(numbers.items(), reverse=True)}
+        one_label = np.arange(len(results[0].instances) + 1, dtype=np.int32)
+        one_label[list(numbers)] = [of_number[number] for number in numbers.values()]
         added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
         tracked = []
         for result, moment, rows in zip(results, moments, found, strict=True):
             known = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
-            tracked.append(replace(_completed(result, moment, rows, of_number), instances=(*known, *added)))
+            own = np.where(result.labels > 0, one_label[result.labels], result.labels)
+            completed = _completed(replace(result, labels=own), moment, rows, of_number)
+            tracked.append(replace(completed, instances=(*known, *added)))
         return tuple(tracked)
 
     def _added(self, found: Ints, of_number: dict[int, int], known: int) -> list[Instance]:
