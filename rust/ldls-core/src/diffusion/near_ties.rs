@@ -133,7 +133,7 @@ fn leaders(
     };
     let (a, mut b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
     if reach.is_some() && candidates.len() > WIDTH_F64 {
-        b = without_twins((&a, &b), candidates, cancel)?;
+        b = without_twins((&a, b), candidates, cancel)?;
     }
     let schedule = match &reach {
         Some(reach) => reach.schedule(&a, cancel)?,

@@ -12,7 +12,7 @@ use crate::{Cancel, Result};
 /// # Errors
 /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
 pub(super) fn without_twins(
-    (a, b): (&PointGraph<f64>, &PixelLabels<f64>),
+    (a, b): (&PointGraph<f64>, PixelLabels<f64>),
     labels: &[u32],
     cancel: &Cancel,
 ) -> Result<PixelLabels<f64>> {
@@ -33,20 +33,21 @@ pub(super) fn without_twins(
     for row in 0..a.len() {
         alike[parts.root(row as u32) as usize].tell_apart(seeds(row));
     }
-    let mut some = PixelLabels {
-        offsets: vec![0],
-        mass: b.mass.clone(),
-        ..PixelLabels::default()
-    };
+    let (mut offsets, mut kept, mut weights) = (vec![0], Vec::new(), Vec::new());
     for row in 0..a.len() {
         let alike = &alike[parts.root(row as u32) as usize];
         for (label, weight) in seeds(row).filter(|&(label, _)| alike.has_no_lower(label)) {
-            push(&mut some.labels, label)?;
-            push(&mut some.weights, weight)?;
+            push(&mut kept, label)?;
+            push(&mut weights, weight)?;
         }
-        push(&mut some.offsets, some.labels.len())?;
+        push(&mut offsets, kept.len())?;
     }
-    Ok(some)
+    Ok(PixelLabels {
+        offsets,
+        labels: kept,
+        weights,
+        mass: b.mass,
+    })
 }
 
 /// Which labels have had the same seeds at all points looked at.
@@ -115,7 +116,7 @@ mod tests {
             b.weights.extend(row.iter().map(|(_, weight)| *weight));
             b.offsets.push(b.labels.len());
         }
-        let b = without_twins((&a, &b), labels, Cancel::never()).unwrap();
+        let b = without_twins((&a, b), labels, Cancel::never()).unwrap();
         let labels = |row| b.row(row).map(|(label, _)| label).collect();
         (0..n).map(labels).collect()
     }
