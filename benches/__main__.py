@@ -205,8 +205,8 @@ def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
     for each, seeds in ((tiled_frame(measured.in_view(), n, 0), range(8)), (street_frame(n), range(3))):
         for seed in seeds:
             boxes = overlapping_boxes(each, 20, seed)
-            sides: dict[str, Callable[[], object]] = {
-                name: lambda masks=masks: ldls.segment(each.points, masks, each.camera, params=params)  # type: ignore[misc]  # noqa: B023
+            sides = {
+                name: partial(ldls.segment, each.points, masks, each.camera, params=params)
                 for name, masks in (("over", boxes), ("alone", boxes.resolve_overlaps("area")))
             }
             found = medians(sides, runs=min(options.runs, 5))

@@ -8,6 +8,7 @@ import pytest
 import ldls
 from conftest import pinhole
 from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES
+from ldls.sequences.track import Footprint, Sighting, Track
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
 WIDE = pinhole(100.0, (320.0, 240.0), T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -183,6 +184,15 @@ def test_a_second_label_in_the_place_of_an_object_is_the_object():
 def test_a_second_label_beside_an_object_is_another():
     sweeps = [sweep_at(0.1 * k, [((8, 0), True), ((8, 1.2), k == 1)]) for k in range(3)]
     assert tracks_of(ldls.Tracker(), sweeps, together=3)[1] == [1, 2]
+
+
+def test_what_stands_has_no_velocity_though_few_of_its_points_are_seen_in_the_last_sweeps():
+    whole = np.stack(np.meshgrid(np.linspace(0, 4, 5), np.linspace(0, 1.6, 4)), axis=-1).reshape(-1, 2)
+    track = Track(1, ldls.Instance(label=1, category=3, name="car", score=1.0, sources=()))
+    for k in range(20):
+        points = whole if k < 15 else whole[-1:] + 0.5
+        track.advance(track.instance, Sighting(0.1 * k, Footprint(points), shown=True))
+    assert track.velocity.tolist() == [0, 0]
 
 
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():

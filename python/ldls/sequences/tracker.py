@@ -89,19 +89,16 @@ class Tracker:
         seen = [_sightings(sweep, result) for sweep, result in zip(sweeps, results, strict=True)]
         by_label = self._advanced(instances, [sweep.stamp for sweep in sweeps], seen)
         numbers = {label: track.number for label, track in by_label.items()}
+        of_number = {number: label for label, number in sorted(numbers.items(), reverse=True)}
+        results = [_relabelled(result, {label: of_number[numbers[label]] for label in numbers}) for result in results]
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
         self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
         found = [overlooked(moment, self._moments, self._tracks) for moment in moments]
-        of_number = {number: label for label, number in sorted(numbers.items(), reverse=True)}
-        one_label = np.arange(len(results[0].instances) + 1, dtype=np.int32)
-        one_label[list(numbers)] = [of_number[number] for number in numbers.values()]
         added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
         tracked = []
         for result, moment, rows in zip(results, moments, found, strict=True):
             known = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
-            own = np.where(result.labels > 0, one_label[result.labels], result.labels)
-            completed = _completed(replace(result, labels=own), moment, rows, of_number)
-            tracked.append(replace(completed, instances=(*known, *added)))
+            tracked.append(replace(_completed(result, moment, rows, of_number), instances=(*known, *added)))
         return tuple(tracked)
 
     def _added(self, found: Ints, of_number: dict[int, int], known: int) -> list[Instance]:
@@ -213,6 +210,13 @@ class Tracker:
             return float("inf")
         middle = np.linalg.norm(one.middle - other.middle)
         return float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
+
+
+def _relabelled(result: Segmentation, label_of: Mapping[int, int]) -> Segmentation:
+    """The result with points of one label for each object."""
+    new = np.arange(len(result.instances) + 1, dtype=np.int32)
+    new[list(label_of)] = list(label_of.values())
+    return replace(result, labels=np.where(result.labels > 0, new[result.labels], result.labels))
 
 
 def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Mapping[int, int]) -> Segmentation:

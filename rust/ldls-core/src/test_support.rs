@@ -1,8 +1,9 @@
 //! For tests of several images, a wall of points before cameras whose masks are rectangles; for those of diffusion, a graph of
-//! two points, and pixel labels of one seed each.
+//! two points, a chain of them, and pixel labels by their seeds.
 
 use crate::{
-    Camera, Cancel, Cloud, InstanceMasks, Params, PixelLabels, PointGraph, Rle, Segmentation, View,
+    Camera, Cancel, Cloud, InstanceMasks, Params, PixelLabels, PointGraph, Real, Rle, Segmentation,
+    View,
 };
 
 const IDENTITY: [f64; 16] = [
@@ -79,4 +80,38 @@ pub(crate) fn one_seed_each(points: usize, seeds: &[usize]) -> PixelLabels {
         weights: vec![0.25; seeds.len()],
         mass: vec![0.25; points],
     }
+}
+
+/// Pixel labels of so many points: label and weight of each seed of the first ones.
+pub(crate) fn seeds_by_point<T: Real>(points: usize, seeds: &[&[(u32, f64)]]) -> PixelLabels<T> {
+    let mut b = PixelLabels {
+        offsets: vec![0],
+        labels: vec![],
+        weights: vec![],
+        mass: vec![T::from_f64(0.5); points],
+    };
+    for row in seeds {
+        b.labels.extend(row.iter().map(|(label, _)| *label));
+        b.weights
+            .extend(row.iter().map(|(_, weight)| T::from_f64(*weight)));
+        b.offsets.push(b.labels.len());
+    }
+    b.offsets.resize(points + 1, b.labels.len());
+    b
+}
+
+/// A chain of points whose edges lead to themselves and to the next one, by the weight given, with the seeds of the first ones.
+pub(crate) fn chain<T: Real>(
+    weights: &[f64],
+    seeds: &[&[(u32, f64)]],
+) -> (PointGraph<T>, PixelLabels<T>) {
+    let n = weights.len();
+    let columns = (0..n as u32).flat_map(|i| [i, (i + 1).min(n as u32 - 1)]);
+    let weights = weights.iter().flat_map(|&weight| [0.1, weight]);
+    let a = PointGraph::from_csr(
+        (0..=n).map(|i| 2 * i).collect(),
+        columns.collect(),
+        weights.map(T::from_f64).collect(),
+    );
+    (a.unwrap(), seeds_by_point(n, seeds))
 }

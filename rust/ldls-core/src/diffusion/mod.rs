@@ -10,6 +10,7 @@ mod convergence;
 mod equal_labels;
 mod errors;
 mod lanes;
+mod leaders;
 mod near_ties;
 mod pass;
 mod passes;

@@ -1,24 +1,16 @@
 //! The points at which single precision cannot decide between labels.
 //!
 //! Labels of many of them are equal, as where several masks show all that anything flows from: their seeds are the same
-//! there. The others are decided in double precision: by the part of the graph that flows to them, with a series that
-//! leaves out next to nothing. Where there are few, one that leaves out little comes first, and tells most of them apart. Where
-//! what flows to them is much of the graph, all of it is diffused again.
+//! there. The others are decided in double precision, with a series that leaves out next to nothing. Where there are few, one
+//! that leaves out little comes first, and tells most of them apart.
 
 use super::equal_labels::Followed;
 use super::errors::Errors;
-use super::lanes::WIDTH_F64;
-use super::pass::Pass;
-use super::plan::Planner;
-use super::reach::Reach;
-use super::schedule::{ROWS_A_TASK, Schedule};
-use super::seeds::Seeds;
+use super::leaders::leaders;
 use super::series::Series;
-use super::twins::without_twins;
 use super::winners::{Best, NearTies, Winners, candidates};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::filled;
 use crate::{Cancel, Result};
 use rayon::prelude::*;
 
@@ -31,8 +23,6 @@ const LEAD: f64 = 0.05;
 /// Points up to which there is a first one. More are those of masks that lie over one another, whose labels differ so little
 /// that it would leave them open.
 const FEW: usize = 1 << 10;
-/// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
-const EQUAL: f64 = 1e-13;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
 const NEGLIGIBLE: f32 = 1e-18;
 
@@ -115,117 +105,11 @@ fn settle_equal(
     Ok(())
 }
 
-/// The leader of `candidates` at each of `points`, in double precision, with `series` in the place of the products where there is
-/// one.
-fn leaders(
-    a: &PointGraph,
-    points: &[u32],
-    candidates: &[u32],
-    (series, iterations): (Option<&Series>, Option<usize>),
-    exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
-    cancel: &Cancel,
-) -> Result<Vec<Leader>> {
-    let steps = Pass::<f64, WIDTH_F64>::steps(series, iterations);
-    // endlessly many products reach everything, and ask for a residual of all points
-    let reach = match iterations {
-        Some(_) => Reach::of(a, points, steps, cancel)?,
-        None => None,
-    };
-    let (a, mut b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
-    if reach.is_some() && candidates.len() > WIDTH_F64 {
-        b = without_twins((&a, b), candidates, cancel)?;
-    }
-    let schedule = match &reach {
-        Some(reach) => reach.schedule(&a, cancel)?,
-        None => Schedule::new(&a, cancel)?,
-    };
-    let planner = Planner {
-        schedule: &schedule,
-        width: WIDTH_F64,
-        probe: false,
-        steps,
-    };
-    let mut leaders = filled(Leader::default(), points.len(), cancel)?;
-    for plan in planner.plan((&a, &b), candidates, cancel)? {
-        let seeds = Seeds::new(&b, plan, cancel)?;
-        let pass: Pass<f64, WIDTH_F64> =
-            Pass::run(&a, &schedule, &seeds, series, iterations, cancel)?;
-        cancel.check()?;
-        let offer = |(at, leader): (usize, &mut Leader)| {
-            // points are the first of those that they reach
-            let row = reach.as_ref().map_or(points[at] as usize, |_| at);
-            pass.at(row)
-                .for_each(|(label, value)| leader.offer(label, value));
-        };
-        let leaders = leaders.par_iter_mut().with_min_len(ROWS_A_TASK);
-        leaders.enumerate().for_each(offer);
-    }
-    Ok(leaders)
-}
-
-/// The label that wins at a point in double precision.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Leader {
-    /// Of [`EQUAL`] ones the lowest.
-    label: u32,
-    value: f64,
-    /// The largest value that is not equal.
-    next: f64,
-}
-
-impl Leader {
-    fn offer(&mut self, label: u32, value: f64) {
-        if value > self.value * (1.0 + EQUAL) {
-            *self = Self {
-                label,
-                value,
-                next: self.value,
-            };
-        } else if value >= self.value * (1.0 - EQUAL) {
-            self.label = label.min(self.label);
-            self.value = value.max(self.value);
-        } else {
-            self.next = value.max(self.next);
-        }
-    }
-
-    /// How far it is ahead.
-    fn lead(&self) -> f64 {
-        self.value - self.next
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::diffuse;
     use super::*;
-
-    type System<T> = (PointGraph<T>, PixelLabels<T>);
-
-    /// A chain of points whose edges lead to themselves and to the next one, by the weight given.
-    fn chain<T: crate::Real>(weights: &[f64], seeds: &[&[(u32, f64)]]) -> System<T> {
-        let n = weights.len();
-        let columns = (0..n as u32).flat_map(|i| [i, (i + 1).min(n as u32 - 1)]);
-        let weights = weights.iter().flat_map(|&weight| [0.1, weight]);
-        let a = PointGraph::from_csr(
-            (0..=n).map(|i| 2 * i).collect(),
-            columns.collect(),
-            weights.map(T::from_f64).collect(),
-        );
-        let mut b = PixelLabels {
-            offsets: vec![0],
-            labels: vec![],
-            weights: vec![],
-            mass: vec![T::from_f64(0.5); n],
-        };
-        for row in seeds {
-            b.labels.extend(row.iter().map(|(label, _)| *label));
-            let weights = row.iter().map(|(_, weight)| T::from_f64(*weight));
-            b.weights.extend(weights);
-            b.offsets.push(b.labels.len());
-        }
-        (a.unwrap(), b)
-    }
+    use crate::test_support::chain;
 
     /// Labels of a chain, and how many points were looked at in double precision.
     fn decided(weights: &[f64], seeds: &[&[(u32, f64)]]) -> (Vec<u32>, usize) {
@@ -240,69 +124,6 @@ mod tests {
         let (a, b) = chain(weights, seeds);
         let found = diffuse(&a, &b, 8, Some(20), exact, Cancel::never()).unwrap();
         (found.labels, asked.get())
-    }
-
-    #[test]
-    fn of_values_that_rounding_tells_apart_the_lowest_label_leads_in_any_order() {
-        let leader = |values: &[(u32, f64)]| {
-            let mut leader = Leader::default();
-            let offers = values.iter();
-            offers.for_each(|&(label, value)| leader.offer(label, value));
-            (leader.label, leader.lead())
-        };
-        let below = 0.5 * (1.0 - f64::EPSILON);
-        for values in [
-            [(3, 0.5), (0, below), (7, 0.25)],
-            [(7, 0.25), (3, 0.5), (0, below)],
-            [(0, below), (7, 0.25), (3, 0.5)],
-        ] {
-            assert_eq!(leader(&values), (0, 0.25), "ahead of those that differ");
-        }
-        let below = 0.5 * (1.0 - 1e-12);
-        let (label, lead) = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
-        assert_eq!(
-            (label, lead),
-            (1, 0.5 - below),
-            "two are equal, the third is near"
-        );
-    }
-
-    #[test]
-    fn leaders_are_those_of_the_products_and_of_equal_labels_the_lowest() {
-        fn system<T: crate::Real>() -> System<T> {
-            let seeds: [&[(u32, f64)]; 5] = [
-                &[(3, 0.01)],
-                &[(1, 0.5)],
-                &[(1, 0.5), (2, 0.5)],
-                &[(2, 0.5)],
-                &[(0, 0.75)],
-            ];
-            let none: &[(u32, f64)] = &[];
-            let seeds: Vec<_> = seeds.into_iter().chain([none; 595]).collect();
-            chain(&[0.25; 600], &seeds)
-        }
-        let asked = std::cell::Cell::new(0);
-        let exact = |among: Option<&[u32]>| {
-            let (a, b) = system::<f64>();
-            let points = among.unwrap_or_default();
-            asked.set(points.len());
-            Ok((a.among(points), b.among(points)))
-        };
-        let labels_after = |products: usize, points: &[u32]| {
-            let (a, _) = system::<f32>();
-            let run = (None, Some(products));
-            let found = leaders(&a, points, &[0, 1, 2, 3], run, exact, Cancel::never());
-            let found = found.unwrap().into_iter();
-            found.map(|leader| leader.label).collect::<Vec<u32>>()
-        };
-        // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5
-        assert_eq!(labels_after(3, &[1, 2, 3, 5]), [1, 2, 2, 0]);
-        assert_eq!(
-            asked.get(),
-            8,
-            "points within as many edges as there are products"
-        );
-        assert_eq!(labels_after(1, &[2]), [1]);
     }
 
     #[test]

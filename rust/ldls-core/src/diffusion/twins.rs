@@ -1,5 +1,5 @@
 //! Labels that are twins in a part of the graph that hangs together: their seeds are the same at all of its points, and so are
-//! their values. One of them speaks for all.
+//! their values. One of them speaks for all, where others differ from both.
 
 use super::schedule::ROWS_A_TASK;
 use crate::graph::{DisjointSets, PointGraph};
@@ -98,6 +98,7 @@ impl Alike {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_support::seeds_by_point;
 
     /// Labels with a seed at each of points that stand in a row, with edges from one to the next but where a part ends.
     fn kept(ends: &[usize], seeds: &[&[(u32, f64)]], labels: &[u32]) -> Vec<Vec<usize>> {
@@ -106,17 +107,7 @@ mod tests {
         let columns = (0..n).flat_map(|i| [i as u32, next(i) as u32]);
         let offsets = (0..=n).map(|i| 2 * i).collect();
         let a = PointGraph::from_csr(offsets, columns.collect(), vec![0.5; 2 * n]).unwrap();
-        let mut b = PixelLabels {
-            offsets: vec![0],
-            mass: vec![1.0; n],
-            ..PixelLabels::default()
-        };
-        for row in seeds {
-            b.labels.extend(row.iter().map(|(label, _)| *label));
-            b.weights.extend(row.iter().map(|(_, weight)| *weight));
-            b.offsets.push(b.labels.len());
-        }
-        let b = without_twins((&a, b), labels, Cancel::never()).unwrap();
+        let b = without_twins((&a, seeds_by_point(n, seeds)), labels, Cancel::never()).unwrap();
         let labels = |row| b.row(row).map(|(label, _)| label).collect();
         (0..n).map(labels).collect()
     }

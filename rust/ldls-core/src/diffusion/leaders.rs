@@ -1,0 +1,173 @@
+//! The labels that win at some points in double precision: by the part of the graph that flows to the points, or where that is
+//! much of it, by all of it.
+
+use super::lanes::WIDTH_F64;
+use super::pass::Pass;
+use super::plan::Planner;
+use super::reach::Reach;
+use super::schedule::{ROWS_A_TASK, Schedule};
+use super::seeds::Seeds;
+use super::series::Series;
+use super::twins::without_twins;
+use crate::graph::PointGraph;
+use crate::masks::PixelLabels;
+use crate::memory::filled;
+use crate::{Cancel, Result};
+use rayon::prelude::*;
+
+/// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
+const EQUAL: f64 = 1e-13;
+/// The leader of `candidates`, ascending, at each of `points`, with `series` in the place of the products where there is one. `exact`
+/// is that of [`super::diffuse`].
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`], [`crate::Error::Cancelled`], and whatever `exact` returns.
+pub(super) fn leaders(
+    a: &PointGraph,
+    points: &[u32],
+    candidates: &[u32],
+    (series, iterations): (Option<&Series>, Option<usize>),
+    exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
+    cancel: &Cancel,
+) -> Result<Vec<Leader>> {
+    let steps = Pass::<f64, WIDTH_F64>::steps(series, iterations);
+    // endlessly many products reach everything, and ask for a residual of all points
+    let reach = match iterations {
+        Some(_) => Reach::of(a, points, steps, cancel)?,
+        None => None,
+    };
+    let (exact_a, mut b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
+    if reach.is_some() && candidates.len() > WIDTH_F64 {
+        b = without_twins((&exact_a, b), candidates, cancel)?;
+    }
+    let schedule = match &reach {
+        Some(reach) => reach.schedule(&exact_a, cancel)?,
+        None => Schedule::new(&exact_a, cancel)?,
+    };
+    let planner = Planner {
+        schedule: &schedule,
+        width: WIDTH_F64,
+        probe: false,
+        steps,
+    };
+    let mut leaders = filled(Leader::default(), points.len(), cancel)?;
+    for plan in planner.plan((&exact_a, &b), candidates, cancel)? {
+        let seeds = Seeds::new(&b, plan, cancel)?;
+        let pass: Pass<f64, WIDTH_F64> =
+            Pass::run(&exact_a, &schedule, &seeds, series, iterations, cancel)?;
+        cancel.check()?;
+        // of a part, values of points farther away are not those of all steps
+        let is_sound = |series: &Series| pass.is_sound(series.most_left_out, b.largest_shares());
+        if reach.is_none() && !series.is_none_or(is_sound) {
+            return self::leaders(a, points, candidates, (None, iterations), exact, cancel);
+        }
+        let offer = |(at, leader): (usize, &mut Leader)| {
+            // points are the first of those that they reach
+            let row = reach.as_ref().map_or(points[at] as usize, |_| at);
+            pass.at(row)
+                .for_each(|(label, value)| leader.offer(label, value));
+        };
+        let leaders = leaders.par_iter_mut().with_min_len(ROWS_A_TASK);
+        leaders.enumerate().for_each(offer);
+    }
+    Ok(leaders)
+}
+
+/// The label that wins at a point in double precision.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Leader {
+    /// Of [`EQUAL`] ones the lowest.
+    pub(super) label: u32,
+    value: f64,
+    /// The largest value that is not equal.
+    next: f64,
+}
+
+impl Leader {
+    fn offer(&mut self, label: u32, value: f64) {
+        if value > self.value * (1.0 + EQUAL) {
+            *self = Self {
+                label,
+                value,
+                next: self.value,
+            };
+        } else if value >= self.value * (1.0 - EQUAL) {
+            self.label = label.min(self.label);
+            self.value = value.max(self.value);
+        } else {
+            self.next = value.max(self.next);
+        }
+    }
+
+    /// How far it is ahead of those that are not equal.
+    pub(super) fn lead(&self) -> f64 {
+        self.value - self.next
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::chain;
+
+    #[test]
+    fn of_values_that_rounding_tells_apart_the_lowest_label_leads_in_any_order() {
+        let leader = |values: &[(u32, f64)]| {
+            let mut leader = Leader::default();
+            let offers = values.iter();
+            offers.for_each(|&(label, value)| leader.offer(label, value));
+            (leader.label, leader.lead())
+        };
+        let below = 0.5 * (1.0 - f64::EPSILON);
+        for values in [
+            [(3, 0.5), (0, below), (7, 0.25)],
+            [(7, 0.25), (3, 0.5), (0, below)],
+            [(0, below), (7, 0.25), (3, 0.5)],
+        ] {
+            assert_eq!(leader(&values), (0, 0.25), "ahead of those that differ");
+        }
+        let below = 0.5 * (1.0 - 1e-12);
+        let (label, lead) = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
+        assert_eq!(
+            (label, lead),
+            (1, 0.5 - below),
+            "two are equal, the third is near"
+        );
+    }
+
+    #[test]
+    fn leaders_are_those_of_the_products_and_of_equal_labels_the_lowest() {
+        fn system<T: crate::Real>() -> (PointGraph<T>, PixelLabels<T>) {
+            let seeds: [&[(u32, f64)]; 5] = [
+                &[(3, 0.01)],
+                &[(1, 0.5)],
+                &[(1, 0.5), (2, 0.5)],
+                &[(2, 0.5)],
+                &[(0, 0.75)],
+            ];
+            chain(&[0.25; 600], &seeds)
+        }
+        let asked = std::cell::Cell::new(0);
+        let exact = |among: Option<&[u32]>| {
+            let (a, b) = system::<f64>();
+            let points = among.unwrap_or_default();
+            asked.set(points.len());
+            Ok((a.among(points), b.among(points)))
+        };
+        let labels_after = |products: usize, points: &[u32]| {
+            let (a, _) = system::<f32>();
+            let run = (None, Some(products));
+            let found = leaders(&a, points, &[0, 1, 2, 3], run, exact, Cancel::never());
+            let found = found.unwrap().into_iter();
+            found.map(|leader| leader.label).collect::<Vec<u32>>()
+        };
+        // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5
+        assert_eq!(labels_after(3, &[1, 2, 3, 5]), [1, 2, 2, 0]);
+        assert_eq!(
+            asked.get(),
+            8,
+            "points within as many edges as there are products"
+        );
+        assert_eq!(labels_after(1, &[2]), [1]);
+    }
+}
