@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 /// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
 const EQUAL: f64 = 1e-13;
+
 /// The leader of `candidates`, ascending, at each of `points`, with `series` in the place of the products where there is one. `exact`
 /// is that of [`super::diffuse`].
 ///
