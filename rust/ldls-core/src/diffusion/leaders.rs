@@ -2,6 +2,7 @@
 //! much of it, by all of it.
 
 use super::lanes::WIDTH_F64;
+use super::near_ties::FEW;
 use super::pass::Pass;
 use super::plan::Planner;
 use super::reach::Reach;
@@ -38,7 +39,7 @@ pub(super) fn leaders(
         None => None,
     };
     let (exact_a, mut b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
-    if reach.is_some() && candidates.len() > WIDTH_F64 {
+    if reach.is_some() && points.len() > FEW && candidates.len() > WIDTH_F64 {
         b = without_twins((&exact_a, b), candidates, cancel)?;
     }
     let schedule = match &reach {

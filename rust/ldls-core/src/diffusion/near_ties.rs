@@ -21,8 +21,8 @@ const FIRST_TOLERANCE: f64 = 1e-9;
 /// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision.
 const LEAD: f64 = 0.05;
 /// Points up to which there is a first one. More are those of masks that lie over one another, whose labels differ so little
-/// that it would leave them open.
-const FEW: usize = 1 << 10;
+/// that it would leave them open, or not at all in much of the graph.
+pub(super) const FEW: usize = 1 << 10;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
 const NEGLIGIBLE: f32 = 1e-18;
 
