@@ -186,6 +186,31 @@ def test_a_second_label_beside_an_object_is_another():
     assert tracks_of(ldls.Tracker(), sweeps, together=3)[1] == [1, 2]
 
 
+def test_a_few_points_on_an_object_are_of_it():
+    """In the second of three sweeps three points at one end of a lorry have another label."""
+    lorry = [((8, 0.2 * part), True) for part in range(-15, 16)]
+    sweeps = [sweep_at(0.1 * k, lorry) for k in range(3)]
+    results = []
+    for k, sweep in enumerate(sweeps):
+        (result,) = ldls.segment_sweeps([sweep], params=PARAMS)
+        labels = np.where(result.labels > 0, 1, result.labels)
+        labels[:3] = 1 + (k == 1)
+        results.append(replace(result, labels=labels, instances=result.instances[:2]))
+    for result in ldls.Tracker().track(sweeps, results):
+        assert result.instance_ids[1:].tolist() == [1, 1]
+        assert set(result.labels.tolist()) == {1}
+
+
+def test_what_stands_has_no_velocity_though_another_end_is_seen_soon():
+    """One end of a car, soon the other, and a point of it last."""
+    end = np.stack(np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1.6, 3)), axis=-1).reshape(-1, 2)
+    track = Track(1, ldls.Instance(label=1, category=3, name="car", score=1.0, sources=()))
+    for k in range(21):
+        points = end + np.array([3, 0]) if k < 4 else end if k < 20 else end[:1]
+        track.advance(track.instance, Sighting(0.1 * k, Footprint(points), shown=True))
+    assert track.velocity.tolist() == [0, 0]
+
+
 def test_what_stands_has_no_velocity_though_few_of_its_points_are_seen_in_the_last_sweeps():
     whole = np.stack(np.meshgrid(np.linspace(0, 4, 5), np.linspace(0, 1.6, 4)), axis=-1).reshape(-1, 2)
     track = Track(1, ldls.Instance(label=1, category=3, name="car", score=1.0, sources=()))

@@ -20,7 +20,8 @@ FASTEST_M_S = 60.0
 """What is faster is not one object at all times."""
 MOVES = 0.5
 """Share of the distance between the points of two moments that a motion may leave: the middle of what is visible of a
-standing object moves too, but its points stay where they are."""
+standing object moves too, but its points stay where they are. And share of the variance of the middles: they jump where
+another part becomes visible, and lie on no line."""
 
 Floats = NDArray[np.float64]
 
@@ -114,9 +115,10 @@ class Track:
 
 
 def _velocity(sightings: Sequence[Sighting]) -> Floats:
-    """The slope of a line through the middles, if the first points, moved so, lie on the last; zeros otherwise.
+    """The slope of a line through the middles, or zeros.
 
-    A middle counts by its points: that of a few is of some corner of the object.
+    It is believed if the middles lie near the line, and the first points, moved so, on the last. A middle counts by its
+    points: that of a few is of some corner of the object.
     """
     stamps = np.array([each.stamp - sightings[-1].stamp for each in sightings])
     counts = np.array([len(each.footprint.points) for each in sightings])
@@ -124,12 +126,21 @@ def _velocity(sightings: Sequence[Sighting]) -> Floats:
     spread = float(counts * since @ since)
     if spread == 0:
         return np.zeros(2)
-    slope: Floats = counts * since @ np.array([each.footprint.middle for each in sightings]) / spread
+    middles = np.array([each.footprint.middle for each in sightings])
+    slope: Floats = counts * since @ middles / spread
+    if _variance(middles - np.outer(since, slope), counts) > MOVES * _variance(middles, counts):
+        return np.zeros(2)
     first, last = sightings[0], sightings[-1]
     way = slope * (last.stamp - first.stamp)
     begin, end = first.footprint.points, last.footprint.points
     moves = _apart(begin + way, end) < MOVES * _apart(begin, end)
     return slope if moves and SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
+
+
+def _variance(middles: Floats, counts: NDArray[np.int64]) -> float:
+    """Mean squared distance of middles from theirs, where each counts so many times."""
+    away = middles - np.average(middles, axis=0, weights=counts)
+    return float(np.average(np.sum(away**2, axis=1), weights=counts))
 
 
 def _apart(one: Floats, other: Floats) -> float:

@@ -32,6 +32,10 @@ SAME = 0.3
 """Share of the longer of two objects, seen from above, up to which they may be apart and are one object."""
 SAME_M = 1.0
 """The same in metres."""
+FEW_POINTS = 3
+"""Points of which so many or fewer on an object are part of it."""
+ON_M = 0.2
+"""Mean distance, seen from above, up to which they are on it."""
 MOST_POINTS = 48
 """Points that stand for an object in a sweep; of more, some."""
 
@@ -148,16 +152,17 @@ class Tracker:
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
         labels = list(sightings)
         costs = np.full((len(labels), len(self._tracks)), np.inf)
+        part = np.zeros(costs.shape, bool)
         for j, track in enumerate(self._tracks):
             like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
             if not like:
                 continue
             there = track.at(stamp)
             for i in like:
-                costs[i, j] = self._apart(sightings[labels[i]].footprint, there)
+                costs[i, j], part[i, j] = self._apart(sightings[labels[i]].footprint, there)
         lengths = [sightings[label].footprint.length for label in labels]
         of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
-        same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
+        same = part | (costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks)))
         goes_on = np.array([track in going_on for track in self._tracks], bool)
         costs[~same & goes_on] = np.inf
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
@@ -197,19 +202,21 @@ class Tracker:
         self._tracks.append(Track(self._count, instance))
         return self._tracks[-1]
 
-    def _apart(self, one: Footprint, other: Footprint) -> float:
-        """How far apart objects are in metres, infinite beyond `NEAR_M`.
+    def _apart(self, one: Footprint, other: Footprint) -> tuple[float, bool]:
+        """How far apart objects are in metres, infinite beyond `NEAR_M`, and whether one is a few points on the other.
 
-        It is the mean of two distances: of the points of the smaller to the nearest of the other, and of the middles.
+        The former is the mean of two distances: of the points of the smaller to the nearest of the other, and of the
+        middles.
         """
         if one.gap(other) > NEAR_M:
-            return float("inf")
+            return float("inf"), False
         few, many = sorted((one.points, other.points), key=len)
         distances, _ = self._tree(many).query(few)
         if distances.min() > NEAR_M:
-            return float("inf")
+            return float("inf"), False
         middle = np.linalg.norm(one.middle - other.middle)
-        return float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
+        apart = float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
+        return apart, len(few) <= FEW_POINTS and bool(distances.mean() < ON_M)
 
 
 def _relabelled(result: Segmentation, label_of: Mapping[int, int]) -> Segmentation:
