@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import argparse
+import itertools
+import statistics
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
 import ldls
-from benches.ground_scenes import GroundScene
+from benches.frames import Frame
+from benches.ground_scenes import LIDARS, SLOPES, GroundScene, ground_scene
+from benches.measuring import medians
+from benches.tables import new_table
 
 WARM_UP = 3
 """Sweeps after which Patchwork++, which adapts its thresholds from sweep to sweep, is asked."""
@@ -127,3 +134,41 @@ def mistakes(scene: GroundScene, rows: NDArray[np.int64], said: Estimate) -> Mis
         objects=int(standing.sum()),
         wrong_objects=int((standing & said.ground).sum()),
     )
+
+
+def ground(_measured: Frame, options: argparse.Namespace) -> Table:
+    """The ground of simulated scenes against Patchwork++: heights, labels and time."""
+    seeds = range(4)
+    names = ("Patchwork++", "ldls, sweep", "Patchwork++ in view", "ldls in view")
+    table = new_table(
+        f"ground of {2 * len(seeds)} simulated scenes a row",
+        ["slopes, lidar", "side", "p50, m", "p90", "p99", "precision", "recall", "IoU", "objects", "ms"],
+        "errors of height; objects: points of objects called ground; Patchwork++ is given whole sweeps; one thread",
+    )
+    for slopes, lidar in itertools.product(SLOPES, LIDARS):
+        found: dict[str, list[Mistakes]] = {name: [] for name in names}
+        seconds: dict[str, list[float]] = {name: [] for name in names}
+        for seed, kind in itertools.product(seeds, ("street", "campus")):
+            scene = ground_scene(seed, kind, slopes, lidar)
+            whole, rows = np.arange(len(scene.points)), scene.in_view
+            in_view, peer = scene.points[rows], Patchwork(scene)
+            sides: dict[str, Callable[[], object]] = {
+                names[0]: peer.run,
+                names[1]: lambda scene=scene: our_ground(scene.points, scene.camera),  # type: ignore[misc]
+                names[3]: lambda scene=scene, seen=in_view: our_ground(seen, scene.camera),  # type: ignore[misc]
+            }
+            for name, median in medians(sides, runs=min(options.runs, 7)).items():
+                seconds[name].append(median)
+            said = peer.estimate()
+            for name, points, estimate in (
+                (names[0], whole, said),
+                (names[1], whole, our_ground(scene.points, scene.camera)),
+                (names[2], rows, said.of(rows)),
+                (names[3], rows, our_ground(in_view, scene.camera)),
+            ):
+                found[name].append(mistakes(scene, points, estimate))
+        for name in names:
+            ms = f"{statistics.median(seconds[name]) * 1e3:.1f}" if seconds[name] else ""
+            table.add_row(f"{slopes}, {lidar}", name, *Mistakes.joined(found[name]).row(), ms)
+        table.add_section()
+    return table

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import argparse
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 from sklearn.cluster import DBSCAN
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.semi_supervised import LabelSpreading
 
+import ldls
 from benches.frames import Frame
+from benches.measuring import medians
 from benches.scipy_pipeline import project
+from benches.tables import add_ratio, new_table
 from ldls.evaluation.clusters import DBSCAN_MIN_POINTS, DBSCAN_RADIUS_M
 
 
@@ -39,3 +45,27 @@ def spread_labels(frame: Frame, masks: NDArray[np.bool_]) -> NDArray[np.int64]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # 200 iterations are what is compared
         return np.asarray(model.fit(xyz, direct).transduction_)
+
+
+def against_learners(measured: Frame, options: argparse.Namespace) -> Table:
+    """`ldls.segment` against project + DBSCAN and against label spreading."""
+    dense, params = measured.masks.to_array(), ldls.Params(threads=options.threads)
+    peers: dict[str, tuple[Callable[..., object], int]] = {
+        "project + DBSCAN (scikit-learn)": (project_and_cluster, options.runs),
+        "LabelSpreading (scikit-learn), 200 iterations": (spread_labels, min(options.runs, 3)),
+    }
+    table = new_table(
+        f"{measured.name}: the whole frame",
+        ["peer", "peer, ms", "ldls, ms", "ratio"],
+        f"{options.threads} threads on both sides",
+    )
+    for name, (peer, rounds) in peers.items():
+        found = medians(
+            {
+                "peer": lambda peer=peer: peer(measured, dense),  # type: ignore[misc]
+                "ldls": lambda: ldls.segment(measured.points, measured.masks, measured.camera, params=params),
+            },
+            runs=rounds,
+        )
+        add_ratio(table, name, found["peer"], found["ldls"])
+    return table

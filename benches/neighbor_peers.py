@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
 import ldls
+from benches.frames import Frame, tiled_points
+from benches.measuring import medians
+from benches.tables import new_table
 
 K = 10
 
@@ -34,8 +39,6 @@ def searches(points: NDArray[np.float32], threads: int) -> dict[str, Callable[[]
 
 def clouds(sweep: NDArray[np.float32], in_view: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
     """The sizes and shapes that trees find easy and hard."""
-    from benches.frames import tiled_points
-
     side = np.arange(50, dtype=np.float32)
     return {
         "in view": in_view,
@@ -47,3 +50,19 @@ def clouds(sweep: NDArray[np.float32], in_view: NDArray[np.float32]) -> dict[str
         "sweep, every point twenty times": np.repeat(sweep[: len(sweep) // 20], 20, axis=0),
         "lattice of 50 x 50 x 50": np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3),
     }
+
+
+def neighbors(measured: Frame, options: argparse.Namespace) -> Table:
+    """Nearest neighbours against pykdtree, SciPy and small_gicp."""
+    table = new_table(
+        "10 nearest neighbours of every point, tree included, ms",
+        ["cloud", "points", "ldls", "pykdtree", "scipy", "small_gicp", "pykdtree / ldls"],
+        f"medians, {options.threads} threads on all sides",
+    )
+    sweep = np.ascontiguousarray(measured.points[:, :3])
+    for name, cloud in clouds(sweep, measured.in_view()).items():
+        rounds = options.runs if len(cloud) < 500_000 else min(options.runs, 5)
+        found = medians(searches(cloud, options.threads), runs=rounds)
+        times = [f"{found[peer] * 1e3:.1f}" for peer in ("ldls", "pykdtree", "scipy", "small_gicp")]
+        table.add_row(name, f"{len(cloud):,}", *times, f"{found['pykdtree'] / found['ldls']:.2f} x")
+    return table

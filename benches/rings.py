@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
 import os
+from collections.abc import Callable
 from pathlib import Path
 
+from rich.table import Table
+
 import ldls
+from benches.frames import Frame
+from benches.measuring import medians
+from benches.tables import new_table
 from ldls.categories import COCO_NAMES, category_ids
 from ldls.cloud import Points
 
@@ -43,3 +50,26 @@ def _simulated() -> tuple[str, Points, list[ldls.View]]:
     frame = scene_frame(0, rig=make_rig(lidar="hdl-32e", camera="ring"))
     views = [ldls.View(image.masks, image.camera, image.name) for image in frame.images]
     return "simulated street, ring of six", frame.points, views
+
+
+def cameras(_measured: Frame, options: argparse.Namespace) -> Table:
+    """A ring of six cameras against each of them alone, by the time a point in view takes."""
+    name, points, views = ring()
+    params = ldls.Params(threads=options.threads)
+
+    def run(some: list[ldls.View]) -> Callable[[], ldls.Segmentation]:
+        return lambda: ldls.segment(points, some, params=params)
+
+    sides = {view.name: run([view]) for view in views} | {"ring": run(views)}
+    found = medians(sides, runs=options.runs)
+    in_view = {side: len(call().in_view) for side, call in sides.items()}
+    alone = sum(found[view.name] for view in views) / sum(in_view[view.name] for view in views)
+    table = new_table(
+        name,
+        ["cameras", "points in view", "ms", "us a point", "over the six alone"],
+        f"{options.threads} threads; the six alone take {alone * 1e6:.2f} us a point and camera",
+    )
+    for side, seconds in found.items():
+        each = seconds / in_view[side]
+        table.add_row(side, f"{in_view[side]:,}", f"{seconds * 1e3:.1f}", f"{each * 1e6:.2f}", f"{each / alone:.2f} x")
+    return table

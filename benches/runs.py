@@ -1,14 +1,21 @@
-"""A folder of many frames in KITTI's object layout: one frame, over and over."""
+"""Many frames: in memory, and by `ldls run` from a folder in KITTI's object layout, which has one over and over."""
 
 from __future__ import annotations
 
+import argparse
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from rich.table import Table
 
 import ldls
 from benches.frames import Frame
+from benches.measuring import medians
+from benches.tables import new_table
+from ldls import batch
 
 
 def write_frames(folder: Path, frame: Frame, count: int) -> tuple[Path, Path]:
@@ -46,3 +53,48 @@ def loop(frame: Frame, count: int, params: ldls.Params) -> None:
     diffusion = ldls.LabelDiffusion(frame.camera, params)
     for _ in range(count):
         diffusion.segment(frame.points, frame.masks)
+
+
+def in_memory(measured: Frame, options: argparse.Namespace) -> Table:
+    """Frames of a batch one after the other on all threads, against one a thread."""
+    frames = 8 * options.threads
+    table = new_table(
+        f"{frames} frames, {measured.name}", ["frames", "ms a frame", "ratio"], f"{options.threads} threads"
+    )
+
+    def one_after_the_other() -> None:
+        stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=options.threads))
+        for _ in range(frames):
+            stream.segment(measured.points, measured.masks)
+
+    def one_a_thread() -> None:
+        stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=1))
+        with ThreadPoolExecutor(options.threads) as workers:
+            list(workers.map(lambda _: stream.segment(measured.points, measured.masks), range(frames)))
+
+    found = medians(
+        {"one after the other": one_after_the_other, "one a thread": one_a_thread}, runs=min(options.runs, 7)
+    )
+    for name, seconds in found.items():
+        table.add_row(name, f"{seconds / frames * 1e3:.2f}", f"{found['one after the other'] / seconds:.2f} x")
+    return table
+
+
+def from_disk(measured: Frame, options: argparse.Namespace) -> Table:
+    """`ldls run` over many frames from the disk, against LabelDiffusion in a loop on one core."""
+    count, one_core = min(2000, options.most), ldls.Params(threads=1)
+    table = new_table(
+        f"{count:,} frames, {measured.name}",
+        ["round", "loop on one core, frames/s", f"run on {options.threads}, frames/s", "share of loop x workers"],
+        "points, calibration and masks from the disk, labels to the disk",
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        training, stored = write_frames(Path(folder), measured, count)
+        settings = batch.RunSettings(masks=str(stored))
+        for number in range(1, 4):
+            seconds = medians({"loop": lambda: loop(measured, 50, one_core)}, runs=3)["loop"]
+            summary = batch.run(training, Path(folder) / f"out{number}", settings, workers=options.threads)
+            own = 50 / seconds
+            share = summary.frames_per_second / own / options.threads
+            table.add_row(str(number), f"{own:.1f}", f"{summary.frames_per_second:.1f}", f"{share:.0%}")
+    return table

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
+import statistics
 import time
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+import ldls
 from benches.frames import Frame
+from benches.measuring import medians
+from benches.tables import add_ratio, new_table
 from ldls import Params
 
 STAGES = ("project", "pixel_labels", "neighbors", "graph", "diffusion", "components")
@@ -87,3 +93,38 @@ def _largest_components(edges: csr_array, labels: NDArray[np.int64]) -> NDArray[
             _, component = connected_components(edges[members][:, members], directed=False)
             kept[members[component == np.bincount(component).argmax()]] = m
     return kept
+
+
+def against_scipy(measured: Frame, options: argparse.Namespace) -> Table:
+    """Each stage of the paper's method and `ldls.segment` against the plain SciPy pipeline."""
+    params, best = ldls.Params.paper(threads=options.threads), ldls.Params(threads=options.threads)
+    dense = measured.masks.to_array()
+    stages: dict[str, list[dict[str, float]]] = {"scipy": [], "ldls": []}
+    labels = {}
+
+    def run_scipy() -> None:
+        labels["scipy"], seconds = segment(measured, params, dense)
+        stages["scipy"].append(seconds)
+
+    def run_ldls() -> None:
+        result = ldls.segment(measured.points, measured.masks, measured.camera, params=params)
+        labels["ldls"] = result.labels[result.in_view]
+        stages["ldls"].append(dict(result.timings))
+
+    def run_best() -> None:
+        ldls.segment(measured.points, measured.masks, measured.camera, params=best)
+
+    whole = medians({"scipy": run_scipy, "ldls": run_ldls, "best": run_best}, runs=options.runs)
+    differ = int((labels["scipy"] != labels["ldls"]).sum())
+    table = new_table(
+        f"{measured.name}: {len(labels['ldls']):,} points in view, {len(measured.masks)} instances",
+        ["stage", "plain scipy float64, ms", "ldls, ms", "ratio"],
+        f"medians of {options.runs} runs, ldls on {options.threads} threads; labels that differ: {differ}",
+    )
+    for stage in STAGES:
+        peer, own = (statistics.median(run[stage] for run in stages[side][1:]) for side in ("scipy", "ldls"))
+        add_ratio(table, stage, peer, own)
+    table.add_section()
+    add_ratio(table, "ldls.segment, the paper's method", whole["scipy"], whole["ldls"])
+    add_ratio(table, "ldls.segment, the defaults", whole["scipy"], whole["best"])
+    return table

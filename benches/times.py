@@ -1,0 +1,110 @@
+"""How the time of a frame spreads over frames, and grows with points, instances, masks that overlap and threads."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from rich.table import Table
+
+import ldls
+from benches.frames import Frame, overlapping_boxes, street_frame, suite_frames, tiled_frame
+from benches.measuring import medians
+from benches.memory import extra_bytes
+from benches.tables import new_table
+
+
+def suite(measured: Frame, options: argparse.Namespace) -> Table:
+    """Times of frames of the simulated suite, which are kept in its folder, beside the one frame."""
+    methods = {
+        "the paper's method": ldls.Params.paper(threads=options.threads),
+        "the defaults": ldls.Params(threads=options.threads),
+    }
+
+    frames = [measured, *suite_frames(options.frames)]
+    # round after round over all frames, so that slow minutes of the machine fall on all of them alike
+    calls = {
+        (name, at): partial(ldls.segment, frame.points, frame.masks, frame.camera, params=params)
+        for name, params in methods.items()
+        for at, frame in enumerate(frames)
+    }
+    runs = min(options.runs, 5)
+    seconds = medians(calls, runs=runs)
+    table = new_table(
+        f"ldls.segment: {len(frames) - 1} frames of the suite",
+        ["ms a frame", measured.name, "median", "90 %", "99 %", "worst", "99 % / median"],
+        f"a frame's time is the median of {runs} runs, {options.threads} threads",
+    )
+    for name in methods:
+        one_ms, *suite_ms = (1e3 * seconds[name, at] for at in range(len(frames)))
+        median, _, high, _ = found = np.percentile(suite_ms, [50, 90, 99, 100])
+        table.add_row(name, *(f"{ms:.1f}" for ms in (one_ms, *found)), f"{high / median:.2f} x")
+    return table
+
+
+def growth(measured: Frame, options: argparse.Namespace) -> Table:
+    """Time and memory against the number of points, all in view of one camera, 20 instances."""
+    params = ldls.Params(threads=options.threads)
+    table = new_table(
+        "time and memory against points",
+        ["points", "s", "over 100,000", "extra bytes a point"],
+        f"{options.threads} threads",
+    )
+    base = 0.0
+    for n in (n for n in (10_000, 100_000, 1_000_000, 10_000_000) if n <= options.most):
+        tiled = tiled_frame(measured.in_view(), n)
+        run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
+        seconds = medians(run, runs=options.runs if n <= 100_000 else 3)["ldls"]
+        base = seconds if n == 100_000 else base
+        ratio = f"{seconds / base:.1f} x" if base else ""
+        table.add_row(f"{n:,}", f"{seconds:.4f}", ratio, f"{extra_bytes(n) / n:.0f}")
+    return table
+
+
+def instances(measured: Frame, options: argparse.Namespace) -> Table:
+    """Time against the number of instances."""
+    params = ldls.Params(threads=options.threads)
+    table = new_table("time against instances, 100,000 points", ["instances", "ms"], f"{options.threads} threads")
+    for count in (0, 1, 5, 20, 100, 500):
+        tiled = tiled_frame(measured.in_view(), 100_000, count)
+        run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
+        table.add_row(str(count), f"{medians(run, runs=min(options.runs, 5))['ldls'] * 1e3:.1f}")
+    return table
+
+
+def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
+    """Time under random boxes that overlap, against the same boxes with each pixel left to one."""
+    n, params = min(options.most, 1_000_000), ldls.Params.paper(threads=options.threads)
+    table = new_table(
+        "20 random boxes, the paper's method",
+        ["frame", "seed of the boxes", "they overlap, s", "they do not, s", "ratio"],
+        f"medians; {options.threads} threads",
+    )
+    for each, seeds in ((tiled_frame(measured.in_view(), n, 0), range(8)), (street_frame(n), range(3))):
+        for seed in seeds:
+            boxes = overlapping_boxes(each, 20, seed)
+            sides = {
+                name: partial(ldls.segment, each.points, masks, each.camera, params=params)
+                for name, masks in (("over", boxes), ("alone", boxes.resolve_overlaps("area")))
+            }
+            found = medians(sides, runs=min(options.runs, 5))
+            ratio = f"{found['over'] / found['alone']:.2f} x"
+            table.add_row(each.name, str(seed), f"{found['over']:.3f}", f"{found['alone']:.3f}", ratio)
+    return table
+
+
+def threads(measured: Frame, options: argparse.Namespace) -> Table:
+    """Time against the number of threads."""
+    table = new_table(f"time against threads: {measured.name}", ["threads", "ms", "ratio to one"], "")
+    counts = [count for count in (1, 2, 4, 8, 16) if count <= options.threads]
+
+    def run(count: int) -> Callable[[], object]:
+        params = ldls.Params(threads=count)
+        return lambda: ldls.segment(measured.points, measured.masks, measured.camera, params=params)
+
+    found = {count: medians({"ldls": run(count)}, runs=options.runs)["ldls"] for count in counts}
+    for count, seconds in found.items():
+        table.add_row(str(count), f"{seconds * 1e3:.2f}", f"{found[1] / seconds:.2f} x")
+    return table
