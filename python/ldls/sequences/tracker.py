@@ -33,7 +33,7 @@ SAME = 0.3
 SAME_M = 1.0
 """The same in metres."""
 FEW_POINTS = 3
-"""Points of which so many or fewer on an object are part of it."""
+"""Points of which so many or fewer on an object are part of it, where both have labels of the same sweeps."""
 ON_M = 0.2
 """Mean distance, seen from above, up to which they are on it."""
 MOST_POINTS = 48
@@ -147,7 +147,7 @@ class Tracker:
             sightings: What is seen of each label.
             stamp: The moment, in seconds.
             going_on: Tracks that have a label at the moment or later. Another label goes on with one if it is in its
-                place, and they are joined with no other.
+                place or a few points on it, and they are joined with no other.
         """
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
         labels = list(sightings)
@@ -162,9 +162,9 @@ class Tracker:
                 costs[i, j], part[i, j] = self._apart(sightings[labels[i]].footprint, there)
         lengths = [sightings[label].footprint.length for label in labels]
         of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
-        same = part | (costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks)))
+        same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
         goes_on = np.array([track in going_on for track in self._tracks], bool)
-        costs[~same & goes_on] = np.inf
+        costs[goes_on & ~(same | part)] = np.inf
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
         rows, columns = self._assign(np.minimum(costs, NEAR_M))
         pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
