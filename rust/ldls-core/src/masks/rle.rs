@@ -276,7 +276,7 @@ pub(crate) fn check_size(height: usize, width: usize) -> Result<usize> {
 }
 
 /// Column-major positions at which `pixels`, row by row, switch between zeros and ones. Rows are compared with the rows
-/// above them, so that memory is read in its order; most of it is equal and passed over 32 pixels at a time.
+/// above them, so that memory is read in its order; most are equal, and of the others most is passed over 32 pixels at a time.
 fn switches(height: usize, width: usize, pixels: &[bool]) -> Vec<u32> {
     const CHUNK: usize = 32;
     let position = |row: usize, column: usize| (column * height + row) as u32;
@@ -291,6 +291,9 @@ fn switches(height: usize, width: usize, pixels: &[bool]) -> Vec<u32> {
     }
     for row in 1..height {
         let [above, pixels] = [row - 1, row].map(|r| &pixels[r * width..(r + 1) * width]);
+        if above == pixels {
+            continue;
+        }
         for (chunk, (a, b)) in above.chunks(CHUNK).zip(pixels.chunks(CHUNK)).enumerate() {
             if a != b {
                 let switched = (0..a.len()).filter(|&i| a[i] != b[i]);
