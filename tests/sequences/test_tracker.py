@@ -186,19 +186,31 @@ def test_a_second_label_beside_an_object_is_another():
     assert tracks_of(ldls.Tracker(), sweeps, together=3)[1] == [1, 2]
 
 
-def test_a_few_points_on_an_object_are_of_it():
-    """In the second of three sweeps three points at one end of a lorry have another label."""
+def lorry_with_a_second_label(shows):
+    """Sweeps of a lorry, and results in which three points at one end have another label where `shows` says so."""
     lorry = [((8, 0.2 * part), True) for part in range(-15, 16)]
-    sweeps = [sweep_at(0.1 * k, lorry) for k in range(3)]
+    sweeps = [sweep_at(0.1 * k, lorry) for k in range(len(shows))]
     results = []
-    for k, sweep in enumerate(sweeps):
+    for sweep, shown in zip(sweeps, shows, strict=True):
         (result,) = ldls.segment_sweeps([sweep], params=PARAMS)
         labels = np.where(result.labels > 0, 1, result.labels)
-        labels[:3] = 1 + (k == 1)
+        labels[:3] = 1 + shown
         results.append(replace(result, labels=labels, instances=result.instances[:2]))
+    return sweeps, results
+
+
+def test_a_few_points_on_an_object_are_of_it_within_sweeps_of_one_call():
+    sweeps, results = lorry_with_a_second_label([False, True, False])
     for result in ldls.Tracker().track(sweeps, results):
         assert result.instance_ids[1:].tolist() == [1, 1]
         assert set(result.labels.tolist()) == {1}
+
+
+def test_a_few_points_on_an_object_may_be_another_in_sweeps_apart():
+    tracker = ldls.Tracker()
+    for sweep, result in zip(*lorry_with_a_second_label([False, True, False, True]), strict=True):
+        (tracked,) = tracker.track([sweep], [result])
+    assert tracked.instance_ids[1:].tolist() == [1, 2]
 
 
 def test_what_stands_has_no_velocity_though_another_end_is_seen_soon():

@@ -71,7 +71,8 @@ class Tracker:
         An object that images overlook has points where it was, or went by its velocity, within 1.2 s of a sweep that
         shows it: if ten images did before, or three where the images of the sweep show nothing at all. Confidence there
         is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances. Two
-        instances in one place are one object: they have one number, and the points of both the label of the first.
+        instances in one place are one object, and so is one of three points or fewer with that on which they lie: they
+        have one number, and the points of both the label of the first.
 
         Args:
             sweeps: The next sweeps of the drive, in the order of their stamps.
