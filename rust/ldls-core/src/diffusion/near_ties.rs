@@ -6,7 +6,7 @@
 
 use super::equal_labels::Followed;
 use super::errors::Errors;
-use super::leaders::leaders;
+use super::leaders::{FEW, leaders};
 use super::series::Series;
 use super::winners::{Best, NearTies, Winners, candidates};
 use crate::graph::PointGraph;
@@ -20,9 +20,6 @@ const TOLERANCE: f64 = 1e-13;
 const FIRST_TOLERANCE: f64 = 1e-9;
 /// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision.
 const LEAD: f64 = 0.05;
-/// Points up to which there is a first one. More are those of masks that lie over one another, whose labels differ so little
-/// that it would leave them open, or not at all in much of the graph.
-pub(super) const FEW: usize = 1 << 10;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
 const NEGLIGIBLE: f32 = 1e-18;
 
@@ -43,6 +40,7 @@ pub(super) fn decide(
     let contested = ties.values().map(Vec::len).sum();
     settle_equal((a, b), best, &mut ties, cancel)?;
     let open: usize = ties.values().map(Vec::len).sum();
+    // of more than a few, labels differ so little that the first one would leave them open
     let first = (open <= FEW).then_some((trusted.last(), FIRST_TOLERANCE, LEAD));
     // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
     let last = (trusted.first(), TOLERANCE, 0.0);
