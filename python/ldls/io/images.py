@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
-from ldls import _ldls
+import ldls._ldls as _ldls
 from ldls.checks import checked
 from ldls.errors import CorruptFileError, LimitError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file, parsing
