@@ -38,13 +38,13 @@ def sweep_at(stamp, objects, *, order=None, pose=None, category=1):
     return ldls.Sweep(np.concatenate(clouds), [ldls.View(masks, WIDE)], pose, stamp)
 
 
-def tracks_of(tracker, sweeps, *, together=1):
+def tracks_of(tracker, sweeps, *, together=1, params=PARAMS):
     """Tracks of each sweep by the object whose points they are on; 0 for none."""
     rows = []
     for start in range(0, len(sweeps), together):
         window = sweeps[start : start + together]
         for sweep, result in zip(
-            window, tracker.track(window, ldls.segment_sweeps(window, params=PARAMS)), strict=True
+            window, tracker.track(window, ldls.segment_sweeps(window, params=params)), strict=True
         ):
             numbers = np.array([0, *(instance.track for instance in result.instances)])
             per_object = np.maximum(result.labels, 0).reshape(-1, 125)
@@ -165,6 +165,25 @@ def test_tracks_joined_within_a_window_have_one_number_in_all_of_it():
     alone, together = tracks_of(tracker, sweeps[:4]), tracks_of(tracker, sweeps[4:], together=2)
     assert alone[3] == [1, 1, 1, 2, 2]
     assert together == [[0, 0, 0, 1, 1], [1] * 5]
+
+
+def test_an_object_goes_on_as_what_it_is_near_in_all_sweeps_of_a_call():
+    """In the first of four sweeps one that drives off is nearer to where the other stood."""
+    tracker = ldls.Tracker()
+    tracks_of(tracker, [sweep_at(0.1 * k, [((8, 0), True)]) for k in range(3)])
+    places = [((8, 0 if k else 0.5), (8, -0.4 - 0.8 * k)) for k in range(4)]
+    sweeps = [sweep_at(0.3 + 0.1 * k, [(stands, True), (drives, True)]) for k, (stands, drives) in enumerate(places)]
+    labels = np.repeat(np.array([1, 2], np.int32), 125)
+    results = [replace(ldls.segment_sweeps([sweep], params=PARAMS)[0], labels=labels) for sweep in sweeps]
+    assert tracker.track(sweeps, results)[0].instance_ids[1:].tolist() == [1, 2]
+
+
+def test_objects_that_stand_keep_their_numbers_where_one_label_is_of_both():
+    apart = [car_at(k, 0, LEFT, RIGHT, ends_m=(1.8, 2.4)) for k in range(3)]
+    sweeps = [*apart, *(car_at(k, 0, (*LEFT, *RIGHT), ends_m=(1.8, 2.4)) for k in (3, 4))]
+    for together in (1, 3):
+        rows = tracks_of(ldls.Tracker(), sweeps, together=together, params=replace(PARAMS, remove_outliers=False))
+        assert [[row[part] for part in (*LEFT, *RIGHT)] for row in rows] == [[1, 1, 2, 2]] * 5
 
 
 def test_a_second_label_in_the_place_of_an_object_is_the_object():

@@ -1,7 +1,7 @@
-"""Labels of an object in sweeps whose images overlook it: those of its points at the nearest moment that shows it.
+"""Labels that other moments know better: of objects that images overlook, and of points that a mask gives to another.
 
-A segmenter misses an object for a while, or a camera has no image. What is known of other moments stays true: what
-stands still is where it was, and what moves is where its velocity takes it.
+A segmenter misses an object for a while, a camera has no image, or a mask shows two. What is known of other moments
+stays true: what stands still is where it was, and what moves is where its velocity takes it.
 """
 
 from __future__ import annotations
@@ -31,6 +31,12 @@ BELOW_M = 0.03
 """Height below the lowest point of an object from which on points are of the ground that it stands on."""
 WHOLE = 0.8
 """Share of the points of the nearest moment from which on an object is not overlooked."""
+AROUND = 12
+"""Points of earlier moments that say of which object a point is."""
+AROUND_M = 0.3
+"""Distance up to which they do."""
+OUTVOTED = 2
+"""How many times as many of another object as of its own there must be."""
 CONFIDENCE = 0.85
 """Share of the points labelled in this way whose label is right, on drives with a fifth of the masks left out."""
 
@@ -121,6 +127,44 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
         found[free[nearer]] = number
         distances[free[nearer]] = to_own[nearer]
     return found
+
+
+def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequence[Track]) -> list[Ints]:
+    """(n,) number of another object for each point of each moment that is rather of that; 0 for all others.
+
+    A mask shows points of the next object too, and two objects have one label for a while. A point of what stands is
+    rather of another such object of its category if of the earlier points around it more than twice as many are.
+
+    Args:
+        moments: The moments.
+        before: Earlier ones, which were not segmented with them.
+        tracks: The objects that are known.
+    """
+    (points, numbers), (there, known) = _together(moments), _together(before)
+    found = np.zeros(len(numbers), np.int64)
+    standing: dict[int, list[int]] = {}
+    for track in tracks:
+        if not track.velocity.any():
+            standing.setdefault(track.instance.category, []).append(track.number)
+    for of_category in standing.values():
+        rows, others = (np.flatnonzero(np.isin(each, of_category)) for each in (numbers, known))
+        if len(of_category) == 1 or not len(rows) or not len(others):
+            continue
+        tree = require("scipy.spatial", "eval").KDTree(there[others])
+        _, nearest = tree.query(points[rows], AROUND, distance_upper_bound=AROUND_M)
+        # where fewer are so near, the tree says that they are after the last
+        around = np.append(known[others], 0)[nearest]
+        votes = np.sum(around[:, :, None] == around[:, None, :], axis=2) * (around > 0)
+        most = (np.arange(len(rows)), votes.argmax(axis=1))
+        of_own = np.sum(around == numbers[rows, None], axis=1)
+        found[rows] = np.where(votes[most] > OUTVOTED * of_own, around[most], 0)
+    return np.split(found, np.cumsum([len(each.points) for each in moments])[:-1])
+
+
+def _together(moments: Sequence[Moment]) -> tuple[Floats, Ints]:
+    """Points of all moments, and the number of the object of each."""
+    points = np.concatenate([np.empty((0, 3)), *(each.points for each in moments)])
+    return points, np.concatenate([np.empty(0, np.int64), *(each.tracks for each in moments)])
 
 
 def _distances(points: Floats, others: Floats) -> Floats:

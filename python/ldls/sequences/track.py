@@ -110,8 +110,12 @@ class Track:
 
     def at(self, stamp: float) -> Footprint:
         """Where the points of all its sightings are at a moment."""
-        moved = [own.points + self.velocity * (stamp - then) for then, own, _ in self.sightings]
-        return Footprint(np.concatenate(moved))
+        return brought(self.sightings, self.velocity, stamp)
+
+
+def brought(sightings: Sequence[Sighting], velocity: Floats, stamp: float) -> Footprint:
+    """Where the points of all sightings are at a moment, at a velocity."""
+    return Footprint(np.concatenate([own.points + velocity * (stamp - then) for then, own, _ in sightings]))
 
 
 def _velocity(sightings: Sequence[Sighting]) -> Floats:
@@ -122,13 +126,14 @@ def _velocity(sightings: Sequence[Sighting]) -> Floats:
     """
     stamps = np.array([each.stamp - sightings[-1].stamp for each in sightings])
     counts = np.array([len(each.footprint.points) for each in sightings])
-    since = stamps - np.average(stamps, weights=counts)
-    spread = float(counts * since @ since)
+    shares = counts / counts.sum()
+    since = stamps - shares @ stamps
+    spread = float(shares * since @ since)
     if spread == 0:
         return np.zeros(2)
     middles = np.array([each.footprint.middle for each in sightings])
-    slope: Floats = counts * since @ middles / spread
-    if _variance(middles - np.outer(since, slope), counts) > MOVES * _variance(middles, counts):
+    slope: Floats = shares * since @ middles / spread
+    if _variance(middles - np.outer(since, slope), shares) > MOVES * _variance(middles, shares):
         return np.zeros(2)
     first, last = sightings[0], sightings[-1]
     way = slope * (last.stamp - first.stamp)
@@ -137,10 +142,9 @@ def _velocity(sightings: Sequence[Sighting]) -> Floats:
     return slope if moves and SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
 
 
-def _variance(middles: Floats, counts: NDArray[np.int64]) -> float:
-    """Mean squared distance of middles from theirs, where each counts so many times."""
-    away = middles - np.average(middles, axis=0, weights=counts)
-    return float(np.average(np.sum(away**2, axis=1), weights=counts))
+def _variance(middles: Floats, shares: Floats) -> float:
+    """Mean squared distance of middles from theirs, where each has a share."""
+    return float(shares @ np.sum((middles - shares @ middles) ** 2, axis=1))
 
 
 def _apart(one: Floats, other: Floats) -> float:

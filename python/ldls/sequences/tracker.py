@@ -1,10 +1,10 @@
 """The objects of a drive: one number for each in all sweeps, through gaps of some seconds.
 
-Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds,
-moved to the moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
+Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds, all
+moved to one moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
 Tracks of one object are joined. Within sweeps that were segmented together an object keeps its label, and so its
-number; a label that begins later goes on with a track that has none then, or in whose very place it is. Sweeps whose
-images overlook an object have its label too (propagation.py).
+number; a label that begins later goes on with a track that has none then, or in whose very place it is. Other moments
+say more of points that images overlook, or give to another object (propagation.py).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
-from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, Ints, Moment, overlooked
+from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, Ints, Moment, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import Footprint, Sighting, Track
+from ldls.sequences.track import Footprint, Sighting, Track, brought
 
 LONGEST_GAP_S = 5.0
 """Time without a point after which a track ends."""
@@ -70,7 +70,8 @@ class Tracker:
 
         An object that images overlook has points where it was, or went by its velocity, within 1.2 s of a sweep that
         shows it: if ten images did before, or three where the images of the sweep show nothing at all. Confidence there
-        is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances. Two
+        is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances. A
+        point of what stands, around which earlier points are of another such object, has the label of that. Two
         instances in one place are one object, and so is one of three points or fewer with that on which they lie: they
         have one number, and the points of both the label of the first.
 
@@ -97,13 +98,15 @@ class Tracker:
         of_number = {number: label for label, number in sorted(numbers.items(), reverse=True)}
         results = [_relabelled(result, {label: of_number[numbers[label]] for label in numbers}) for result in results]
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
-        self._moments = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S] + moments
-        found = [overlooked(moment, self._moments, self._tracks) for moment in moments]
+        known = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S]
+        self._moments = known + moments
+        others = mistaken(moments, known, self._tracks)
+        found = [overlooked(m, self._moments, self._tracks) + other for m, other in zip(moments, others, strict=True)]
         added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
         tracked = []
         for result, moment, rows in zip(results, moments, found, strict=True):
-            known = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
-            tracked.append(replace(_completed(result, moment, rows, of_number), instances=(*known, *added)))
+            own = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
+            tracked.append(replace(_completed(result, moment, rows, of_number), instances=(*own, *added)))
         return tuple(tracked)
 
     def _added(self, found: Ints, of_number: dict[int, int], known: int) -> list[Instance]:
@@ -127,7 +130,8 @@ class Tracker:
         last = {label: at for at, own in enumerate(seen) for label in own}
         by_label: dict[int, Track] = {}
         for at, (stamp, own) in enumerate(zip(stamps, seen, strict=True)):
-            new = {label: sighting for label, sighting in own.items() if label not in by_label}
+            begin = [label for label in own if label not in by_label]
+            new = {label: [each[label] for each in seen[at:] if label in each] for label in begin}
             going_on = {track for label, track in by_label.items() if last[label] >= at}
             by_label |= self._matched(instances, new, stamp, going_on)
             for label, sighting in own.items():
@@ -137,7 +141,7 @@ class Tracker:
     def _matched(
         self,
         instances: Mapping[int, Instance],
-        sightings: Mapping[int, Sighting],
+        sightings: Mapping[int, Sequence[Sighting]],
         stamp: float,
         going_on: Set[Track],
     ) -> dict[int, Track]:
@@ -145,7 +149,7 @@ class Tracker:
 
         Args:
             instances: That of each label.
-            sightings: What is seen of each label.
+            sightings: What is seen of each label, then and later.
             stamp: The moment, in seconds.
             going_on: Tracks that have a label at the moment or later. Another label goes on with one if it is in its
                 place or a few points on it, and they are joined with no other.
@@ -153,19 +157,22 @@ class Tracker:
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
         labels = list(sightings)
         costs = np.full((len(labels), len(self._tracks)), np.inf)
-        part = np.zeros(costs.shape, bool)
+        on = np.zeros(costs.shape, bool)
         for j, track in enumerate(self._tracks):
             like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
             if not like:
                 continue
             there = track.at(stamp)
             for i in like:
-                costs[i, j], part[i, j] = self._apart(sightings[labels[i]].footprint, there)
-        lengths = [sightings[label].footprint.length for label in labels]
+                own = brought(sightings[labels[i]], track.velocity, stamp)
+                costs[i, j], on[i, j] = self._apart(own, there)
+        first = [sightings[label][0].footprint for label in labels]
+        few = np.array([len(footprint.points) <= FEW_POINTS for footprint in first], bool)
+        lengths = [footprint.length for footprint in first]
         of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
         same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
         goes_on = np.array([track in going_on for track in self._tracks], bool)
-        costs[goes_on & ~(same | part)] = np.inf
+        costs[goes_on & ~(same | on & few[:, None])] = np.inf
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
         rows, columns = self._assign(np.minimum(costs, NEAR_M))
         pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
@@ -217,7 +224,7 @@ class Tracker:
             return float("inf"), False
         middle = np.linalg.norm(one.middle - other.middle)
         apart = float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
-        return apart, len(few) <= FEW_POINTS and bool(distances.mean() < ON_M)
+        return apart, bool(distances.mean() < ON_M)
 
 
 def _relabelled(result: Segmentation, label_of: Mapping[int, int]) -> Segmentation:
@@ -233,8 +240,8 @@ def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Map
     if not len(new):
         return result
     labels, confidence, rows = result.labels.copy(), result.confidence.copy(), moment.rows[new]
+    confidence[rows] = np.where(labels[rows] > 0, confidence[rows], CONFIDENCE)
     labels[rows] = [of_number[number] for number in found[new].tolist()]
-    confidence[rows] = CONFIDENCE
     return replace(result, labels=labels, confidence=confidence)
 
 
