@@ -133,7 +133,8 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
     """(n,) number of another object for each point of each moment that is rather of that; 0 for all others.
 
     A mask shows points of the next object too, and two objects have one label for a while. A point of what stands is
-    rather of another such object of its category if of the earlier points around it more than twice as many are.
+    rather of another such object of its category if of the earlier points around it more than twice as many are. An
+    object that has none yet keeps its own.
 
     Args:
         moments: The moments.
@@ -147,7 +148,8 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
         if not track.velocity.any():
             standing.setdefault(track.instance.category, []).append(track.number)
     for of_category in standing.values():
-        rows, others = (np.flatnonzero(np.isin(each, of_category)) for each in (numbers, known))
+        others = np.flatnonzero(np.isin(known, of_category))
+        rows = np.flatnonzero(np.isin(numbers, known[others]))
         if len(of_category) == 1 or not len(rows) or not len(others):
             continue
         tree = require("scipy.spatial", "eval").KDTree(there[others])
