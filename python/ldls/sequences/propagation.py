@@ -150,7 +150,8 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
     for of_category in standing.values():
         others = np.flatnonzero(np.isin(known, of_category))
         rows = np.flatnonzero(np.isin(numbers, known[others]))
-        if len(of_category) == 1 or not len(rows) or not len(others):
+        rows = rows[_beside(points[rows], numbers[rows], there[others], known[others])]
+        if not len(rows):
             continue
         tree = require("scipy.spatial", "eval").KDTree(there[others])
         _, nearest = tree.query(points[rows], AROUND, distance_upper_bound=AROUND_M)
@@ -161,6 +162,16 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
         of_own = np.sum(around == numbers[rows, None], axis=1)
         found[rows] = np.where(votes[most] > OUTVOTED * of_own, around[most], 0)
     return np.split(found, np.cumsum([len(each.points) for each in moments])[:-1])
+
+
+def _beside(points: Floats, numbers: Ints, there: Floats, known: Ints) -> NDArray[np.bool_]:
+    """(n,) whether the points of objects, each of its number, are in the box of those known of another."""
+    beside = np.zeros(len(points), bool)
+    for number in np.unique(known):
+        own = there[known == number]
+        inside = np.all((points >= own.min(axis=0) - AROUND_M) & (points <= own.max(axis=0) + AROUND_M), axis=1)
+        beside |= inside & (numbers != number)
+    return beside
 
 
 def _together(moments: Sequence[Moment]) -> tuple[Floats, Ints]:
