@@ -7,7 +7,7 @@ import pytest
 
 import ldls
 from conftest import pinhole
-from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES
+from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES, Moment, mistaken
 from ldls.sequences.track import Footprint, Sighting, Track
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
@@ -184,6 +184,21 @@ def test_objects_that_stand_keep_their_numbers_where_one_label_is_of_both():
     for together in (1, 3):
         rows = tracks_of(ldls.Tracker(), sweeps, together=together, params=replace(PARAMS, remove_outliers=False))
         assert [[row[part] for part in (*LEFT, *RIGHT)] for row in rows] == [[1, 1, 2, 2]] * 5
+
+
+def test_an_object_that_begins_keeps_its_points_where_another_was():
+    (result,) = ldls.segment_sweeps([sweep_at(0.0, [((8, 0), True)])], params=PARAMS)
+    tracks = [Track(number, result.instances[0]) for number in (1, 2)]
+    points = box_of_points(8, 0)
+
+    def moment(stamp, number, other=None):
+        numbers = np.full(len(points), number)
+        numbers[-1] = other or number
+        return Moment(stamp, points, numbers, np.arange(len(points)), {}, blind=False)
+
+    assert not mistaken([moment(0.1, 2)], [moment(0.0, 1)], tracks)[0].any()
+    # with a point of its own before it is known, and outvoted
+    assert set(mistaken([moment(0.1, 2)], [moment(0.0, 1, other=2)], tracks)[0].tolist()) >= {1}
 
 
 def test_a_second_label_in_the_place_of_an_object_is_the_object():

@@ -31,14 +31,14 @@ BELOW_M = 0.03
 """Height below the lowest point of an object from which on points are of the ground that it stands on."""
 WHOLE = 0.8
 """Share of the points of the nearest moment from which on an object is not overlooked."""
+CONFIDENCE = 0.85
+"""Share of the overlooked points whose label is right, on drives with a fifth of the masks left out."""
 AROUND = 12
-"""Points of earlier moments that say of which object a point is."""
+"""Most points of earlier moments that say of which object a point is that has a label."""
 AROUND_M = 0.3
 """Distance up to which they do."""
 OUTVOTED = 2
 """How many times as many of another object as of its own there must be."""
-CONFIDENCE = 0.85
-"""Share of the points labelled in this way whose label is right, on drives with a fifth of the masks left out."""
 
 Ints = NDArray[np.int64]
 

@@ -100,6 +100,7 @@ class Tracker:
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
         known = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S]
         self._moments = known + moments
+        # of points with a label, and of those without
         others = mistaken(moments, known, self._tracks)
         found = [overlooked(m, self._moments, self._tracks) + other for m, other in zip(moments, others, strict=True)]
         added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
@@ -211,10 +212,10 @@ class Tracker:
         return self._tracks[-1]
 
     def _apart(self, one: Footprint, other: Footprint) -> tuple[float, bool]:
-        """How far apart objects are in metres, infinite beyond `NEAR_M`, and whether one is a few points on the other.
+        """How far apart objects are in metres, infinite beyond `NEAR_M`, and whether one lies on the other.
 
-        The former is the mean of two distances: of the points of the smaller to the nearest of the other, and of the
-        middles.
+        The former is the mean of two distances: of the points of the one of fewer to the nearest of the other, and of
+        the middles.
         """
         if one.gap(other) > NEAR_M:
             return float("inf"), False
