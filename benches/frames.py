@@ -72,7 +72,7 @@ def tiled_points(points: NDArray[np.float32], n: int) -> NDArray[np.float32]:
 
 
 def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Frame:
-    """`n` points tiled from `points`, all in view of one camera high above them, and masks in a grid."""
+    """`n` points tiled from `points`, all in view of one camera high above them, and masks in a grid over them."""
     size = 2000
     cloud = tiled_points(points, n)
     low, high = cloud.min(axis=0), cloud.max(axis=0)
@@ -84,16 +84,22 @@ def tiled_frame(points: NDArray[np.float32], n: int, instances: int = 20) -> Fra
         projection=[[focal_px, 0, size / 2], [0, focal_px, size / 2], [0, 0, 1]], T_camera_lidar=transform
     )
     _, pixels = ldls.stages.project(cloud, camera, image_size=(size, size))
-    low, high = pixels.min(axis=0), pixels.max(axis=0)
-    # a grid of masks over what the points fill, each half as wide and high as its cell: instances seldom overlap
+    # a grid of masks that hardly overlap: each shows the middle half of its row of the middle half of its column
     columns = int(np.ceil(np.sqrt(2 * instances)))
     rows = -(-instances // max(columns, 1))
-    cell, quarter = (high - low) / np.maximum([columns, rows], 1), 0.25
     masks = np.zeros((instances, size, size), bool)
     for m, mask in enumerate(masks):
-        left, top = (low + cell * [m % columns + quarter, m // columns + quarter]).astype(int)
-        mask[top : top + max(int(cell[1] / 2), 1), left : left + max(int(cell[0] / 2), 1)] = True
+        left, right = _middle_half(pixels[:, 0], m % columns, columns)
+        in_column = (pixels[:, 0] >= left) & (pixels[:, 0] <= right)
+        top, bottom = _middle_half(pixels[in_column, 1], m // columns, rows)
+        mask[top : bottom + 1, left : right + 1] = True
     return Frame(f"{n:,} points tiled", cloud, ldls.InstanceMasks.from_array(masks), camera)
+
+
+def _middle_half(values: NDArray[np.float32], part: int, parts: int) -> tuple[int, int]:
+    """Where the middle half of one of `parts` equal parts of `values` begins and ends."""
+    low, high = np.quantile(values, [(part + 0.25) / parts, (part + 0.75) / parts])
+    return int(low), int(high)
 
 
 def street_frame(n: int) -> Frame:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
+from statistics import median
 
 import numpy as np
 from rich.table import Table
@@ -13,6 +15,7 @@ import ldls
 from benches.frames import Frame, overlapping_boxes, street_frame, suite_frames, tiled_frame
 from benches.measuring import medians
 from benches.memory import extra_bytes
+from benches.runs import one_a_thread
 from benches.tables import new_table
 
 
@@ -96,15 +99,34 @@ def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
 
 
 def threads(measured: Frame, options: argparse.Namespace) -> Table:
-    """Time against the number of threads."""
-    table = new_table(f"time against threads: {measured.name}", ["threads", "ms", "ratio to one"], "")
-    counts = [count for count in (1, 2, 4, 8, 16) if count <= options.threads]
+    """Times against the number of threads: of the frame and its stages, of clouds, and of a frame of a batch."""
+    counts = [count for count in (1, 2, 4, 8, 16, 32, 64) if count <= options.threads]
+    table = new_table(
+        f"ms against threads: {measured.name}",
+        ["", *map(str, counts)],
+        "and how many times faster than on one; clouds and batches with the defaults",
+    )
+    laps: dict[int, list[Mapping[str, float]]] = {count: [] for count in counts}
 
-    def run(count: int) -> Callable[[], object]:
-        params = ldls.Params(threads=count)
-        return lambda: ldls.segment(measured.points, measured.masks, measured.camera, params=params)
+    def segment(frame: Frame, params: ldls.Params, count: int) -> None:
+        params = replace(params, threads=count)
+        laps[count].append(ldls.segment(frame.points, frame.masks, frame.camera, params=params).timings)
 
-    found = {count: medians({"ldls": run(count)}, runs=options.runs)["ldls"] for count in counts}
-    for count, seconds in found.items():
-        table.add_row(str(count), f"{seconds * 1e3:.2f}", f"{found[1] / seconds:.2f} x")
+    def add(name: str, frame: Frame, params: ldls.Params, runs: int) -> None:
+        calls = {count: partial(segment, frame, params, count) for count in counts}
+        add_row(name, medians(calls, runs=runs))
+
+    def add_row(name: str, seconds: Mapping[int, float]) -> None:
+        one = seconds[counts[0]]
+        table.add_row(name, *(f"{1e3 * each:.2f} ({one / each:.1f} x)" for each in seconds.values()))
+
+    add("the paper's method", measured, ldls.Params.paper(), options.runs)
+    for stage in laps[counts[0]][0]:
+        add_row(f"  {stage}", {count: median(lap[stage] for lap in laps[count][1:]) for count in counts})
+    add("the defaults", measured, ldls.Params(), options.runs)
+    for n in (n for n in (100_000, 1_000_000, 10_000_000) if n <= options.most):
+        add(f"{n:,} points", tiled_frame(measured.in_view(), n), ldls.Params(), 3)
+    batches = {count: partial(one_a_thread, measured, 8 * count, count) for count in counts}
+    seconds = medians(batches, runs=min(options.runs, 7))
+    add_row("a frame of a batch, one a thread", {count: seconds[count] / (8 * count) for count in counts})
     return table
