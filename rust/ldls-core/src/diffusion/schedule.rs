@@ -16,7 +16,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
 
 /// Fewest rows for a task of the thread pool.
-pub(super) const ROWS_A_TASK: usize = 2048;
+pub(super) const ROWS_A_TASK: usize = 512;
 /// Rows of a block.
 pub(super) const BLOCK: usize = 16;
 /// Rows of a tile.
@@ -24,7 +24,7 @@ const TILE: usize = 4 * BLOCK;
 /// Blocks between two looks at the flag.
 const BLOCKS_A_LOOK: usize = 4096;
 /// Fewest blocks for a task of the thread pool.
-const BLOCKS_A_TASK: usize = ROWS_A_TASK / BLOCK;
+pub(super) const BLOCKS_A_TASK: usize = ROWS_A_TASK / BLOCK;
 /// Tiles of a region: some 16 MB of values and edges.
 const REGION: usize = 32768 / TILE;
 /// Steps that a region takes at a time.

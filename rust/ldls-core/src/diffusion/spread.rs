@@ -1,6 +1,6 @@
 //! Where labels come to from their seeds, one edge farther with every step.
 
-use super::schedule::{BLOCK, Schedule};
+use super::schedule::{BLOCK, BLOCKS_A_TASK, Schedule};
 use crate::bits::ones;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
@@ -147,19 +147,12 @@ impl<'a, T: Real> Spread<'a, T> {
 
     /// Takes a step; false if it led nowhere.
     fn advance(&mut self) -> Result<bool> {
-        let mut new = Vec::new();
-        for block in take(&mut self.awake) {
-            let near = take(&mut self.near[block as usize]);
-            for row in self.rows(block as usize) {
-                let missing = near & !self.come[row];
-                if missing != 0 {
-                    let from = self.a.row(row).map(|(column, _)| self.come[column]);
-                    let labels = missing & from.fold(0, |any, come| any | come);
-                    if labels != 0 {
-                        push(&mut new, (row, labels))?;
-                    }
-                }
-            }
+        let awake = take(&mut self.awake);
+        let new = awake.par_chunks(BLOCKS_A_TASK);
+        let new = new.map(|blocks| self.come_next(blocks));
+        let new: Vec<(usize, u32)> = new.collect::<Result<Vec<_>>>()?.concat();
+        for block in awake {
+            self.near[block as usize] = 0;
         }
         for &(row, labels) in &new {
             self.come[row] |= labels;
@@ -170,6 +163,24 @@ impl<'a, T: Real> Spread<'a, T> {
             self.wake(block, rows.iter().fold(0, |any, (_, labels)| any | labels))?;
         }
         Ok(!new.is_empty())
+    }
+
+    /// Rows of `blocks` that labels come to in the next step, and which.
+    fn come_next(&self, blocks: &[u32]) -> Result<Vec<(usize, u32)>> {
+        let mut new = Vec::new();
+        for &block in blocks {
+            for row in self.rows(block as usize) {
+                let missing = self.near[block as usize] & !self.come[row];
+                if missing != 0 {
+                    let from = self.a.row(row).map(|(column, _)| self.come[column]);
+                    let labels = missing & from.fold(0, |any, come| any | come);
+                    if labels != 0 {
+                        push(&mut new, (row, labels))?;
+                    }
+                }
+            }
+        }
+        Ok(new)
     }
 
     /// The blocks that each of so many labels has come to.

@@ -1,7 +1,8 @@
 //! The local offset of the ground from its smooth surface: kerbs, lawns, ramps.
 
-use crate::memory::{filled, with_room, zeros};
+use crate::memory::{push, tabulate, with_room, zeros};
 use crate::{Cancel, Result};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -23,9 +24,10 @@ const NOISE_M: f64 = 0.03;
 
 /// Points between two looks at the flag.
 const POINTS_A_BLOCK: usize = 1 << 16;
+/// Fewest points for a task of the thread pool.
+const POINTS_A_TASK: usize = 4096;
 
 type Cell = (i64, i64);
-type Cells = HashMap<Cell, usize, BuildHasherDefault<CellHasher>>;
 type Histogram = [u32; STEPS];
 
 /// Heights of the ground around a cell above the smooth surface, ascending; infinite where there are no more.
@@ -33,8 +35,8 @@ type Levels = [f64; MOST_LEVELS];
 
 /// Turns `heights` of `places` above the smooth surface, in metres, into those above the ground around each.
 pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -> Result<()> {
-    let (numbers, cells) = number_cells(places, cancel)?;
-    let mut counts: Vec<Histogram> = zeros(cells.len(), cancel)?;
+    let (cells, numbers) = Cells::of(places, cancel)?;
+    let mut counts: Vec<Histogram> = zeros(cells.all.len(), cancel)?;
     for (&number, height) in numbers.iter().zip(heights.iter()) {
         let step = (height + NEAR_M) / STEP_M;
         if (0.0..STEPS as f64).contains(&step) {
@@ -42,34 +44,64 @@ pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -
         }
     }
     cancel.check()?;
-    let mut levels = filled([f64::INFINITY; MOST_LEVELS], cells.len(), cancel)?;
-    for (&cell, &number) in &cells {
-        levels[number] = levels_of(&around(&counts, &cells, cell));
-    }
-    for (height, number) in heights.iter_mut().zip(numbers) {
-        *height -= below(*height, &levels[number as usize]);
-    }
+    let of_cell = |number| levels_of(&cells.around(&counts, number));
+    let levels = tabulate(cells.all.len(), of_cell, cancel)?;
+    let heights = heights.par_iter_mut().zip(numbers);
+    let heights = heights.with_min_len(POINTS_A_TASK);
+    heights.for_each(|(height, number)| *height -= below(*height, &levels[number as usize]));
     Ok(())
 }
 
-/// The number of the cell of each place, and of each cell that has one.
-fn number_cells(places: &[[f64; 3]], cancel: &Cancel) -> Result<(Vec<u32>, Cells)> {
-    let mut cells = Cells::default();
-    let mut numbers = with_room(places.len())?;
-    let mut last = ((i64::MIN, i64::MIN), 0);
-    for block in places.chunks(POINTS_A_BLOCK) {
-        cancel.check()?;
-        numbers.extend(block.iter().map(|place| {
+/// The cells that hold places, by number, and the number of each.
+#[derive(Default)]
+struct Cells {
+    all: Vec<Cell>,
+    numbers: HashMap<Cell, u32, BuildHasherDefault<CellHasher>>,
+}
+
+impl Cells {
+    /// The cells of `places`, and the number of the cell of each place.
+    fn of(places: &[[f64; 3]], cancel: &Cancel) -> Result<(Self, Vec<u32>)> {
+        let (mut cells, mut numbers) = (Self::default(), with_room(places.len())?);
+        let mut last = ((i64::MIN, i64::MIN), 0);
+        for (at, place) in places.iter().enumerate() {
+            if at % POINTS_A_BLOCK == 0 {
+                cancel.check()?;
+            }
             let cell = cell(place);
             // neighbours on a scan line share a cell
             if cell != last.0 {
-                let next = cells.len();
-                last = (cell, *cells.entry(cell).or_insert(next));
+                last = (cell, cells.number(cell)?);
             }
-            last.1 as u32
-        }));
+            numbers.push(last.1);
+        }
+        Ok((cells, numbers))
     }
-    Ok((numbers, cells))
+
+    /// The number of `cell`, which gets one where it has none.
+    fn number(&mut self, cell: Cell) -> Result<u32> {
+        let next = self.all.len() as u32;
+        let number = *self.numbers.entry(cell).or_insert(next);
+        if number == next {
+            push(&mut self.all, cell)?;
+        }
+        Ok(number)
+    }
+
+    /// The heights counted in the cell of a number and the eight around it.
+    fn around(&self, counts: &[Histogram], number: usize) -> Histogram {
+        let (column, row) = self.all[number];
+        let mut sum = [0; STEPS];
+        for at in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (column + dx, row + dy))) {
+            let Some(&number) = self.numbers.get(&at) else {
+                continue;
+            };
+            sum.iter_mut()
+                .zip(&counts[number as usize])
+                .for_each(|(sum, count)| *sum += count);
+        }
+        sum
+    }
 }
 
 fn cell([x, y, _]: &[f64; 3]) -> Cell {
@@ -79,20 +111,6 @@ fn cell([x, y, _]: &[f64; 3]) -> Cell {
         cell - i64::from(axis / CELL_M < cell as f64)
     };
     (along(x), along(y))
-}
-
-/// The heights counted in a cell and the eight around it.
-fn around(counts: &[Histogram], cells: &Cells, (column, row): Cell) -> Histogram {
-    let mut sum = [0; STEPS];
-    for at in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (column + dx, row + dy))) {
-        let Some(&number) = cells.get(&at) else {
-            continue;
-        };
-        sum.iter_mut()
-            .zip(&counts[number])
-            .for_each(|(sum, count)| *sum += count);
-    }
-    sum
 }
 
 /// The mean heights of the lowest layers that are fuller than those beside them, and full enough to be the ground.
