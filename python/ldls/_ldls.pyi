@@ -38,6 +38,7 @@ __all__ = [
     "remove_outliers",
     "segment",
     "unpack_laz",
+    "upright_box",
 ]
 
 __version__: str
@@ -136,6 +137,7 @@ def panic_in_worker() -> None: ...
 def brought_together(
     clouds: list[_Points], matrices: list[list[list[float]]], keep_origin: bool
 ) -> NDArray[np.float64]: ...
+def upright_box(points: NDArray[np.float64]) -> tuple[list[float], list[float], float]: ...
 def project(
     points: _Points,
     camera: Camera,

@@ -26,6 +26,7 @@ mod ring;
 mod segment;
 #[cfg(test)]
 mod test_support;
+mod upright_box;
 
 pub use cancel::Cancel;
 pub use confidence::calibrated_confidence;
@@ -44,6 +45,7 @@ pub use real::Real;
 pub use report::{Report, Timings};
 pub use ring::{Objects, View};
 pub use segment::{Segmentation, segment};
+pub use upright_box::UprightBox;
 
 /// Result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;

@@ -27,7 +27,7 @@ mod _ldls {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
-    use crate::clouds::brought_together;
+    use crate::clouds::{brought_together, upright_box};
     #[pymodule_export]
     use crate::laz::unpack_laz;
     #[pymodule_export]
