@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -49,7 +50,7 @@ class Moment:
 
     Attributes:
         stamp: Time of the sweep in seconds.
-        points: (n, 3) x y z in metres, ascending along x.
+        points: (n, 3) x y z in metres, all x before all y in memory.
         tracks: (n,) number of the object of each point; 0 of none.
         rows: (n,) row of each in the points of its sweep.
         counts: Points of each object.
@@ -66,15 +67,20 @@ class Moment:
     @classmethod
     def of(cls, sweep: Sweep, result: Segmentation, numbers: Mapping[int, int]) -> Self:
         """The moment of a sweep whose labels stand for objects of these `numbers`."""
-        xyz = transformed(result.points[result.in_view], sweep.pose)
-        order = np.argsort(xyz[:, 0], kind="stable")
-        rows = result.in_view[order]
+        rows = result.in_view
+        xyz = np.asfortranarray(transformed(result.points[rows], sweep.pose))
         of_label = np.zeros(len(result.instances) + 1, np.int64)
         of_label[list(numbers)] = list(numbers.values())
         tracks = of_label[np.maximum(result.labels[rows], 0)]
-        each, counts = np.unique(tracks[tracks > 0], return_counts=True)
+        counts = np.bincount(tracks)
+        each = 1 + np.flatnonzero(counts[1:])
         blind = not any(instance.sources for instance in result.instances)
-        return cls(sweep.stamp, xyz[order], tracks, rows, dict(zip(each.tolist(), counts.tolist(), strict=True)), blind)
+        return cls(sweep.stamp, xyz, tracks, rows, dict(zip(each.tolist(), counts[each].tolist(), strict=True)), blind)
+
+    @cached_property
+    def labelled(self) -> Ints:
+        """Indices of the points of objects."""
+        return np.flatnonzero(self.tracks)
 
     def renumbered(self, number: int, other: int) -> Self:
         """The same, where an object of a number has another, which may be there too."""
@@ -86,9 +92,10 @@ class Moment:
 
     def within(self, low: Floats, high: Floats) -> Ints:
         """Indices of the points in a box."""
-        first, last = np.searchsorted(self.points[:, 0], (low[0], high[0]))
-        _, y, z = self.points[first:last].T
-        inside: Ints = first + np.flatnonzero((y >= low[1]) & (y <= high[1]) & (z >= low[2]) & (z <= high[2]))
+        x = self.points[:, 0]
+        inside: Ints = np.flatnonzero((x >= low[0]) & (x <= high[0]))
+        _, y, z = self.points[inside].T
+        inside = inside[(y >= low[1]) & (y <= high[1]) & (z >= low[2]) & (z <= high[2])]
         return inside
 
 
@@ -141,7 +148,7 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
         before: Earlier ones, which were not segmented with them.
         tracks: The objects that are known.
     """
-    (points, numbers), (there, known) = _together(moments), _together(before)
+    (points, numbers), (there, known) = _labelled(moments), _labelled(before)
     found = np.zeros(len(numbers), np.int64)
     standing: dict[int, list[int]] = {}
     for track in tracks:
@@ -149,7 +156,7 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
             standing.setdefault(track.instance.category, []).append(track.number)
     for of_category in standing.values():
         others = np.flatnonzero(np.isin(known, of_category))
-        rows = np.flatnonzero(np.isin(numbers, known[others]))
+        rows = np.flatnonzero(np.isin(numbers, np.unique(known[others])))
         rows = rows[_beside(points[rows], numbers[rows], there[others], known[others])]
         if not len(rows):
             continue
@@ -161,7 +168,11 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
         most = (np.arange(len(rows)), votes.argmax(axis=1))
         of_own = np.sum(around == numbers[rows, None], axis=1)
         found[rows] = np.where(votes[most] > OUTVOTED * of_own, around[most], 0)
-    return np.split(found, np.cumsum([len(each.points) for each in moments])[:-1])
+    all_found = [np.zeros(len(each.points), np.int64) for each in moments]
+    ends = np.cumsum([len(each.labelled) for each in moments])
+    for of_moment, moment, of_labelled in zip(all_found, moments, np.split(found, ends[:-1]), strict=True):
+        of_moment[moment.labelled] = of_labelled
+    return all_found
 
 
 def _beside(points: Floats, numbers: Ints, there: Floats, known: Ints) -> NDArray[np.bool_]:
@@ -174,10 +185,10 @@ def _beside(points: Floats, numbers: Ints, there: Floats, known: Ints) -> NDArra
     return beside
 
 
-def _together(moments: Sequence[Moment]) -> tuple[Floats, Ints]:
-    """Points of all moments, and the number of the object of each."""
-    points = np.concatenate([np.empty((0, 3)), *(each.points for each in moments)])
-    return points, np.concatenate([np.empty(0, np.int64), *(each.tracks for each in moments)])
+def _labelled(moments: Sequence[Moment]) -> tuple[Floats, Ints]:
+    """Points of objects, of all moments, and the number of the object of each."""
+    points = np.concatenate([np.empty((0, 3)), *(each.points[each.labelled] for each in moments)])
+    return points, np.concatenate([np.empty(0, np.int64), *(each.tracks[each.labelled] for each in moments)])
 
 
 def _distances(points: Floats, others: Floats) -> Floats:

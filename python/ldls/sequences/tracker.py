@@ -22,7 +22,7 @@ from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, Ints, Moment, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import Footprint, Sighting, Track, brought
+from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought, gap
 
 LONGEST_GAP_S = 5.0
 """Time without a point after which a track ends."""
@@ -103,7 +103,8 @@ class Tracker:
         # of points with a label, and of those without
         others = mistaken(moments, known, self._tracks)
         found = [overlooked(m, self._moments, self._tracks) + other for m, other in zip(moments, others, strict=True)]
-        added = self._added(np.unique(np.concatenate(found)), of_number, len(results[0].instances))
+        new = np.unique(np.concatenate([each[each > 0] for each in found]))
+        added = self._added(new, of_number, len(results[0].instances))
         tracked = []
         for result, moment, rows in zip(results, moments, found, strict=True):
             own = (i if (t := by_label.get(i.label)) is None else t.as_instance(i) for i in result.instances)
@@ -118,7 +119,7 @@ class Tracker:
         tracks = {track.number: track for track in self._tracks}
         added: list[Instance] = []
         for number in found.tolist():
-            if number and number not in of_number:
+            if number not in of_number:
                 of_number[number] = known + len(added) + 1
                 track = tracks[number]
                 added.append(track.as_instance(replace(track.instance, label=of_number[number], sources=())))
@@ -163,10 +164,13 @@ class Tracker:
             like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
             if not like:
                 continue
-            there = track.at(stamp)
-            for i in like:
-                own = brought(sightings[labels[i]], track.velocity, stamp)
-                costs[i, j], on[i, j] = self._apart(own, there)
+            box = box_brought(track.sightings, track.velocity, stamp)
+            own = {i: (sightings[labels[i]], track.velocity, stamp) for i in like}
+            near = [i for i in like if gap(box_brought(*own[i]), box) <= NEAR_M]
+            if near:
+                there = track.at(stamp)
+                for i in near:
+                    costs[i, j], on[i, j] = self._apart(brought(*own[i]), there)
         first = [sightings[label][0].footprint for label in labels]
         few = np.array([len(footprint.points) <= FEW_POINTS for footprint in first], bool)
         lengths = [footprint.length for footprint in first]
@@ -217,8 +221,6 @@ class Tracker:
         The former is the mean of two distances: of the points of the one of fewer to the nearest of the other, and of
         the middles.
         """
-        if one.gap(other) > NEAR_M:
-            return float("inf"), False
         few, many = sorted((one.points, other.points), key=len)
         distances, _ = self._tree(many).query(few)
         if distances.min() > NEAR_M:
@@ -230,9 +232,12 @@ class Tracker:
 
 def _relabelled(result: Segmentation, label_of: Mapping[int, int]) -> Segmentation:
     """The result with points of one label for each object."""
-    new = np.arange(len(result.instances) + 1, dtype=np.int32)
+    if all(label == new for label, new in label_of.items()):
+        return result
+    # the last one is that of -1
+    new = np.append(np.arange(len(result.instances) + 1, dtype=np.int32), np.int32(-1))
     new[list(label_of)] = list(label_of.values())
-    return replace(result, labels=np.where(result.labels > 0, new[result.labels], result.labels))
+    return replace(result, labels=new[result.labels])
 
 
 def _completed(result: Segmentation, moment: Moment, found: Ints, of_number: Mapping[int, int]) -> Segmentation:
