@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,40 @@ AROUND_M = 0.3
 """Distance up to which they do."""
 OUTVOTED = 2
 """How many times as many of another object as of its own there must be."""
+NO_CATEGORY = -1
+"""In the place of that of what moves."""
 
 Ints = NDArray[np.int64]
+
+
+class Boxes(NamedTuple):
+    """The boxes of objects, along the axes of the world.
+
+    Attributes:
+        numbers: (k,) that of each object.
+        low: (k, 3) least x y z of its points, in metres.
+        high: (k, 3) largest.
+    """
+
+    numbers: Ints
+    low: Floats
+    high: Floats
+
+    @classmethod
+    def around(cls, numbers: Ints, low: Floats, high: Floats) -> Self:
+        """That of each number around all boxes (n, 3), or points, that have it."""
+        order = np.argsort(numbers, kind="stable")
+        each, starts = np.unique(numbers[order], return_index=True)
+        if not len(each):
+            return cls(each, low, high)
+        return cls(each, np.minimum.reduceat(low[order], starts), np.maximum.reduceat(high[order], starts))
+
+    def hold(self, points: Floats, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,) whether any of `some` boxes, `AROUND_M` longer at each end, holds each of points (n, 3)."""
+        held = np.zeros(len(points), bool)
+        for low, high in zip(self.low[some], self.high[some], strict=True):
+            held |= np.all((points >= low - AROUND_M) & (points <= high + AROUND_M), axis=1)
+        return held
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +113,12 @@ class Moment:
     def labelled(self) -> Ints:
         """Indices of the points of objects."""
         return np.flatnonzero(self.tracks)
+
+    @cached_property
+    def boxes(self) -> Boxes:
+        """Those of the objects."""
+        own = self.points[self.labelled]
+        return Boxes.around(self.tracks[self.labelled], own, own)
 
     def renumbered(self, number: int, other: int) -> Self:
         """The same, where an object of a number has another, which may be there too."""
@@ -148,47 +186,49 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
         before: Earlier ones, which were not segmented with them.
         tracks: The objects that are known.
     """
-    (points, numbers), (there, known) = _labelled(moments), _labelled(before)
-    found = np.zeros(len(numbers), np.int64)
-    standing: dict[int, list[int]] = {}
-    for track in tracks:
-        if not track.velocity.any():
-            standing.setdefault(track.instance.category, []).append(track.number)
-    for of_category in standing.values():
-        others = np.flatnonzero(np.isin(known, of_category))
-        rows = np.flatnonzero(np.isin(numbers, np.unique(known[others])))
-        rows = rows[_beside(points[rows], numbers[rows], there[others], known[others])]
-        if not len(rows):
-            continue
-        tree = require("scipy.spatial", "eval").KDTree(there[others])
-        _, nearest = tree.query(points[rows], AROUND, distance_upper_bound=AROUND_M)
-        # where fewer are so near, the tree says that they are after the last
-        around = np.append(known[others], 0)[nearest]
-        votes = np.sum(around[:, :, None] == around[:, None, :], axis=2) * (around > 0)
-        most = (np.arange(len(rows)), votes.argmax(axis=1))
-        of_own = np.sum(around == numbers[rows, None], axis=1)
-        found[rows] = np.where(votes[most] > OUTVOTED * of_own, around[most], 0)
-    all_found = [np.zeros(len(each.points), np.int64) for each in moments]
-    ends = np.cumsum([len(each.labelled) for each in moments])
-    for of_moment, moment, of_labelled in zip(all_found, moments, np.split(found, ends[:-1]), strict=True):
-        of_moment[moment.labelled] = of_labelled
-    return all_found
+    found = [np.zeros(len(each.points), np.int64) for each in moments]
+    if not before:
+        return found
+    known = Boxes.around(*map(np.concatenate, zip(*(each.boxes for each in before), strict=True)))
+    standing = {track.number: track.instance.category for track in tracks if not track.velocity.any()}
+    of_known = {number: standing.get(number, NO_CATEGORY) for number in known.numbers.tolist()}
+    category = np.array([*of_known.values()], np.int64)
+    for moment, others in zip(moments, found, strict=True):
+        own = moment.boxes
+        # what has no earlier points keeps its own, as what moves does
+        of_own = np.array([of_known.get(number, NO_CATEGORY) for number in own.numbers.tolist()], np.int64)[:, None]
+        rivals = (of_own == category) & (of_own != NO_CATEGORY) & (own.numbers[:, None] != known.numbers)
+        beside = (own.low[:, None] <= known.high + AROUND_M) & (own.high[:, None] >= known.low - AROUND_M)
+        rivals &= beside.all(axis=2)
+        for at in np.flatnonzero(rivals.any(axis=1)):
+            number = own.numbers[at]
+            rows = np.flatnonzero(moment.tracks == number)
+            rows = rows[known.hold(moment.points[rows], rivals[at])]
+            if len(rows):
+                all_known = np.append(known.numbers[rivals[at]], number)
+                others[rows] = _outvoted(moment.points[rows], number, before, all_known)
+    return found
 
 
-def _beside(points: Floats, numbers: Ints, there: Floats, known: Ints) -> NDArray[np.bool_]:
-    """(n,) whether the points of objects, each of its number, are in the box of those known of another."""
-    beside = np.zeros(len(points), bool)
-    for number in np.unique(known):
-        own = there[known == number]
-        inside = np.all((points >= own.min(axis=0) - AROUND_M) & (points <= own.max(axis=0) + AROUND_M), axis=1)
-        beside |= inside & (numbers != number)
-    return beside
+def _outvoted(points: Floats, number: int, before: Sequence[Moment], known: Ints) -> Ints:
+    """(n,) number of the other object that each point of one is rather of; 0 where it is of its own.
 
-
-def _labelled(moments: Sequence[Moment]) -> tuple[Floats, Ints]:
-    """Points of objects, of all moments, and the number of the object of each."""
-    points = np.concatenate([np.empty((0, 3)), *(each.points[each.labelled] for each in moments)])
-    return points, np.concatenate([np.empty(0, np.int64), *(each.tracks[each.labelled] for each in moments)])
+    Args:
+        points: (n, 3) x y z in metres.
+        number: That of their object.
+        before: Earlier moments.
+        known: Numbers of the objects, their own among them, that may have points around them then.
+    """
+    shown = [(each, np.isin(each.tracks[each.labelled], known)) for each in before]
+    there = np.concatenate([each.points[each.labelled][of_known] for each, of_known in shown])
+    numbers = np.concatenate([each.tracks[each.labelled][of_known] for each, of_known in shown])
+    tree = require("scipy.spatial", "eval").KDTree(there)
+    _, nearest = tree.query(points, AROUND, distance_upper_bound=AROUND_M)
+    # where fewer are so near, the tree says that they are after the last
+    around = np.append(numbers, 0)[nearest]
+    votes = np.sum(around[:, :, None] == around[:, None, :], axis=2) * (around > 0)
+    most = (np.arange(len(points)), votes.argmax(axis=1))
+    return np.where(votes[most] > OUTVOTED * np.sum(around == number, axis=1), around[most], 0)
 
 
 def _distances(points: Floats, others: Floats) -> Floats:
