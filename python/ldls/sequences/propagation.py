@@ -120,6 +120,10 @@ class Moment:
         own = self.points[self.labelled]
         return Boxes.around(self.tracks[self.labelled], own, own)
 
+    def some(self, rows: Ints) -> tuple[Floats, Ints]:
+        """Points at some rows, and the number of the object of each."""
+        return self.points[rows], self.tracks[rows]
+
     def renumbered(self, number: int, other: int) -> Self:
         """The same, where an object of a number has another, which may be there too."""
         counts = dict(self.counts)
@@ -193,42 +197,58 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
     standing = {track.number: track.instance.category for track in tracks if not track.velocity.any()}
     of_known = {number: standing.get(number, NO_CATEGORY) for number in known.numbers.tolist()}
     category = np.array([*of_known.values()], np.int64)
-    for moment, others in zip(moments, found, strict=True):
+    # the category of each point that is asked, and the objects that it may be of
+    asked = [np.full(len(each.points), NO_CATEGORY) for each in moments]
+    involved: dict[int, set[int]] = {}
+    for moment, of_points in zip(moments, asked, strict=True):
         own = moment.boxes
         # what has no earlier points keeps its own, as what moves does
-        of_own = np.array([of_known.get(number, NO_CATEGORY) for number in own.numbers.tolist()], np.int64)[:, None]
-        rivals = (of_own == category) & (of_own != NO_CATEGORY) & (own.numbers[:, None] != known.numbers)
+        of_own = np.array([of_known.get(number, NO_CATEGORY) for number in own.numbers.tolist()], np.int64)
+        rivals = (of_own[:, None] == category) & (own.numbers[:, None] != known.numbers)
         beside = (own.low[:, None] <= known.high + AROUND_M) & (own.high[:, None] >= known.low - AROUND_M)
         rivals &= beside.all(axis=2)
-        for at in np.flatnonzero(rivals.any(axis=1)):
-            number = own.numbers[at]
-            rows = np.flatnonzero(moment.tracks == number)
+        for at in np.flatnonzero(rivals.any(axis=1) & (of_own != NO_CATEGORY)):
+            rows = np.flatnonzero(moment.tracks == own.numbers[at])
             rows = rows[known.hold(moment.points[rows], rivals[at])]
+            of_points[rows] = of_own[at]
             if len(rows):
-                all_known = np.append(known.numbers[rivals[at]], number)
-                others[rows] = _outvoted(moment.points[rows], number, before, all_known)
+                numbers = own.numbers[at], *known.numbers[rivals[at]]
+                involved.setdefault(of_own[at], set()).update(numbers)
+    for of_category, objects in involved.items():
+        rows_of = [np.flatnonzero(each == of_category) for each in asked]
+        points, of_objects = _together([each.some(rows) for each, rows in zip(moments, rows_of, strict=True)])
+        new = _outvoted(points, of_objects, before, [*objects])
+        ends = np.cumsum([len(rows) for rows in rows_of])
+        for each, rows, of_rows in zip(found, rows_of, np.split(new, ends[:-1]), strict=True):
+            each[rows] = of_rows
     return found
 
 
-def _outvoted(points: Floats, number: int, before: Sequence[Moment], known: Ints) -> Ints:
-    """(n,) number of the other object that each point of one is rather of; 0 where it is of its own.
+def _outvoted(points: Floats, own: Ints, before: Sequence[Moment], objects: Sequence[int]) -> Ints:
+    """(n,) number of another of some objects for each point that is rather of that; 0 for all others.
 
     Args:
         points: (n, 3) x y z in metres.
-        number: That of their object.
+        own: (n,) number of the object of each.
         before: Earlier moments.
-        known: Numbers of the objects, their own among them, that may have points around them then.
+        objects: Numbers of those that may have points around them then, their own among them.
     """
-    shown = [(each, np.isin(each.tracks[each.labelled], known)) for each in before]
-    there = np.concatenate([each.points[each.labelled][of_known] for each, of_known in shown])
-    numbers = np.concatenate([each.tracks[each.labelled][of_known] for each, of_known in shown])
+    there, numbers = _together(
+        [each.some(each.labelled[np.isin(each.tracks[each.labelled], objects)]) for each in before]
+    )
     tree = require("scipy.spatial", "eval").KDTree(there)
     _, nearest = tree.query(points, AROUND, distance_upper_bound=AROUND_M)
     # where fewer are so near, the tree says that they are after the last
     around = np.append(numbers, 0)[nearest]
     votes = np.sum(around[:, :, None] == around[:, None, :], axis=2) * (around > 0)
     most = (np.arange(len(points)), votes.argmax(axis=1))
-    return np.where(votes[most] > OUTVOTED * np.sum(around == number, axis=1), around[most], 0)
+    return np.where(votes[most] > OUTVOTED * np.sum(around == own[:, None], axis=1), around[most], 0)
+
+
+def _together(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
+    """Points of all moments, and the number of the object of each."""
+    points, numbers = zip(*parts, strict=True)
+    return np.concatenate(points), np.concatenate(numbers)
 
 
 def _distances(points: Floats, others: Floats) -> Floats:
