@@ -6,7 +6,7 @@ stays true: what stands still is where it was, and what moves is where its veloc
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Self
@@ -196,32 +196,42 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
     known = Boxes.around(*map(np.concatenate, zip(*(each.boxes for each in before), strict=True)))
     standing = {track.number: track.instance.category for track in tracks if not track.velocity.any()}
     of_known = {number: standing.get(number, NO_CATEGORY) for number in known.numbers.tolist()}
-    category = np.array([*of_known.values()], np.int64)
     # the category of each point that is asked, and the objects that it may be of
     asked = [np.full(len(each.points), NO_CATEGORY) for each in moments]
     involved: dict[int, set[int]] = {}
     for moment, of_points in zip(moments, asked, strict=True):
-        own = moment.boxes
-        # what has no earlier points keeps its own, as what moves does
-        of_own = np.array([of_known.get(number, NO_CATEGORY) for number in own.numbers.tolist()], np.int64)
-        rivals = (of_own[:, None] == category) & (own.numbers[:, None] != known.numbers)
-        beside = (own.low[:, None] <= known.high + AROUND_M) & (own.high[:, None] >= known.low - AROUND_M)
-        rivals &= beside.all(axis=2)
-        for at in np.flatnonzero(rivals.any(axis=1) & (of_own != NO_CATEGORY)):
-            rows = np.flatnonzero(moment.tracks == own.numbers[at])
-            rows = rows[known.hold(moment.points[rows], rivals[at])]
-            of_points[rows] = of_own[at]
-            if len(rows):
-                numbers = own.numbers[at], *known.numbers[rivals[at]]
-                involved.setdefault(of_own[at], set()).update(numbers)
-    for of_category, objects in involved.items():
+        for rows, of_category, objects in _beside(moment, known, of_known):
+            of_points[rows] = of_category
+            involved.setdefault(of_category, set()).update(objects)
+    for of_category, numbers in involved.items():
         rows_of = [np.flatnonzero(each == of_category) for each in asked]
         points, of_objects = _together([each.some(rows) for each, rows in zip(moments, rows_of, strict=True)])
-        new = _outvoted(points, of_objects, before, [*objects])
+        new = _outvoted(points, of_objects, before, [*numbers])
         ends = np.cumsum([len(rows) for rows in rows_of])
         for each, rows, of_rows in zip(found, rows_of, np.split(new, ends[:-1]), strict=True):
             each[rows] = of_rows
     return found
+
+
+def _beside(moment: Moment, known: Boxes, of_known: Mapping[int, int]) -> Iterator[tuple[Ints, int, Ints]]:
+    """Points of each object that boxes of others of its category hold, that category, and the objects.
+
+    Args:
+        moment: The moment.
+        known: Boxes of objects at earlier moments.
+        of_known: The category of each, `NO_CATEGORY` of what moves.
+    """
+    own = moment.boxes
+    # what has no earlier points keeps its own, as what moves does
+    category = np.array([of_known.get(number, NO_CATEGORY) for number in own.numbers.tolist()], np.int64)
+    rivals = (category[:, None] == [*of_known.values()]) & (own.numbers[:, None] != known.numbers)
+    meet = (own.low[:, None] <= known.high + AROUND_M) & (own.high[:, None] >= known.low - AROUND_M)
+    rivals &= meet.all(axis=2)
+    for at in np.flatnonzero(rivals.any(axis=1) & (category != NO_CATEGORY)):
+        rows = np.flatnonzero(moment.tracks == own.numbers[at])
+        rows = rows[known.hold(moment.points[rows], rivals[at])]
+        if len(rows):
+            yield rows, int(category[at]), np.append(known.numbers[rivals[at]], own.numbers[at])
 
 
 def _outvoted(points: Floats, own: Ints, before: Sequence[Moment], objects: Sequence[int]) -> Ints:
