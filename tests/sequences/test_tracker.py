@@ -8,7 +8,7 @@ import pytest
 import ldls
 from conftest import pinhole
 from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES, Moment, mistaken
-from ldls.sequences.track import Footprint, Sighting, Track
+from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
 WIDE = pinhole(100.0, (320.0, 240.0), T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -264,6 +264,15 @@ def test_what_stands_has_no_velocity_though_few_of_its_points_are_seen_in_the_la
         points = whole if k < 15 else whole[-1:] + 0.5
         track.advance(track.instance, Sighting(0.1 * k, Footprint(points), shown=True))
     assert track.velocity.tolist() == [0, 0]
+
+
+def test_boxes_that_are_brought_to_a_moment_are_those_of_the_points_to_the_last_bit():
+    generator = np.random.default_rng(3)
+    for count in (1, 2, 7):
+        places = [Footprint(generator.normal(50, 3, (n, 2))) for n in generator.integers(1, 9, count)]
+        sightings = [Sighting(0.1 * k, place, shown=True) for k, place in enumerate(places)]
+        moment = (sightings, generator.normal(0, 7, 2), 0.83)
+        assert box_brought(*moment) == brought(*moment).box
 
 
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():
