@@ -247,6 +247,23 @@ def test_a_few_points_on_an_object_may_be_another_in_sweeps_apart():
     assert tracked.instance_ids[1:].tolist() == [1, 2]
 
 
+@pytest.mark.parametrize(
+    ("apart", "beside_lorry", "numbers"), [(1.2, True, [2, 2]), (1.2, False, [1, 2]), (2.9, True, [2, 3])]
+)
+def test_single_points_are_one_object_where_others_of_its_category_are_long(apart, beside_lorry, numbers):
+    lorry = [((8, 0.2 * part), True) for part in range(-15, 16)]
+    sweeps = [sweep_at(0.1 * k, [*lorry, ((14, 0), True), ((14, apart), True)]) for k in range(3)]
+    results = []
+    for k, sweep in enumerate(sweeps):
+        (result,) = ldls.segment_sweeps([sweep], params=PARAMS)
+        distances = np.linalg.norm(result.points[:, :2] - (14, apart * (k == 1)), axis=1)
+        labels = np.where((result.labels > 0) & (result.points[:, 0] < 9) & beside_lorry, 1, 0)
+        labels[distances.argmin()] = 3 if k == 1 else 2
+        results.append(replace(result, labels=labels.astype(np.int32), instances=result.instances[:3]))
+    for result in ldls.Tracker().track(sweeps, results):
+        assert result.instance_ids[2:].tolist() == numbers
+
+
 def test_what_stands_has_no_velocity_though_another_end_is_seen_soon():
     """One end of a car, soon the other, and a point of it last."""
     end = np.stack(np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1.6, 3)), axis=-1).reshape(-1, 2)

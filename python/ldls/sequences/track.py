@@ -92,6 +92,16 @@ class Track:
         """When it was seen last, in seconds."""
         return self.sightings[-1].stamp
 
+    @property
+    def most_points(self) -> int:
+        """Those of the sighting with the most."""
+        return max(len(each.footprint.points) for each in self.sightings)
+
+    @property
+    def length(self) -> float:
+        """That of the longest sighting, in metres."""
+        return max(each.footprint.length for each in self.sightings)
+
     @cached_property
     def velocity(self) -> Floats:
         """(2,) x y in the world, in metres a second; zeros where it stands."""

@@ -36,6 +36,8 @@ FEW_POINTS = 3
 """Points of which so many or fewer on an object are part of it, where both have labels of the same sweeps."""
 ON_M = 0.2
 """Mean distance, seen from above, up to which they are on it."""
+SAME_OF_FEW = 0.5
+"""Share of the usual length of their category up to which two objects of so few points in every sweep are one."""
 MOST_POINTS = 48
 """Points that stand for an object in a sweep; of more, some."""
 
@@ -176,6 +178,8 @@ class Tracker:
         lengths = [footprint.length for footprint in first]
         of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
         same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
+        most_points = [max(len(own.footprint.points) for own in sightings[label]) for label in labels]
+        same |= costs < self._reach_of_few(most_points)
         goes_on = np.array([track in going_on for track in self._tracks], bool)
         costs[goes_on & ~(same | on & few[:, None])] = np.inf
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
@@ -183,6 +187,19 @@ class Tracker:
         pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
         known = {labels[i]: track for i, track in self._joined(pairs, same & ~goes_on).items()}
         return {label: known.get(label) or self._begin(instances[label]) for label in labels}
+
+    def _reach_of_few(self, most_points: Sequence[int]) -> NDArray[np.float64]:
+        """(labels, tracks) distance in metres up to which two of few points in every sweep are the same; 0 for others.
+
+        Args:
+            most_points: Most points that each label has in a sweep.
+        """
+        few = np.array([track.most_points <= FEW_POINTS for track in self._tracks], bool)
+        category = np.array([track.instance.category for track in self._tracks], np.int64)
+        lengths = np.array([track.length for track in self._tracks], np.float64)
+        usual = {each: float(np.median(lengths[~few & (category == each)])) for each in set(category[~few].tolist())}
+        reach = np.array([SAME_OF_FEW * usual.get(each, 0.0) for each in category.tolist()]) * few
+        return np.outer(np.array(most_points) <= FEW_POINTS, reach)
 
     def _joined(self, pairs: Mapping[int, int], same: NDArray[np.bool_]) -> dict[int, Track]:
         """The track of each label that is paired with one, after tracks of one object are joined.
