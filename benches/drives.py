@@ -181,7 +181,7 @@ def errors_and_tracks(measured: Frame, options: argparse.Namespace) -> Table:
             "S_assoc",
             "switches a hundred",
             "ms a sweep",
-            "tracks",
+            "its tracks",
         ],
         "error: 100 less the IoU of all points in view, in %; wrong poses: 5 cm and 0.3 degrees off, of a moment 50 ms "
         f"off; labels on {options.threads} threads, tracks on one",

@@ -7,7 +7,8 @@ import pytest
 
 import ldls
 from conftest import pinhole
-from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES, Moment, mistaken
+from ldls.sequences.moment import Moment
+from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES, mistaken
 from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 

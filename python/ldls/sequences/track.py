@@ -94,12 +94,12 @@ class Track:
 
     @property
     def most_points(self) -> int:
-        """Those of the sighting with the most."""
+        """Points of the sighting that has the most."""
         return max(len(each.footprint.points) for each in self.sightings)
 
     @property
     def length(self) -> float:
-        """That of the longest sighting, in metres."""
+        """Length of the longest sighting, in metres."""
         return max(each.footprint.length for each in self.sightings)
 
     @cached_property

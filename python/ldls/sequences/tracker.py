@@ -20,7 +20,8 @@ from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
-from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, Ints, Moment, mistaken, overlooked
+from ldls.sequences.moment import Ints, Moment
+from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
 from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought, gap
 
@@ -74,8 +75,9 @@ class Tracker:
         shows it: if ten images did before, or three where the images of the sweep show nothing at all. Confidence there
         is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances. A
         point of what stands, around which earlier points are of another such object, has the label of that. Two
-        instances in one place are one object, and so is one of three points or fewer with that on which they lie: they
-        have one number, and the points of both the label of the first.
+        instances in one place are one object, and so is one of three points or fewer with that on which they lie, or
+        near another of so few, by the length of their category: they have one number, and the points of both the label
+        of the first.
 
         Args:
             sweeps: The next sweeps of the drive, in the order of their stamps.

@@ -34,7 +34,7 @@ impl UprightBox {
     /// one of least area. Stray points do not decide where sides are; the box holds all points.
     pub fn around(points: &[[f64; 3]]) -> Option<Self> {
         let first = points.first()?;
-        let step = points.len().div_ceil(MOST_LOOKED_AT).max(1);
+        let step = points.len().div_ceil(MOST_LOOKED_AT);
         let some = points.iter().step_by(step).map(|&[x, y, _]| [x, y]);
         let heading = best_heading(&some.collect::<Vec<_>>());
         let (sin, cos) = heading.sin_cos();
@@ -73,8 +73,8 @@ fn best_heading(places: &[[f64; 2]]) -> f64 {
     let mut fits = [(0.0, 0.0); HEADINGS];
     let (mut along, mut across) = ([0.0; MOST_LOOKED_AT], [0.0; MOST_LOOKED_AT]);
     let (along, across) = (&mut along[..places.len()], &mut across[..places.len()]);
-    for (degrees, fit) in fits.iter_mut().enumerate() {
-        let (sin, cos) = heading_of(degrees).sin_cos();
+    for (number, fit) in fits.iter_mut().enumerate() {
+        let (sin, cos) = heading_of(number).sin_cos();
         for (([x, y], along), across) in places.iter().zip(&mut *along).zip(&mut *across) {
             *along = cos * x + sin * y;
             *across = cos * y - sin * x;
@@ -91,9 +91,10 @@ fn best_heading(places: &[[f64; 2]]) -> f64 {
         .enumerate()
         .filter(|(_, fit)| fit.0 >= AS_GOOD * closest);
     let best = as_good.min_by(|(_, one), (_, other)| one.1.total_cmp(&other.1));
-    heading_of(best.map_or(0, |(degrees, _)| degrees))
+    heading_of(best.map_or(0, |(number, _)| number))
 }
 
+/// The heading of a number, in radians.
 fn heading_of(number: usize) -> f64 {
     number as f64 * FRAC_PI_2 / HEADINGS as f64
 }
@@ -130,14 +131,12 @@ impl Side {
 /// Puts `value` among the `lowest`, which ascend, if it is one of them.
 #[inline(always)]
 fn keep_lowest(lowest: &mut [f64], value: f64) {
-    let mut at = lowest.len();
-    while at > 0 && lowest[at - 1] > value {
-        if at < lowest.len() {
+    let mut at = lowest.len() - 1;
+    if lowest[at] > value {
+        while at > 0 && lowest[at - 1] > value {
             lowest[at] = lowest[at - 1];
+            at -= 1;
         }
-        at -= 1;
-    }
-    if at < lowest.len() {
         lowest[at] = value;
     }
 }
