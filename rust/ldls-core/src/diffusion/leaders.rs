@@ -8,7 +8,6 @@ use super::reach::Reach;
 use super::schedule::{ROWS_A_TASK, Schedule};
 use super::seeds::Seeds;
 use super::series::Series;
-use super::twins::without_twins;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::filled;
@@ -40,10 +39,7 @@ pub(super) fn leaders(
         Some(_) => Reach::of(a, points, steps, cancel)?,
         None => None,
     };
-    let (exact_a, mut b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
-    if reach.is_some() && points.len() > FEW && candidates.len() > WIDTH_F64 {
-        b = without_twins((&exact_a, b), candidates, cancel)?;
-    }
+    let (exact_a, b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
     let schedule = match &reach {
         Some(reach) => reach.schedule(&exact_a, cancel)?,
         None => Schedule::new(&exact_a, cancel)?,

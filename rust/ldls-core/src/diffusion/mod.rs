@@ -2,12 +2,11 @@
 //!
 //! The products are not run one by one: their result is a polynomial of A times b, which a Chebyshev series
 //! reaches with a third of the sweeps, in single precision. Both leave an error, which is estimated; where two
-//! labels are nearer to one another than that and not the same, the point is decided in double precision: by the part of
-//! the graph that flows to it, or where that is much, by diffusing such labels again. Where the graph is such that no series
-//! can be trusted, the products are run as they stand.
+//! labels are nearer to one another than that and seeds alone do not show which wins, the point is decided in double
+//! precision: by the part of the graph that flows to it, or where that is much, by diffusing such labels again. Where the
+//! graph is such that no series can be trusted, the products are run as they stand.
 
 mod convergence;
-mod equal_labels;
 mod errors;
 mod lanes;
 mod leaders;
@@ -19,11 +18,11 @@ mod plan;
 mod products;
 mod reach;
 mod schedule;
+mod seed_search;
 mod seeds;
 mod series;
 mod spread;
 mod sweep;
-mod twins;
 mod values;
 mod winners;
 

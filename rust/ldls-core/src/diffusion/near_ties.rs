@@ -1,12 +1,14 @@
 //! The points at which single precision cannot decide between labels.
 //!
-//! Labels of many of them are equal, as where several masks show all that anything flows from: their seeds are the same
-//! there. The others are decided in double precision, with a series that leaves out next to nothing. Where there are few, one
-//! that leaves out little comes first, and tells most of them apart.
+//! At many of them seeds alone show the winner, as where several masks show all that anything flows from. The others are
+//! decided in double precision, with a series that leaves out next to nothing. Where there are few, one that leaves out little
+//! comes first, and tells most of them apart.
 
-use super::equal_labels::Followed;
 use super::errors::Errors;
+use super::lanes::WIDTH_F32;
 use super::leaders::{FEW, leaders};
+use super::pass::Pass;
+use super::seed_search::SeedSearch;
 use super::series::Series;
 use super::winners::{Best, NearTies, Winners, candidates};
 use crate::graph::PointGraph;
@@ -38,7 +40,7 @@ pub(super) fn decide(
     let mut ties = winners.near_ties(largest, error)?;
     let best = &mut winners.best;
     let contested = ties.values().map(Vec::len).sum();
-    settle_equal((a, b), best, &mut ties, cancel)?;
+    settle_by_seeds((a, b), iterations, best, &mut ties, cancel)?;
     let open: usize = ties.values().map(Vec::len).sum();
     // of more than a few, labels differ so little that the first one would leave them open
     let first = (open <= FEW).then_some((trusted.last(), FIRST_TOLERANCE, LEAD));
@@ -72,32 +74,33 @@ pub(super) fn decide(
     Ok(contested)
 }
 
-/// Makes the lowest label the best at those of `ties` at which all that may win are equal, and leaves the others.
-fn settle_equal(
+/// Makes those labels the best of `ties` that win by their seeds alone, and leaves the other points.
+fn settle_by_seeds(
     (a, b): (&PointGraph, &PixelLabels),
+    iterations: Option<usize>,
     best: &mut [Best],
     ties: &mut NearTies,
     cancel: &Cancel,
 ) -> Result<()> {
-    let mut sets: Vec<(&Vec<u32>, &mut Vec<u32>)> = ties.iter_mut().collect();
-    let size = sets.len().div_ceil(rayon::current_num_threads()).max(1);
-    let settled_by_set = sets.par_chunks_mut(size).map(|sets| {
-        let mut followed = Followed::new(a, b, cancel)?;
-        let settle = |(labels, points): &mut (&Vec<u32>, &mut Vec<u32>)| {
-            let values = points.iter().map(|&point| best[point as usize].value);
-            let least = NEGLIGIBLE * values.fold(1.0, f32::min);
-            let equal = followed.equal_at(points, labels, least, cancel)?;
-            let mut next = equal.iter().peekable();
-            points.retain(|point| next.next_if_eq(&point).is_none());
-            Ok((labels[0], equal))
-        };
-        sets.iter_mut().map(settle).collect::<Result<Vec<_>>>()
+    let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
+    let new = || SeedSearch::new((a, b), steps, cancel);
+    let sets: Vec<(&Vec<u32>, &mut Vec<u32>)> = ties.iter_mut().collect();
+    let sets = sets.into_par_iter();
+    let settled = sets.map_init(new, |search, (labels, points)| {
+        let search = search.as_mut().map_err(|error| error.clone())?;
+        let values = points.iter().map(|&point| best[point as usize].value);
+        let values: Vec<f32> = values.collect();
+        let least = NEGLIGIBLE * values.iter().copied().fold(1.0, f32::min);
+        let winners = search.winners(labels, (points, &values), least, cancel)?;
+        let of_points = points.iter().copied().zip(&winners);
+        let settled = of_points.filter_map(|(point, winner)| Some((point, (*winner)?)));
+        let settled: Vec<(u32, u32)> = settled.collect();
+        let mut winners = winners.iter();
+        points.retain(|_| winners.next().is_some_and(Option::is_none));
+        Ok(settled)
     });
-    let settled_by_set = settled_by_set.collect::<Result<Vec<_>>>()?.concat();
-    for (lowest, points) in settled_by_set {
-        for point in points {
-            best[point as usize].label = lowest;
-        }
+    for (point, label) in settled.collect::<Result<Vec<_>>>()?.concat() {
+        best[point as usize].label = label;
     }
     ties.retain(|_, points| !points.is_empty());
     Ok(())
@@ -138,10 +141,17 @@ mod tests {
     }
 
     #[test]
-    fn labels_whose_seeds_differ_farther_away_are_told_apart() {
+    fn labels_that_seeds_farther_away_tell_apart_need_no_look_either() {
         let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
         let (labels, asked) = decided(&[1e-7, 0.2, 0.2], &[twins, &[], &[(2, 0.25)]]);
-        assert_eq!((labels, asked), (vec![2, 2, 2], 3));
+        assert_eq!((labels, asked), (vec![2, 2, 2], 0));
+    }
+
+    #[test]
+    fn labels_that_are_both_ahead_somewhere_are_told_apart_in_double_precision() {
+        let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
+        let seeds: [&[_]; 3] = [twins, &[(2, 0.1)], &[(1, 0.25)]];
+        assert_eq!(decided(&[1e-7, 0.2, 0.2], &seeds), (vec![2, 2, 1], 3));
     }
 
     #[test]

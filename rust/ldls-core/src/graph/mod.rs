@@ -7,5 +7,4 @@ mod point_graph;
 
 pub use components::remove_outliers;
 pub(crate) use components::remove_outliers_by_index;
-pub(crate) use disjoint_sets::DisjointSets;
 pub use point_graph::PointGraph;
