@@ -155,6 +155,19 @@ mod tests {
     }
 
     #[test]
+    fn labels_are_told_apart_in_single_precision_as_far_as_the_rounding_of_its_sweeps() {
+        // label 1 is ahead at the point itself, and label 2 by that and as much as `ahead` at the next
+        let decided = |ahead: f64| {
+            let own = [(1, 0.25), (2, 0.25 * (1.0 - 2e-5))];
+            let next = [(2, 0.25 * (2e-5 + ahead) * 0.9 / 0.2)];
+            let (labels, asked) = decided(&[0.2; 3], &[&own, &next]);
+            (labels[0], asked)
+        };
+        assert_eq!(decided(1e-5), (2, 0));
+        assert_eq!(decided(1e-6), (2, 3));
+    }
+
+    #[test]
     fn what_lies_beyond_an_edge_of_no_weight_is_not_followed() {
         let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
         let (labels, asked) = decided(&[1e-19, 0.2, 0.2], &[twins, &[], &[(2, 0.25)]]);
