@@ -120,6 +120,7 @@ impl<'a> SeedSearch<'a> {
                 return Ok(Vec::new());
             }
             if region.followed == last {
+                cancel.check()?;
                 (edges, last) = (edges + 1, region.met.len());
             }
             if region.followed == look && look < MET_ANYWAY {
