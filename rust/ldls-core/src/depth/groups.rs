@@ -1,6 +1,8 @@
 //! Groups of the points of a mask by their distance to the camera.
 
-use crate::Params;
+use crate::memory::push;
+use crate::{Params, Result};
+use std::collections::BTreeMap;
 
 /// Gap between two groups as a share of the distance, where that is more than `depth_gap`: points thin out.
 const GAP_SHARE: f64 = 0.03;
@@ -13,15 +15,10 @@ const LEAST_ON_MASK: f64 = 0.75;
 const LEAST_M: f64 = 0.3;
 /// Distance, in metres, by which an object reaches beyond its group.
 const SLACK_M: f64 = 0.3;
-
-/// A point on a mask that stands on the ground.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Member {
-    /// Distance to the camera, in metres.
-    pub(super) distance: f64,
-    /// Steps to the edge of the mask: the nearer to its middle, the surer.
-    pub(super) weight: u64,
-}
+/// Cells up to which each has a place, empty or not.
+const NEAR_CELLS: usize = 1 << 10;
+/// Length, in metres, of the shortest cells: points are no farther apart for any `depth_gap`.
+const LEAST_CELL_M: f64 = 1e-9;
 
 /// Points without a gap between them.
 #[derive(Debug, Clone, Copy)]
@@ -32,8 +29,83 @@ struct Group {
     weight: u64,
 }
 
-/// Nearest and farthest distance of the object that `members` show, in metres: those of the heaviest group, the nearest
-/// of equals, and some slack. `beside` are the distances of the points beside the mask; both ascend.
+/// The points on a mask that stand on the ground, in cells of distance so short that there is no gap within one.
+#[derive(Debug)]
+pub(super) struct Cells {
+    cell_m: f64,
+    near: Vec<Group>,
+    far: BTreeMap<u64, Group>,
+}
+
+impl Cells {
+    pub(super) fn new(params: &Params) -> Self {
+        Self {
+            cell_m: (params.depth_gap / 2.0).max(LEAST_CELL_M),
+            near: Vec::new(),
+            far: BTreeMap::new(),
+        }
+    }
+
+    /// Adds a point at a `distance` to the camera, in metres. Its `weight` are the steps to the edge of the mask: the nearer to its
+    /// middle, the surer.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn add(&mut self, distance: f64, weight: u64) -> Result<()> {
+        let cell = (distance / self.cell_m) as u64;
+        let group = if cell < NEAR_CELLS as u64 {
+            while self.near.len() as u64 <= cell {
+                push(&mut self.near, Group::NONE)?;
+            }
+            &mut self.near[cell as usize]
+        } else {
+            self.far.entry(cell).or_insert(Group::NONE)
+        };
+        group.add(Group {
+            near: distance,
+            far: distance,
+            points: 1,
+            weight,
+        });
+        Ok(())
+    }
+
+    /// The groups that they are of, the nearest first.
+    fn groups(&self, params: &Params) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
+        let cells = self.near.iter().chain(self.far.values());
+        for &cell in cells.filter(|cell| cell.points > 0) {
+            match groups.last_mut() {
+                Some(group)
+                    if cell.near - group.far <= params.depth_gap.max(GAP_SHARE * group.far) =>
+                {
+                    group.add(cell);
+                }
+                _ => groups.push(cell),
+            }
+        }
+        groups
+    }
+}
+
+impl Group {
+    const NONE: Self = Self {
+        near: f64::INFINITY,
+        far: 0.0,
+        points: 0,
+        weight: 0,
+    };
+
+    fn add(&mut self, other: Self) {
+        self.near = self.near.min(other.near);
+        self.far = self.far.max(other.far);
+        self.points += other.points;
+        self.weight += other.weight;
+    }
+}
+
+/// Nearest and farthest distance of the object that the points in `cells` show, in metres: those of the heaviest group, the
+/// nearest of equals, and some slack. `beside` are the distances of the points beside the mask, ascending.
 ///
 /// What lies behind an object goes on beside its mask and is hidden by what is before it, so the weight of a group is
 /// that of its points on the mask, times the square of their share of all at its distances, over the square root of the
@@ -42,23 +114,8 @@ struct Group {
 ///
 /// The long side of a vehicle seen from behind has gaps of metres: groups apart by no more than `bridged_gap` are one
 /// unless the lighter one goes on beside the mask.
-pub(super) fn object_of(members: &[Member], beside: &[f64], params: &Params) -> Option<[f64; 2]> {
-    let mut groups: Vec<Group> = Vec::new();
-    for &Member { distance, weight } in members {
-        match groups.last_mut() {
-            Some(group) if distance - group.far <= params.depth_gap.max(GAP_SHARE * group.far) => {
-                group.far = distance;
-                group.points += 1;
-                group.weight += weight;
-            }
-            _ => groups.push(Group {
-                near: distance,
-                far: distance,
-                points: 1,
-                weight,
-            }),
-        }
-    }
+pub(super) fn object_of(cells: &Cells, beside: &[f64], params: &Params) -> Option<[f64; 2]> {
+    let groups = cells.groups(params);
     // share of the points at the distances of a group that lie on the mask, the others beside it
     let on_mask = |groups: &[Group]| {
         let [near, far] = interval(groups);
@@ -98,14 +155,36 @@ fn interval(groups: &[Group]) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    fn cells(distances: &[f64], params: &Params) -> Cells {
+        let mut cells = Cells::new(params);
+        for &distance in distances {
+            cells.add(distance, 1).unwrap();
+        }
+        cells
+    }
 
     fn object(distances: &[f64], beside: &[f64]) -> [f64; 2] {
-        let member = |&distance| Member {
-            distance,
-            weight: 1,
-        };
-        let members: Vec<Member> = distances.iter().map(member).collect();
-        object_of(&members, beside, &Params::default()).unwrap()
+        let params = Params::default();
+        object_of(&cells(distances, &params), beside, &params).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn groups_end_where_there_is_a_gap_between_neighbouring_points(
+            distances in proptest::collection::vec((0.0..1.0_f64).prop_map(|x| 0.1 + 1e4 * x.powi(6)), 1..200),
+            depth_gap in prop_oneof![Just(0.0), 1e-6..1e-3, 0.1..2.0, Just(1e3)],
+        ) {
+            let params = Params { depth_gap, ..Params::default() };
+            let mut ascending = distances.clone();
+            ascending.sort_by(f64::total_cmp);
+            let same = |one: &f64, other: &f64| other - one <= depth_gap.max(GAP_SHARE * one);
+            let expected = ascending.chunk_by(same).map(|group| (group[0], group[group.len() - 1], group.len()));
+            let found = cells(&distances, &params).groups(&params);
+            let found = found.iter().map(|group| (group.near, group.far, group.points));
+            prop_assert_eq!(found.collect::<Vec<_>>(), expected.collect::<Vec<_>>());
+        }
     }
 
     #[test]
@@ -168,6 +247,7 @@ mod tests {
 
     #[test]
     fn no_point_makes_no_object() {
-        assert!(object_of(&[], &[1.0], &Params::default()).is_none());
+        let params = Params::default();
+        assert!(object_of(&Cells::new(&params), &[1.0], &params).is_none());
     }
 }

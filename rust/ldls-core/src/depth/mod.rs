@@ -11,7 +11,7 @@ use crate::masks::InstanceMasks;
 use crate::memory::{collect, push, zeros};
 use crate::{Cancel, Params, Result, Rle};
 use edges::Edges;
-use groups::{Member, object_of};
+use groups::{Cells, object_of};
 use pixels::Pixels;
 use rayon::prelude::*;
 
@@ -80,25 +80,21 @@ impl InstanceMasks {
             let Some(edges) = Edges::of(mask, params.edge_margin, cancel)? else {
                 return Ok(None);
             };
-            let (mut members, mut beside) = (Vec::new(), Vec::new());
+            let (mut cells, mut beside) = (Cells::new(params), Vec::new());
             for column in edges.columns() {
                 cancel.check()?;
                 for &(row, point) in pixels.of_column(column) {
                     let distance = distances[point as usize];
                     match edges.steps_at([column, row as usize]) {
                         0 => {}
-                        steps @ 1.. => {
-                            let weight = u64::from(steps.unsigned_abs());
-                            push(&mut members, Member { distance, weight })?;
-                        }
+                        steps @ 1.. => cells.add(distance, steps.unsigned_abs().into())?,
                         _ => push(&mut beside, (distance, point))?,
                     }
                 }
             }
-            sort(&mut members, |member| member.distance, cancel)?;
-            sort(&mut beside, |&(distance, _)| distance, cancel)?;
+            sort(&mut beside, cancel)?;
             let distances = collect(beside.iter().map(|&(distance, _)| distance), cancel)?;
-            let Some([near, far]) = object_of(&members, &distances, params) else {
+            let Some([near, far]) = object_of(&cells, &distances, params) else {
                 return Ok(None);
             };
             beside.retain(|(distance, _)| (near..=far).contains(distance));
@@ -123,24 +119,17 @@ impl InstanceMasks {
     }
 }
 
-/// Sorts `values` by their distance, ascending.
-fn sort<T: Send>(
-    values: &mut [T],
-    distance: impl Fn(&T) -> f64 + Copy + Sync,
-    cancel: &Cancel,
-) -> Result<()> {
-    let compare = |one: &T, other: &T| distance(one).total_cmp(&distance(other));
-    if values.len() <= PARALLEL {
-        values.sort_unstable_by(compare);
+/// Sorts points by their distance, ascending.
+fn sort(points: &mut [(f64, u32)], cancel: &Cancel) -> Result<()> {
+    let compare = |one: &(f64, u32), other: &(f64, u32)| one.0.total_cmp(&other.0);
+    if points.len() <= PARALLEL {
+        points.sort_unstable_by(compare);
         return Ok(());
     }
     cancel.check()?;
-    let middle = values.len() / 2;
-    values.select_nth_unstable_by(middle, compare);
-    let (near, far) = values.split_at_mut(middle);
-    let (near, far) = rayon::join(
-        || sort(near, distance, cancel),
-        || sort(far, distance, cancel),
-    );
+    let middle = points.len() / 2;
+    points.select_nth_unstable_by(middle, compare);
+    let (near, far) = points.split_at_mut(middle);
+    let (near, far) = rayon::join(|| sort(near, cancel), || sort(far, cancel));
     near.and(far)
 }
