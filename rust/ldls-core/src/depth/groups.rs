@@ -15,9 +15,9 @@ const LEAST_ON_MASK: f64 = 0.75;
 const LEAST_M: f64 = 0.3;
 /// Distance, in metres, by which an object reaches beyond its group.
 const SLACK_M: f64 = 0.3;
-/// Cells up to which each has a place, empty or not.
+/// Cells up to which each has a place of its own, empty or not: some hundred are in use, and are found at once.
 const NEAR_CELLS: usize = 1 << 10;
-/// Length, in metres, of the shortest cells: points are no farther apart for any `depth_gap`.
+/// Length, in metres, of the shortest cells: there is no gap so short, whatever `depth_gap` is.
 const LEAST_CELL_M: f64 = 1e-9;
 
 /// Points without a gap between them.
@@ -32,8 +32,11 @@ struct Group {
 /// The points on a mask that stand on the ground, in cells of distance so short that there is no gap within one.
 #[derive(Debug)]
 pub(super) struct Cells {
+    /// Length of each, half of the shortest gap.
     cell_m: f64,
+    /// The first [`NEAR_CELLS`], as far as there are points.
     near: Vec<Group>,
+    /// Those beyond that have points, by their number.
     far: BTreeMap<u64, Group>,
 }
 

@@ -14,9 +14,6 @@ use crate::memory::filled;
 use crate::{Cancel, Result};
 use rayon::prelude::*;
 
-/// Points up to which they are a few. More are those of masks that lie over one another, whose labels differ little, and not at
-/// all in much of the graph.
-pub(super) const FEW: usize = 1 << 10;
 /// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
 const EQUAL: f64 = 1e-13;
 

@@ -6,7 +6,7 @@
 
 use super::errors::Errors;
 use super::lanes::WIDTH_F32;
-use super::leaders::{FEW, leaders};
+use super::leaders::leaders;
 use super::pass::Pass;
 use super::seed_search::SeedSearch;
 use super::series::Series;
@@ -20,6 +20,9 @@ use rayon::prelude::*;
 const TOLERANCE: f64 = 1e-13;
 /// What the first one does: a hundredth of what that of single precision does.
 const FIRST_TOLERANCE: f64 = 1e-9;
+/// Points up to which they are a few. More are those of masks that lie over one another, whose labels differ so little that the
+/// first one would leave them open.
+const FEW: usize = 1 << 10;
 /// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision.
 const LEAD: f64 = 0.05;
 /// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
@@ -42,7 +45,6 @@ pub(super) fn decide(
     let contested = ties.values().map(Vec::len).sum();
     settle_by_seeds((a, b), iterations, best, &mut ties, cancel)?;
     let open: usize = ties.values().map(Vec::len).sum();
-    // of more than a few, labels differ so little that the first one would leave them open
     let first = (open <= FEW).then_some((trusted.last(), FIRST_TOLERANCE, LEAD));
     // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
     let last = (trusted.first(), TOLERANCE, 0.0);

@@ -69,7 +69,8 @@ impl<'a> SeedSearch<'a> {
     }
 
     /// Of `labels`, ascending, the one that wins at each of `points`, of equal ones the lowest: where seeds that come along edges
-    /// of more than the `least` weight tell, and not too many points have to be looked at. Winners have about these `values`.
+    /// of more than the `least` weight tell, and neither too many points have to be looked at nor more than 64 labels. Winners have
+    /// about these `values`.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
@@ -351,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_far_to_seeds_where_many_points_are_asked_about() {
+    fn the_more_points_are_asked_about_the_farther_it_may_be_to_seeds() {
         let n = 2 * MET_ANYWAY as u32;
         let edges: Vec<Vec<u32>> = (0..n).map(|i| vec![(i + 1) % n]).collect();
         let edges: Vec<&[u32]> = edges.iter().map(Vec::as_slice).collect();

@@ -5,7 +5,7 @@ use crate::{Cancel, Result};
 
 /// Union-find in which the root of a set is its lowest element.
 #[derive(Debug)]
-pub(crate) struct DisjointSets {
+pub(super) struct DisjointSets {
     parents: Vec<u32>,
 }
 
@@ -14,13 +14,13 @@ impl DisjointSets {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
-    pub(crate) fn new(n: usize, cancel: &Cancel) -> Result<Self> {
+    pub(super) fn new(n: usize, cancel: &Cancel) -> Result<Self> {
         Ok(Self {
             parents: collect(0..n as u32, cancel)?,
         })
     }
 
-    pub(crate) fn root(&mut self, mut element: u32) -> u32 {
+    pub(super) fn root(&mut self, mut element: u32) -> u32 {
         while self.parents[element as usize] != element {
             let grandparent = self.parents[self.parents[element as usize] as usize];
             self.parents[element as usize] = grandparent;
@@ -29,7 +29,7 @@ impl DisjointSets {
         element
     }
 
-    pub(crate) fn join(&mut self, a: u32, b: u32) {
+    pub(super) fn join(&mut self, a: u32, b: u32) {
         if self.parents[a as usize] == self.parents[b as usize] {
             return;
         }
