@@ -10,7 +10,7 @@ use super::seeds::Seeds;
 use super::series::Series;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
-use crate::memory::filled;
+use crate::memory::{push, with_room};
 use crate::{Cancel, Result};
 use rayon::prelude::*;
 
@@ -47,7 +47,8 @@ pub(super) fn leaders(
         probe: false,
         steps,
     };
-    let mut leaders = filled(Leader::default(), points.len(), cancel)?;
+    let mut leaders = with_room(points.len())?;
+    leaders.resize(points.len(), Leader::default());
     for plan in planner.plan((&exact_a, &b), candidates, cancel)? {
         let seeds = Seeds::new(&b, plan, cancel)?;
         let pass: Pass<f64, WIDTH_F64> =
@@ -61,44 +62,53 @@ pub(super) fn leaders(
         let offer = |(at, leader): (usize, &mut Leader)| {
             // points are the first of those that they reach
             let row = reach.as_ref().map_or(points[at] as usize, |_| at);
-            pass.at(row)
-                .for_each(|(label, value)| leader.offer(label, value));
+            let mut values = pass.at(row);
+            values.try_for_each(|(label, value)| leader.offer(label, value))
         };
         let leaders = leaders.par_iter_mut().with_min_len(ROWS_A_TASK);
-        leaders.enumerate().for_each(offer);
+        leaders.enumerate().try_for_each(offer)?;
     }
     Ok(leaders)
 }
 
-/// The label that wins at a point in double precision.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+/// The label that wins at a point in double precision, whatever the order in which labels are offered.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Leader {
-    /// Of [`EQUAL`] ones the lowest.
-    pub(super) label: u32,
-    value: f64,
-    /// The largest value that is not equal.
+    /// The labels whose values are [`EQUAL`] to the largest, and these values.
+    equal: Vec<(u32, f64)>,
+    /// The largest value that is not.
     next: f64,
 }
 
 impl Leader {
-    fn offer(&mut self, label: u32, value: f64) {
-        if value > self.value * (1.0 + EQUAL) {
-            *self = Self {
-                label,
-                value,
-                next: self.value,
-            };
-        } else if value >= self.value * (1.0 - EQUAL) {
-            self.label = label.min(self.label);
-            self.value = value.max(self.value);
-        } else {
-            self.next = value.max(self.next);
-        }
+    fn offer(&mut self, label: u32, value: f64) -> Result<()> {
+        let largest = self.value().max(value);
+        push(&mut self.equal, (label, value))?;
+        let next = &mut self.next;
+        self.equal.retain(|(_, value)| {
+            let is_equal = *value >= largest * (1.0 - EQUAL);
+            if !is_equal {
+                *next = value.max(*next);
+            }
+            is_equal
+        });
+        Ok(())
+    }
+
+    fn value(&self) -> f64 {
+        let values = self.equal.iter().map(|(_, value)| *value);
+        values.fold(0.0, f64::max)
+    }
+
+    /// The lowest of equal ones.
+    pub(super) fn label(&self) -> u32 {
+        let labels = self.equal.iter().map(|(label, _)| *label);
+        labels.min().unwrap_or(0)
     }
 
     /// How far it is ahead of those that are not equal.
     pub(super) fn lead(&self) -> f64 {
-        self.value - self.next
+        self.value() - self.next
     }
 }
 
@@ -106,30 +116,48 @@ impl Leader {
 mod tests {
     use super::*;
     use crate::test_support::chain;
+    use proptest::prelude::*;
+
+    fn leader(values: &[(u32, f64)]) -> Leader {
+        let mut leader = Leader::default();
+        for &(label, value) in values {
+            leader.offer(label, value).unwrap();
+        }
+        leader
+    }
 
     #[test]
-    fn of_values_that_rounding_tells_apart_the_lowest_label_leads_in_any_order() {
-        let leader = |values: &[(u32, f64)]| {
-            let mut leader = Leader::default();
-            let offers = values.iter();
-            offers.for_each(|&(label, value)| leader.offer(label, value));
-            (leader.label, leader.lead())
-        };
+    fn of_values_that_rounding_tells_apart_the_lowest_label_leads() {
         let below = 0.5 * (1.0 - f64::EPSILON);
-        for values in [
-            [(3, 0.5), (0, below), (7, 0.25)],
-            [(7, 0.25), (3, 0.5), (0, below)],
-            [(0, below), (7, 0.25), (3, 0.5)],
-        ] {
-            assert_eq!(leader(&values), (0, 0.25), "ahead of those that differ");
-        }
-        let below = 0.5 * (1.0 - 1e-12);
-        let (label, lead) = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
+        let found = leader(&[(3, 0.5), (0, below), (7, 0.25)]);
         assert_eq!(
-            (label, lead),
-            (1, 0.5 - below),
-            "two are equal, the third is near"
+            (found.label(), found.lead()),
+            (0, 0.25),
+            "ahead of those that differ"
         );
+        let below = 0.5 * (1.0 - 1e-12);
+        let found = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
+        assert_eq!((found.label(), found.lead()), (1, 0.5 - below));
+    }
+
+    proptest! {
+        #[test]
+        fn the_order_in_which_labels_are_offered_does_not_matter(
+            values in proptest::collection::vec(0..8_u8, 1..9).prop_map(|steps| {
+                // each differs from the next as much as rounding may make equal ones differ
+                let value = |step: u8| 0.5 * (1.0 + 0.7 * EQUAL * f64::from(step));
+                (0..).zip(steps.into_iter().map(value)).collect::<Vec<(u32, f64)>>()
+            }),
+            seed in any::<u64>(),
+        ) {
+            let largest = values.iter().map(|(_, value)| *value).fold(0.0, f64::max);
+            let first = values.iter().find(|(_, value)| *value >= largest * (1.0 - EQUAL));
+            let mut shuffled = values.clone();
+            shuffled.sort_by_key(|(label, _)| (u64::from(*label) + 1).wrapping_mul(seed | 1));
+            let [one, other] = [&values, &shuffled].map(|values| leader(values));
+            prop_assert_eq!(Some(one.label()), first.map(|(label, _)| *label));
+            prop_assert_eq!((one.label(), one.lead()), (other.label(), other.lead()));
+        }
     }
 
     #[test]
@@ -156,7 +184,7 @@ mod tests {
             let run = (None, Some(products));
             let found = leaders(&a, points, &[0, 1, 2, 3], run, exact, Cancel::never());
             let found = found.unwrap().into_iter();
-            found.map(|leader| leader.label).collect::<Vec<u32>>()
+            found.map(|leader| leader.label()).collect::<Vec<u32>>()
         };
         // point 2 has label 1 from itself, and label 2 from itself and from the next; nothing comes to point 5
         assert_eq!(labels_after(3, &[1, 2, 3, 5]), [1, 2, 2, 0]);

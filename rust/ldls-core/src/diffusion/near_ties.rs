@@ -65,7 +65,7 @@ pub(super) fn decide(
             };
             let is_open = leader.lead() < share * error(*point);
             if !is_open {
-                best[*point as usize].label = leader.label;
+                best[*point as usize].label = leader.label();
             }
             is_open
         };
