@@ -38,6 +38,7 @@ use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::{tabulate, zeros};
 use crate::{Cancel, Result};
+use std::mem::take;
 
 /// The winning label of every point.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,11 +70,11 @@ pub fn diffuse(
     b.check(a.len(), n_labels)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
     let (mut winners, mut probed, mut error) = (Winners::default(), Vec::new(), 0.0);
-    let choose = |pass: &Pass<f32, WIDTH_F32>| {
+    let choose = |pass: &mut Pass<f32, WIDTH_F32>| {
         error = pass.convergence.error.max(error);
         winners.update(pass, error, cancel)?;
-        if let Some(errors) = pass.errors(cancel)? {
-            probed = errors;
+        if !pass.errors.is_empty() {
+            probed = take(&mut pass.errors);
         }
         Ok(())
     };
@@ -108,7 +109,7 @@ pub fn likelihoods(
     b.check(a.len(), n_labels)?;
     let mut all = zeros(a.len().saturating_mul(n_labels), cancel)?;
     let labels: Vec<u32> = (0..n_labels as u32).collect();
-    let write = |pass: &Pass<f32, WIDTH_F32>| {
+    let write = |pass: &mut Pass<f32, WIDTH_F32>| {
         for (point, row) in all.chunks_mut(n_labels).enumerate() {
             for (label, value) in pass.at(point) {
                 row[label as usize] = value;

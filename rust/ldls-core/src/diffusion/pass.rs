@@ -26,8 +26,8 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     z: Values<T, WIDTH>,
     /// Values before the last step, which the next one overwrites.
     previous: Values<T, WIDTH>,
-    /// Sum of the magnitudes of the coefficients that a series leaves out.
-    left_out: f64,
+    /// What a series may leave out at each point, going by the probe; nothing where the pass has none of both.
+    pub(super) errors: Vec<f32>,
     pub(super) convergence: Convergence,
 }
 
@@ -99,7 +99,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             activity: Activity::new(schedule, &seeds.groups(cancel)?),
             z,
             previous,
-            left_out: 0.0,
+            errors: Vec::new(),
             convergence: Convergence::default(),
         })
     }
@@ -108,10 +108,9 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         self.advance(&series.steps(), cancel)?;
         self.convergence.sweeps = series.degree();
         // the probe has gone through the recurrence as the last term alone
-        self.left_out = series.tail;
-        let errors = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
-        let errors = errors.filter_map(|point| self.error(point));
-        self.convergence.error = errors.reduce(|| 0.0, f64::max);
+        self.errors = self.errors_of(series.tail, cancel)?;
+        let errors = self.errors.par_iter().with_min_len(ROWS_A_TASK).copied();
+        self.convergence.error = errors.reduce(|| 0.0, f32::max).into();
         Ok(())
     }
 
@@ -166,11 +165,16 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         self.seeds.plan.labels_at(point, group)
     }
 
-    /// Values of each group at all points, and one for each of its lanes, zero for that of the probe.
+    /// Values of each group at all points, and one for each of its lanes, zero for those of the probe.
     pub(super) fn groups(&self) -> impl Iterator<Item = (&[Lanes<T, WIDTH>], [T; WIDTH])> {
         self.z.groups().enumerate().map(|(group, values)| {
             let mut counts = [T::from_f64(1.0); WIDTH];
-            if let Some(lane) = self.seeds.plan.probe.filter(|lane| lane / WIDTH == group) {
+            for lane in self
+                .seeds
+                .plan
+                .probe_lanes()
+                .filter(|lane| lane / WIDTH == group)
+            {
                 counts[lane % WIDTH] = T::default();
             }
             (values, counts)
@@ -178,10 +182,10 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     }
 
     fn largest_change(&self) -> f64 {
-        let probe = self.seeds.plan.probe;
+        let probe = self.seeds.plan.probe_lanes();
         let of_group = |group: usize| {
             let change_at = |(z, previous): (&Lanes<T, WIDTH>, &Lanes<T, WIDTH>)| {
-                let lanes = (0..WIDTH).filter(|lane| Some(group * WIDTH + lane) != probe);
+                let lanes = (0..WIDTH).filter(|lane| !probe.contains(&(group * WIDTH + lane)));
                 let changes = lanes.map(|lane| (z[lane] - previous[lane]).to_f64().abs());
                 changes.fold(0.0, f64::max)
             };
@@ -195,24 +199,19 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             .fold(0.0, f64::max)
     }
 
-    /// What the series may leave out at a point, going by the probe there; none where there is no series or no probe.
-    fn error(&self, point: usize) -> Option<f64> {
-        let lane = self.seeds.plan.probe.filter(|_| self.left_out > 0.0)?;
-        Some(
-            self.left_out
-                * self.z.group(lane / WIDTH)[point][lane % WIDTH]
-                    .to_f64()
-                    .abs(),
-        )
-    }
-
-    /// That of all points.
-    pub(super) fn errors(&self, cancel: &Cancel) -> Result<Option<Vec<f32>>> {
-        if self.a.is_empty() || self.error(0).is_none() {
-            return Ok(None);
-        }
-        let error = |point| self.error(point).unwrap_or_default() as f32;
-        tabulate(self.a.len(), error, cancel).map(Some)
+    /// What the series, whose coefficients left out sum to `tail`, may leave out at each point, going by the probe there; nothing
+    /// where there is no probe.
+    fn errors_of(&self, tail: f64, cancel: &Cancel) -> Result<Vec<f32>> {
+        let Some(first) = self.seeds.plan.probe.filter(|_| tail > 0.0) else {
+            return Ok(Vec::new());
+        };
+        let values = self.z.group(first / WIDTH);
+        let error = |point: usize| {
+            let probed = [0, 1].map(|lane| values[point][first % WIDTH + lane].to_f64());
+            let [x, y] = probed;
+            (tail * (x * x + y * y).sqrt()) as f32
+        };
+        tabulate(self.a.len(), error, cancel)
     }
 
     /// True if at most `most_left_out` is left out, no likelihood is negative or larger than the `largest` share of one label, and

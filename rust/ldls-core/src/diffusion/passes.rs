@@ -22,7 +22,7 @@ pub(super) fn for_each_pass(
     labels: &[u32],
     iterations: Option<usize>,
     cancel: &Cancel,
-    mut done: impl FnMut(&Pass<f32, WIDTH_F32>) -> Result<()>,
+    mut done: impl FnMut(&mut Pass<f32, WIDTH_F32>) -> Result<()>,
 ) -> Result<(Convergence, Vec<Series>)> {
     // parts of each are for one thread alone
     let (mut series, schedule) = rayon::join(
@@ -52,7 +52,7 @@ pub(super) fn for_each_pass(
             }
             cancel.check()?;
             pass.drop_previous();
-            done(&pass)?;
+            done(&mut pass)?;
             convergence.merge(pass.convergence);
             probe = false;
             labels.retain(|label| seeds.plan.lanes.iter().all(|(other, _)| other != label));

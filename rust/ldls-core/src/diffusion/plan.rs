@@ -24,6 +24,8 @@ const SHARED_FROM: usize = (1 << 15) / BLOCK;
 const AWAKE_A_GROUP: f64 = 1.0 / 16.0;
 /// Lane of the background in the pass that has it.
 pub(super) const BACKGROUND_LANE: usize = 0;
+/// Lanes of the probe.
+pub(super) const PROBE_LANES: usize = 2;
 /// Label of a lane where it has none.
 const NONE: u32 = u32::MAX;
 
@@ -32,7 +34,7 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Plan {
     /// Each label, and the lane that it has wherever it comes.
     pub(super) lanes: Vec<(u32, usize)>,
-    /// Lane of the probe, where the pass has it.
+    /// First lane of the probe, all of which are in the first group, where the pass has it.
     pub(super) probe: Option<usize>,
     /// Number of groups of lanes.
     pub(super) groups: usize,
@@ -50,8 +52,8 @@ pub(super) struct Planner<'a> {
     pub(super) schedule: &'a Schedule,
     /// Lanes of a group.
     pub(super) width: usize,
-    /// Whether the first has the probe: all labels with random factors, of which only the last term of the series is summed. It
-    /// shows how large the terms left out may be.
+    /// Whether the first has the probe: all labels times factors, of which only the last term of the series is summed. It shows
+    /// how large the terms left out may be.
     pub(super) probe: bool,
     /// Most steps of each.
     pub(super) steps: usize,
@@ -74,7 +76,7 @@ impl Planner<'_> {
     ) -> Result<Vec<Plan>> {
         let background = labels.contains(&0);
         let probe = self.probe.then_some(usize::from(background));
-        let own = usize::from(background) + usize::from(self.probe);
+        let own = usize::from(background) + probe.map_or(0, |_| PROBE_LANES);
         let in_first = if own > 0 { self.width - own } else { 0 };
         let seeded = in_order(b, labels, in_first);
         let blocks = self.schedule.blocks();
@@ -143,6 +145,11 @@ impl Plan {
             labels,
             stride: if blocks > 1 { stride } else { 0 },
         })
+    }
+
+    /// The lanes of the probe.
+    pub(super) fn probe_lanes(&self) -> Range<usize> {
+        self.probe.map_or(0..0, |first| first..first + PROBE_LANES)
     }
 
     /// Label of each lane of `group` at a row, if it has one there.
@@ -262,10 +269,10 @@ mod tests {
         };
         assert_eq!((plan.groups, plan.probe), (2, Some(1)));
         // of labels with as many seeds the lowest first, and then by place
-        assert_eq!(at(plan, 0), [Some(0), None, Some(1), Some(2)]);
+        assert_eq!(at(plan, 0), [Some(0), None, None, Some(1)]);
         assert_eq!(at(plan, 99), at(plan, 0));
         let second: Vec<_> = plan.labels_at(0, 1).collect();
-        assert_eq!(second, [Some(3), Some(4), None, None]);
+        assert_eq!(second, [Some(3), Some(4), Some(2), None]);
     }
 
     #[test]

@@ -4,13 +4,16 @@
 //! from all masks, that of a mask within it, or of several. These are added with the other terms; the rest one by one.
 
 use super::lanes::Lanes;
-use super::plan::{BACKGROUND_LANE, Plan};
+use super::plan::{BACKGROUND_LANE, PROBE_LANES, Plan};
 use super::schedule::{BLOCK, ROWS_A_TASK};
 use crate::bits::ones;
 use crate::masks::PixelLabels;
 use crate::memory::{push, tabulate, with_room, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
+
+/// What divides a circle by the golden ratio: pi (3 - sqrt 5).
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 /// The seeds of the labels of one pass by lane.
 #[derive(Debug)]
@@ -23,7 +26,7 @@ pub(super) struct Seeds<T> {
     pub(super) in_common: Vec<T>,
     others: Others<T>,
     /// Seeds of the probe, where the pass has it.
-    probe: Vec<T>,
+    probe: Vec<[T; PROBE_LANES]>,
     /// Values up to this magnitude are too small to matter.
     pub(super) least: T,
 }
@@ -85,9 +88,17 @@ impl<T: Real> Seeds<T> {
         let tasks = common.par_chunks_mut(ROWS_A_TASK / BLOCK);
         let tasks = tasks.zip(in_common.par_chunks_mut(ROWS_A_TASK)).enumerate();
         let others = Others::concat(tasks.map(of_task).collect::<Result<_>>()?)?;
-        let signed = |(label, weight): (usize, T)| T::from_f64(random_factor(label)) * weight;
         let probe = if plan.probe.is_some() {
-            tabulate(b.rows(), |i| b.row(i).map(signed).sum(), cancel)?
+            let labels = b.labels.par_iter().max();
+            let directions: Vec<[T; PROBE_LANES]> =
+                directions(labels.map_or(0, |&label| label as usize + 1));
+            let in_lane = |row: usize, lane: usize| {
+                let seeds = b.row(row);
+                let seeds = seeds.map(|(label, seed)| directions[label][lane] * seed);
+                seeds.sum()
+            };
+            let of_row = |row: usize| [0, 1].map(|lane| in_lane(row, lane));
+            tabulate(b.rows(), of_row, cancel)?
         } else {
             Vec::new()
         };
@@ -109,7 +120,7 @@ impl<T: Real> Seeds<T> {
         // what is nearly everywhere counts as everywhere
         let background = self.plan.lanes.contains(&(0, BACKGROUND_LANE));
         let everywhere = background.then_some(BACKGROUND_LANE);
-        let everywhere = everywhere.into_iter().chain(self.plan.probe);
+        let everywhere = everywhere.into_iter().chain(self.plan.probe_lanes());
         let everywhere = everywhere.fold(0, |lanes, lane| lanes | 1 << lane);
         let of_block = |block: usize| {
             let common = everywhere | self.common[block];
@@ -142,9 +153,9 @@ impl<T: Real> Seeds<T> {
                 }
             }
         }
-        if let Some(lane) = self.plan.probe.and_then(lane_of) {
+        for (at, lane) in self.plan.probe_lanes().filter_map(lane_of).enumerate() {
             let values = values.iter_mut().zip(&self.probe[first..]);
-            values.for_each(|(value, &seed)| value[lane] = seed);
+            values.for_each(|(value, seeds)| value[lane] = seeds[at]);
         }
     }
 
@@ -248,16 +259,14 @@ fn seed_in_all<T: Real>(common: u64, seeds: impl Iterator<Item = (u8, T)>) -> T 
     }
 }
 
-/// A number of magnitude 0.5 to 1.5, without a pattern, so that masks which show the same do not cancel each other.
-fn random_factor(label: usize) -> f64 {
-    // the multiplier of Knuth's multiplicative hash
-    let hash = (label as u32).wrapping_add(1).wrapping_mul(2_654_435_769);
-    let magnitude = 0.5 + f64::from(hash >> 16) / f64::from(1 << 16);
-    if hash & 0x8000 == 0 {
-        magnitude
-    } else {
-        -magnitude
-    }
+/// The factors with which the probe has so many labels: each a direction of its own, far from those of the labels before and
+/// after it, so that what masks side by side lack and have too much of does not cancel.
+fn directions<T: Real>(labels: usize) -> Vec<[T; PROBE_LANES]> {
+    let direction = |label: usize| {
+        let (sine, cosine) = (GOLDEN_ANGLE * label as f64).sin_cos();
+        [cosine, sine].map(T::from_f64)
+    };
+    (0..labels).map(direction).collect()
 }
 
 #[cfg(test)]
