@@ -8,6 +8,7 @@
 
 mod convergence;
 mod errors;
+mod lane_order;
 mod lanes;
 mod leaders;
 mod near_ties;

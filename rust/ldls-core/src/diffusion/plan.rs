@@ -3,13 +3,13 @@
 //! A label comes one edge farther with every step. In a large cloud most stay far from most others, and those that never come to
 //! the same block share a lane: a pass holds more of them, and fewer groups of lanes are in use at any place.
 
+use super::lane_order::in_order;
 use super::schedule::{BLOCK, Schedule};
 use super::spread::{Blocks, spread};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::memory::filled;
 use crate::{Cancel, Real, Result};
-use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;
 
@@ -63,8 +63,7 @@ impl Planner<'_> {
     /// The passes that `labels` take over the graph `a` from their seeds in `b`. Labels without a seed need no lane.
     ///
     /// The first group, which the background keeps busy everywhere, takes the labels with the most seeds, or where lanes are
-    /// shared those that come farthest; the others follow in the order of where they lie, so that the labels of a group are
-    /// neighbours and the group is zero over most of the cloud.
+    /// shared those that come farthest.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
@@ -77,8 +76,7 @@ impl Planner<'_> {
         let background = labels.contains(&0);
         let probe = self.probe.then_some(usize::from(background));
         let own = usize::from(background) + probe.map_or(0, |_| PROBE_LANES);
-        let in_first = if own > 0 { self.width - own } else { 0 };
-        let seeded = in_order(b, labels, in_first);
+        let seeded = in_order(b, labels, own, self.width);
         let blocks = self.schedule.blocks();
         let groups = (own + seeded.len()).div_ceil(self.width);
         let come = if blocks >= SHARED_FROM && groups > 1 {
@@ -159,47 +157,6 @@ impl Plan {
         let labels = self.labels[first..first + self.width].iter();
         labels.map(|&label| (label != NONE).then_some(label))
     }
-}
-
-/// Those of `labels` other than the background that have seeds: the `most_seeds` with the most first, then by where they lie.
-fn in_order<T: Real>(b: &PixelLabels<T>, labels: &[u32], most_seeds: usize) -> Vec<u32> {
-    let (counts, row_sums) = count_seeds(b, labels);
-    let count = |label: &u32| counts[*label as usize];
-    // rows are in the order of the tree: near rows are near points
-    let middle = |label: &u32| row_sums[*label as usize] / count(label);
-    let is_seeded = |label: &u32| *label > 0 && count(label) > 0;
-    let mut seeded: Vec<u32> = labels.iter().copied().filter(is_seeded).collect();
-    seeded.sort_by_key(|label| Reverse(count(label)));
-    if let Some(rest) = seeded.get_mut(most_seeds..) {
-        rest.sort_by_key(|label| (middle(label), *label));
-    }
-    seeded
-}
-
-/// Number of the seeds of each label up to the highest of `labels`, and the sum of their rows.
-fn count_seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> (Vec<u64>, Vec<u64>) {
-    let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
-    let none = || (vec![0; n_labels], vec![0; n_labels]);
-    let of_rows = |rows: Range<usize>| {
-        let (mut counts, mut row_sums) = none();
-        for i in rows {
-            for (label, _) in b.row(i).filter(|&(label, _)| label < n_labels) {
-                counts[label] += 1;
-                row_sums[label] += i as u64;
-            }
-        }
-        (counts, row_sums)
-    };
-    let both = |(mut counts, mut row_sums): (Vec<u64>, Vec<u64>), other: (Vec<u64>, Vec<u64>)| {
-        counts.iter_mut().zip(other.0).for_each(|(a, b)| *a += b);
-        row_sums.iter_mut().zip(other.1).for_each(|(a, b)| *a += b);
-        (counts, row_sums)
-    };
-    let tasks = 4 * rayon::current_num_threads();
-    let size = b.rows().div_ceil(tasks).max(1);
-    let tasks = (0..b.rows().div_ceil(size)).into_par_iter();
-    let tasks = tasks.map(|task| of_rows(task * size..b.rows().min((task + 1) * size)));
-    tasks.reduce(none, both)
 }
 
 /// Lanes for `labels`, each in the first that is free in all blocks to which it may `come`.
