@@ -1,13 +1,13 @@
 //! How far pixels lie from the edge of a mask, inside and outside.
 
-use crate::memory::{collect, filled};
+use crate::memory::filled;
 use crate::{Cancel, Result, Rle};
 use std::ops::Range;
 
 /// Most pixels by which a mask may be off, and pixels inside it on which all count alike.
-const REACH: usize = 10;
+const REACH: i8 = 10;
 /// Steps that stand for all beyond.
-const FARTHER: u8 = REACH as u8 + 1;
+const FARTHER: i8 = REACH + 1;
 /// Fewest pixels by which a mask may be off.
 const LEAST_MARGIN: usize = 3;
 
@@ -15,7 +15,9 @@ const LEAST_MARGIN: usize = 3;
 pub(super) struct Edges {
     columns: Range<usize>,
     rows: Range<usize>,
-    /// Column by column: steps to the nearest pixel outside the mask, or minus those to the nearest one inside.
+    /// Pixels by which the mask may be off.
+    margin: i8,
+    /// Column by column: steps to the nearest pixel outside the mask, or minus those to the nearest one inside, [`FARTHER`] at most.
     steps: Vec<i8>,
 }
 
@@ -26,22 +28,31 @@ impl Edges {
             return Ok(None);
         };
         let shorter = columns.len().min(rows.len());
-        let margin = ((margin * shorter as f64) as usize).clamp(LEAST_MARGIN, REACH);
+        let margin = ((margin * shorter as f64) as usize).clamp(LEAST_MARGIN, REACH as usize);
         let around = |side: Range<usize>, end: usize| {
             side.start.saturating_sub(margin)..(side.end + margin).min(end)
         };
         let (columns, rows) = (around(columns, mask.width()), around(rows, mask.height()));
-        let window = [columns.clone(), rows.clone()];
-        let to_outside = steps_to(&mask.complement(), &window, cancel)?;
-        let to_inside = steps_to(mask, &window, cancel)?;
-        let signed = |(&out, &back): (&u8, &u8)| match (out, back) {
-            (0, back) if usize::from(back) <= margin => -(back as i8),
-            (out, _) => out.min(REACH as u8) as i8,
-        };
-        let steps = collect(to_outside.iter().zip(&to_inside).map(signed), cancel)?;
+        let mut steps = filled(-FARTHER, columns.len() * rows.len(), cancel)?;
+        let mut spans = mask.column_spans().peekable();
+        for (column, steps) in columns.clone().zip(steps.chunks_mut(rows.len())) {
+            let mut outside = 0;
+            while let Some((_, span)) = spans.next_if(|(of, _)| *of == column) {
+                let [start, end] = [span.start, span.end].map(|row| row - rows.start);
+                count_along(steps, outside..start, -1);
+                count_along(steps, start..end, 1);
+                outside = end;
+            }
+            if outside > 0 {
+                count_along(steps, outside..rows.len(), -1);
+            }
+        }
+        cancel.check()?;
+        spread(&mut steps, rows.len());
         Ok(Some(Self {
             columns,
             rows,
+            margin: margin as i8,
             steps,
         }))
     }
@@ -57,7 +68,13 @@ impl Edges {
         if !self.columns.contains(&column) || !self.rows.contains(&row) {
             return 0;
         }
-        self.steps[(column - self.columns.start) * self.rows.len() + row - self.rows.start]
+        let steps =
+            self.steps[(column - self.columns.start) * self.rows.len() + row - self.rows.start];
+        if steps < -self.margin {
+            0
+        } else {
+            steps.min(REACH)
+        }
     }
 }
 
@@ -72,34 +89,24 @@ fn extent(mask: &Rle) -> Option<[Range<usize>; 2]> {
     all
 }
 
-/// Steps from each pixel of a window, columns and rows, to the nearest one of `mask` in it, at most [`FARTHER`].
-fn steps_to(mask: &Rle, [columns, rows]: &[Range<usize>; 2], cancel: &Cancel) -> Result<Vec<u8>> {
-    let mut steps = filled(FARTHER, columns.len() * rows.len(), cancel)?;
-    for (column, span) in mask.column_spans() {
-        let span = span.start.max(rows.start)..span.end.min(rows.end);
-        if columns.contains(&column) && !span.is_empty() {
-            let start = (column - columns.start) * rows.len();
-            let span = span.start - rows.start..span.end - rows.start;
-            surround(&mut steps[start..start + rows.len()], span);
-        }
+/// Steps along a column from the pixels of a `run`, all inside the mask or all outside, to those before and after it, with the
+/// sign of where it lies.
+fn count_along(column: &mut [i8], run: Range<usize>, sign: i8) {
+    let (first, last) = (run.start == 0, run.end == column.len());
+    let run = &mut column[run];
+    run.fill(sign * FARTHER);
+    let nearer = |(steps, pixel): (i8, &mut i8)| *pixel = sign * steps.min(pixel.abs());
+    if !first {
+        (1..FARTHER).zip(run.iter_mut()).for_each(nearer);
     }
-    spread(&mut steps, rows.len());
-    Ok(steps)
-}
-
-/// Steps along a column to the pixels of a span, where none is nearer.
-fn surround(column: &mut [u8], span: Range<usize>) {
-    let (above, others) = column.split_at_mut(span.start);
-    let (own, below) = others.split_at_mut(span.len());
-    own.fill(0);
-    let nearer = |(step, pixel): (u8, &mut u8)| *pixel = step.min(*pixel);
-    (1..FARTHER).zip(above.iter_mut().rev()).for_each(nearer);
-    (1..FARTHER).zip(below).for_each(nearer);
+    if !last {
+        (1..FARTHER).zip(run.iter_mut().rev()).for_each(nearer);
+    }
 }
 
 /// Turns steps along each column, of `height` pixels, into those by any of the eight neighbours: over columns first, from
 /// one side and then from the other.
-fn spread(steps: &mut [u8], height: usize) {
+fn spread(steps: &mut [i8], height: usize) {
     for column in 1..steps.len() / height {
         let (before, after) = steps.split_at_mut(column * height);
         step_over(&before[(column - 1) * height..], &mut after[..height]);
@@ -111,19 +118,28 @@ fn spread(steps: &mut [u8], height: usize) {
 }
 
 /// Takes one step from a column `from` to the one beside it, straight or to a side.
-fn step_over(from: &[u8], to: &mut [u8]) {
+fn step_over(from: &[i8], to: &mut [i8]) {
     let last = from.len() - 1;
     for row in [0, last] {
         let beside = &from[row.saturating_sub(1)..(row + 2).min(from.len())];
-        let nearest = beside
-            .iter()
-            .fold(FARTHER, |nearest, &steps| nearest.min(steps));
-        to[row] = to[row].min(nearest + 1);
+        for &steps in beside {
+            to[row] = nearer(to[row], [steps; 3]);
+        }
     }
     for (to, beside) in to[1..last.max(1)].iter_mut().zip(from.windows(3)) {
-        let nearest = beside[0].min(beside[1]).min(beside[2]);
-        *to = (*to).min(nearest + 1);
+        *to = nearer(*to, [beside[0], beside[1], beside[2]]);
     }
+}
+
+/// The steps of a pixel, or one more than the fewest `beside` it, where those on the other side of the edge are none.
+#[inline(always)]
+fn nearer(steps: i8, beside: [i8; 3]) -> i8 {
+    // all bits are set if it lies outside: steps on its side count positive with that
+    let outside = steps >> 7;
+    let on_its_side = |steps: i8| (steps ^ outside) - outside;
+    let [above, level, below] = beside.map(on_its_side);
+    let nearest = above.min(level).min(below).max(0) + 1;
+    on_its_side(nearest.min(on_its_side(steps)))
 }
 
 #[cfg(test)]
@@ -151,7 +167,7 @@ mod tests {
             };
             let [columns, rows] = extent(&mask).unwrap();
             let shorter = columns.len().min(rows.len()) as f64;
-            let margin = ((share * shorter) as usize).clamp(LEAST_MARGIN, REACH);
+            let margin = ((share * shorter) as usize).clamp(LEAST_MARGIN, REACH as usize);
             for at in 0..PIXELS {
                 let steps = |other: usize| {
                     (at / ROWS).abs_diff(other / ROWS).max((at % ROWS).abs_diff(other % ROWS))
@@ -159,7 +175,7 @@ mod tests {
                 let others = (0..PIXELS).filter(|&other| pixels[other] != pixels[at]);
                 let nearest = others.map(steps).min().unwrap_or(PIXELS);
                 let expected = match (pixels[at], nearest <= margin) {
-                    (true, _) => nearest.min(REACH) as i8,
+                    (true, _) => nearest.min(REACH as usize) as i8,
                     (false, true) => -(nearest as i8),
                     (false, false) => 0,
                 };
