@@ -34,7 +34,7 @@ def suite(measured: Frame, options: argparse.Namespace) -> Table:
         for name, params in methods.items()
         for at, frame in enumerate(frames)
     }
-    runs = min(options.runs, 5)
+    runs = min(options.runs, 9)
     seconds = medians(calls, runs=runs)
     table = new_table(
         f"ldls.segment: {len(frames) - 1} frames of the suite",

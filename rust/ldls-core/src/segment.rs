@@ -100,13 +100,13 @@ pub fn segment(
         normalize(nearest, pixel_labels, heights, params, cancel)
     })?;
     let exact = |among: Option<&[u32]>| {
-        let pixels = b.counted(among, |row| a.own_weight(row), params.pixel_weight, cancel)?;
+        let pixels = || b.counted(among, |row| a.own_weight(row), params.pixel_weight, cancel);
         let Some(places) = among else {
-            return normalize(nearest, pixels, heights, params, cancel);
+            return normalize(nearest, pixels()?, heights, params, cancel);
         };
-        let nearest = nearest.among(places, cancel)?;
+        let (pixels, nearest) = rayon::join(pixels, || nearest.among(places, cancel));
         let heights = arrange(places, heights, cancel)?;
-        normalize(&nearest, pixels, &heights, params, cancel)
+        normalize(&nearest?, pixels?, &heights, params, cancel)
     };
     let diffused = timed(&mut t.diffusion, || {
         diffuse(&a, &b, scene.n_labels(), params.iterations, exact, cancel)
