@@ -5,9 +5,9 @@
 
 use crate::graph::PointGraph;
 
-/// By how many times the terms left out may be larger than the last one around a point: of 800,000 points of 64 beams none where
-/// those of the two best labels differ by more than twice as much.
-const SAFETY: f64 = 3.0;
+/// By how many times the terms left out may be larger than the last one around a point. Of 540,000 points of four lidars there is
+/// none at which those of the two best labels differ by more than twice as much.
+const SAFETY: f64 = 2.5;
 
 /// What the series may leave out at each point, going by the probe there.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ mod tests {
         let a = PointGraph::from_csr(offsets, rows.concat(), vec![0.25; 7]).unwrap();
         let errors = |probed| Errors { a: &a, probed };
         let probed = errors(vec![0.25, 0.0, 0.5, 1.0]);
-        assert_eq!([0, 1, 3].map(|point| probed.at(point)), [1.5, 3.0, 3.0]);
+        assert_eq!([0, 1, 3].map(|point| probed.at(point)), [1.25, 2.5, 2.5]);
         assert_eq!(errors(Vec::new()).at(0), 0.0);
     }
 }

@@ -259,12 +259,14 @@ fn seed_in_all<T: Real>(common: u64, seeds: impl Iterator<Item = (u8, T)>) -> T 
     }
 }
 
-/// The factors with which the probe has so many labels: each a direction of its own, far from those of the labels before and
-/// after it, so that what masks side by side lack and have too much of does not cancel.
+/// The factors with which the probe has so many labels: directions in a plane, so that what one lacks and what the one beside it has
+/// too much of does not cancel. Those of labels one after the other lie far apart, and that of the background, which all objects
+/// are beside, far from all.
 fn directions<T: Real>(labels: usize) -> Vec<[T; PROBE_LANES]> {
     let direction = |label: usize| {
         let (sine, cosine) = (GOLDEN_ANGLE * label as f64).sin_cos();
-        [cosine, sine].map(T::from_f64)
+        let length = if label == 0 { 2.0 } else { 1.0 };
+        [cosine, sine].map(|part| T::from_f64(length * part))
     };
     (0..labels).map(direction).collect()
 }
