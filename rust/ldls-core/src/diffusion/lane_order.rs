@@ -11,37 +11,33 @@ use std::cmp::Reverse;
 /// Parts of the cloud that are told apart, a bit each: rows are in the order of the tree, so near rows are near points.
 const PARTS: usize = u64::BITS as usize;
 
-/// Those of `labels` other than the background that have seeds in `b`, in the order of the lanes that they take after the first
-/// `own`, of which `width` make a group.
+/// `labels` in the order of the lanes that they take after the first `own`, of which `width` make a group. Label l has `seeds[l]`.
 ///
 /// The first group, if it has lanes of its own, is in use everywhere, so the labels with the most seeds are free there. The others
 /// follow by the first part that they have seeds in, and then change places with others as long as that leaves groups with fewer
 /// parts.
-pub(super) fn in_order<T: Real>(
-    b: &PixelLabels<T>,
-    labels: &[u32],
+pub(super) fn in_order(
+    mut labels: Vec<u32>,
+    seeds: &[Seeds],
     own: usize,
     width: usize,
 ) -> Vec<u32> {
-    let found = seeds(b, labels);
-    let of = |label: &u32| found[*label as usize];
-    let is_seeded = |label: &u32| *label > 0 && of(label).count > 0;
-    let mut seeded: Vec<u32> = labels.iter().copied().filter(is_seeded).collect();
-    seeded.sort_by_key(|label| Reverse(of(label).count));
+    let of = |label: &u32| seeds[*label as usize];
+    labels.sort_by_key(|label| Reverse(of(label).count));
     let in_first = if own > 0 { width - own } else { 0 };
-    if let Some(rest) = seeded.get_mut(in_first..) {
+    if let Some(rest) = labels.get_mut(in_first..) {
         rest.sort_by_key(|label| (of(label).parts.trailing_zeros(), *label));
     }
-    let of_label = |label: u32| (label, of(&label).parts);
-    let mut seeded: Vec<(u32, u64)> = seeded.into_iter().map(of_label).collect();
-    change_places(&mut seeded, own, width);
-    seeded.into_iter().map(|(label, _)| label).collect()
+    let with_parts = labels.iter().map(|label| (*label, of(label).parts));
+    let mut labels: Vec<(u32, u64)> = with_parts.collect();
+    change_places(&mut labels, own, width);
+    labels.into_iter().map(|(label, _)| label).collect()
 }
 
 /// The seeds of a label.
 #[derive(Debug, Clone, Copy, Default)]
-struct Seeds {
-    count: u64,
+pub(super) struct Seeds {
+    pub(super) count: u64,
     /// A bit for each part of the cloud that has one.
     parts: u64,
 }
@@ -55,8 +51,8 @@ impl Seeds {
     }
 }
 
-/// Those of each label up to the highest of `labels`.
-fn seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
+/// Those in `b` of each label up to the highest of `labels`.
+pub(super) fn seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
     let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
     let size = b.rows().div_ceil(PARTS).max(1);
     let none = || vec![Seeds::default(); n_labels];
@@ -149,13 +145,14 @@ mod tests {
     }
 
     #[test]
-    fn labels_without_seeds_take_no_lane_and_those_of_one_place_lie_side_by_side() {
+    fn labels_of_one_place_lie_side_by_side_and_those_of_the_most_seeds_in_the_first_group() {
         let b = one_seed_each(640, &[0, 9, 600, 12, 610, 11, 620]);
-        assert_eq!(
-            in_order(&b, &[0, 1, 2, 3, 4, 5, 6, 7], 0, 3),
-            [1, 3, 5, 2, 4, 6]
-        );
-        assert_eq!(in_order(&b, &[2, 3], 1, 3), [2, 3]);
+        let mut seeds = seeds(&b, &[0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!((seeds[6].count, seeds[7].count), (1, 0));
+        let order = |seeds: &[Seeds], own| in_order((1..7).collect(), seeds, own, 3);
+        assert_eq!(order(&seeds, 0), [1, 3, 5, 2, 4, 6]);
+        seeds[4].count = 9;
+        assert_eq!(order(&seeds, 2)[0], 4);
     }
 
     proptest! {
