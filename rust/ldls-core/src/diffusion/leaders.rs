@@ -82,6 +82,10 @@ pub(super) struct Leader {
 
 impl Leader {
     fn offer(&mut self, label: u32, value: f64) -> Result<()> {
+        if value <= 0.0 {
+            // nothing of it came here
+            return Ok(());
+        }
         let largest = self.value().max(value);
         push(&mut self.equal, (label, value))?;
         let next = &mut self.next;
@@ -135,6 +139,7 @@ mod tests {
             (0, 0.25),
             "ahead of those that differ"
         );
+        assert_eq!(leader(&[(3, 0.0), (5, 0.0)]).label(), 0, "nothing came");
         let below = 0.5 * (1.0 - 1e-12);
         let found = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
         assert_eq!((found.label(), found.lead()), (1, 0.5 - below));
