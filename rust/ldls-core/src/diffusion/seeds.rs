@@ -294,6 +294,19 @@ mod tests {
         assert_eq!(most_common(&rows[..2]), of_background.lanes);
     }
 
+    #[test]
+    fn in_the_probe_labels_in_a_row_lie_far_apart_and_the_background_far_from_all() {
+        let directions = directions::<f64>(500);
+        let apart = |one: usize, other: usize| {
+            let [one, other] = [directions[one], directions[other]];
+            (one[0] - other[0]).hypot(one[1] - other[1])
+        };
+        for label in 1..499 {
+            assert!(apart(0, label) > 0.999, "{label}");
+            assert!(apart(label, label + 1) > 1.8, "{label}");
+        }
+    }
+
     proptest! {
         #[test]
         fn what_is_common_and_what_is_not_are_all_seeds(
