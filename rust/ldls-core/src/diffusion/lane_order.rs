@@ -11,19 +11,19 @@ use std::cmp::Reverse;
 /// Parts of the cloud that are told apart, a bit each: rows are in the order of the tree, so near rows are near points.
 const PARTS: usize = u64::BITS as usize;
 
-/// `labels` in the order of the lanes that they take after the first `own`, of which `width` make a group. Label l has `seeds[l]`.
+/// `labels` in the order of the lanes that they take after the first `own`, where `width` make a group. Label l has `extents[l]`.
 ///
 /// The first group, if it has lanes of its own, is in use everywhere, so the labels with the most seeds are free there. The others
 /// follow by the first part that they have seeds in, and then change places with others as long as that leaves groups with fewer
 /// parts.
 pub(super) fn in_order(
     mut labels: Vec<u32>,
-    seeds: &[Seeds],
+    extents: &[Extent],
     own: usize,
     width: usize,
 ) -> Vec<u32> {
-    let of = |label: &u32| seeds[*label as usize];
-    labels.sort_by_key(|label| Reverse(of(label).count));
+    let of = |label: &u32| extents[*label as usize];
+    labels.sort_by_key(|label| Reverse(of(label).seeds));
     let in_first = if own > 0 { width - own } else { 0 };
     if let Some(rest) = labels.get_mut(in_first..) {
         rest.sort_by_key(|label| (of(label).parts.trailing_zeros(), *label));
@@ -34,33 +34,34 @@ pub(super) fn in_order(
     labels.into_iter().map(|(label, _)| label).collect()
 }
 
-/// The seeds of a label.
+/// How far the seeds of a label reach.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Seeds {
-    pub(super) count: u64,
+pub(super) struct Extent {
+    /// Number of its seeds.
+    pub(super) seeds: u64,
     /// A bit for each part of the cloud that has one.
     parts: u64,
 }
 
-impl Seeds {
+impl Extent {
     fn with(self, other: Self) -> Self {
         Self {
-            count: self.count + other.count,
+            seeds: self.seeds + other.seeds,
             parts: self.parts | other.parts,
         }
     }
 }
 
-/// Those in `b` of each label up to the highest of `labels`.
-pub(super) fn seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
+/// That of the seeds in `b` of each label up to the highest of `labels`.
+pub(super) fn extents<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Extent> {
     let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
     let size = b.rows().div_ceil(PARTS).max(1);
-    let none = || vec![Seeds::default(); n_labels];
-    let of_part = |mut found: Vec<Seeds>, part: usize| {
+    let none = || vec![Extent::default(); n_labels];
+    let of_part = |mut found: Vec<Extent>, part: usize| {
         for row in part * size..b.rows().min((part + 1) * size) {
             for (label, _) in b.row(row).filter(|&(label, _)| label < n_labels) {
-                let one = Seeds {
-                    count: 1,
+                let one = Extent {
+                    seeds: 1,
                     parts: 1 << part,
                 };
                 found[label] = found[label].with(one);
@@ -68,15 +69,15 @@ pub(super) fn seeds<T: Real>(b: &PixelLabels<T>, labels: &[u32]) -> Vec<Seeds> {
         }
         found
     };
-    let both = |mut found: Vec<Seeds>, other: Vec<Seeds>| {
+    let both = |mut found: Vec<Extent>, other: Vec<Extent>| {
         let all = found.iter_mut().zip(other);
         all.for_each(|(one, other)| *one = one.with(other));
         found
     };
+    let parts_a_task = PARTS / (4 * rayon::current_num_threads()).min(PARTS);
     let parts = (0..b.rows().div_ceil(size)).into_par_iter();
-    let least = PARTS / (4 * rayon::current_num_threads()).min(PARTS);
-    let parts = parts.with_min_len(least);
-    parts.fold(none, of_part).reduce(none, both)
+    let tasks = parts.with_min_len(parts_a_task).fold(none, of_part);
+    tasks.reduce(none, both)
 }
 
 /// Lets each of `labels`, which have seeds in these parts, change places with the one of another group that leaves both groups
@@ -103,9 +104,9 @@ fn change_places(labels: &mut [(u32, u64)], own: usize, width: usize) {
     (0..=group(labels.len())).for_each(|group| unite_others(labels, &mut others, group));
     for one in 0..labels.len() {
         let change = |&other: &usize| {
-            let [own, its] = [labels[one].1, labels[other].1];
-            let before = cost(one, others[one] | own) + cost(other, others[other] | its);
-            cost(one, others[one] | its) + cost(other, others[other] | own) - before
+            let [parts, its] = [labels[one].1, labels[other].1];
+            let before = cost(one, others[one] | parts) + cost(other, others[other] | its);
+            cost(one, others[one] | its) + cost(other, others[other] | parts) - before
         };
         let elsewhere = (0..labels.len()).filter(|&other| group(other) != group(one));
         let best = elsewhere.min_by_key(change);
@@ -147,12 +148,12 @@ mod tests {
     #[test]
     fn labels_of_one_place_lie_side_by_side_and_those_of_the_most_seeds_in_the_first_group() {
         let b = one_seed_each(640, &[0, 9, 600, 12, 610, 11, 620]);
-        let mut seeds = seeds(&b, &[0, 1, 2, 3, 4, 5, 6, 7]);
-        assert_eq!((seeds[6].count, seeds[7].count), (1, 0));
-        let order = |seeds: &[Seeds], own| in_order((1..7).collect(), seeds, own, 3);
-        assert_eq!(order(&seeds, 0), [1, 3, 5, 2, 4, 6]);
-        seeds[4].count = 9;
-        assert_eq!(order(&seeds, 2)[0], 4);
+        let mut extents = extents(&b, &[0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!((extents[6].seeds, extents[7].seeds), (1, 0));
+        let order = |extents: &[Extent], own| in_order((1..7).collect(), extents, own, 3);
+        assert_eq!(order(&extents, 0), [1, 3, 5, 2, 4, 6]);
+        extents[4].seeds = 9;
+        assert_eq!(order(&extents, 2)[0], 4);
     }
 
     proptest! {

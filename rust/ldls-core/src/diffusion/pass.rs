@@ -169,12 +169,8 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     pub(super) fn groups(&self) -> impl Iterator<Item = (&[Lanes<T, WIDTH>], [T; WIDTH])> {
         self.z.groups().enumerate().map(|(group, values)| {
             let mut counts = [T::from_f64(1.0); WIDTH];
-            for lane in self
-                .seeds
-                .plan
-                .probe_lanes()
-                .filter(|lane| lane / WIDTH == group)
-            {
+            let of_probe = self.seeds.plan.probe_lanes();
+            for lane in of_probe.filter(|lane| lane / WIDTH == group) {
                 counts[lane % WIDTH] = T::default();
             }
             (values, counts)
@@ -207,8 +203,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         };
         let values = self.z.group(first / WIDTH);
         let error = |point: usize| {
-            let probed = [0, 1].map(|lane| values[point][first % WIDTH + lane].to_f64());
-            let [x, y] = probed;
+            let [x, y] = [0, 1].map(|lane| values[point][first % WIDTH + lane].to_f64());
             (tail * (x * x + y * y).sqrt()) as f32
         };
         tabulate(self.a.len(), error, cancel)

@@ -3,7 +3,7 @@
 //! A label comes one edge farther with every step. In a large cloud most stay far from most others, and those that never come to
 //! the same block share a lane: a pass holds more of them, and fewer groups of lanes are in use at any place.
 
-use super::lane_order::{in_order, seeds};
+use super::lane_order::{extents, in_order};
 use super::schedule::{BLOCK, Schedule};
 use super::spread::{Blocks, spread};
 use crate::graph::PointGraph;
@@ -76,8 +76,8 @@ impl Planner<'_> {
         let background = labels.contains(&0);
         let probe = self.probe.then_some(usize::from(background));
         let own = usize::from(background) + probe.map_or(0, |_| PROBE_LANES);
-        let seeds = seeds(b, labels);
-        let is_seeded = |label: &u32| *label > 0 && seeds[*label as usize].count > 0;
+        let extents = extents(b, labels);
+        let is_seeded = |label: &u32| *label > 0 && extents[*label as usize].seeds > 0;
         let seeded: Vec<u32> = labels.iter().copied().filter(is_seeded).collect();
         let blocks = self.schedule.blocks();
         let groups = (own + seeded.len()).div_ceil(self.width);
@@ -95,7 +95,7 @@ impl Planner<'_> {
         if let Some(come) = come {
             lanes.extend(share(&seeded, come));
         } else {
-            let seeded = in_order(seeded, &seeds, own, self.width).into_iter();
+            let seeded = in_order(seeded, &extents, own, self.width).into_iter();
             lanes.extend(seeded.map(|label| Shared {
                 labels: vec![(label, None)],
                 ..Shared::default()
