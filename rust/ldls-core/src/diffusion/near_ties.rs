@@ -8,6 +8,7 @@ use super::errors::Errors;
 use super::lanes::WIDTH_F32;
 use super::leaders::leaders;
 use super::pass::Pass;
+use super::passes;
 use super::seed_search::SeedSearch;
 use super::series::Series;
 use super::winners::{Best, NearTies, Winners, candidates};
@@ -18,8 +19,8 @@ use rayon::prelude::*;
 
 /// What the last series leaves out, as a share of the largest value.
 const TOLERANCE: f64 = 1e-13;
-/// What the first one does: a hundredth of what that of single precision does.
-const FIRST_TOLERANCE: f64 = 1e-9;
+/// What the first one does.
+const FIRST_TOLERANCE: f64 = passes::TOLERANCE / 100.0;
 /// Points up to which they are a few. More are those of masks that lie over one another, whose labels differ so little that the
 /// first one would leave them open.
 const FEW: usize = 1 << 10;

@@ -12,7 +12,7 @@ use crate::masks::PixelLabels;
 use crate::{Cancel, Result};
 
 /// Share of the largest likelihood that a series may leave out.
-pub(super) const TOLERANCE: f64 = 1e-7;
+pub(super) const TOLERANCE: f64 = 5e-8;
 
 /// Calls `done` with each pass over the graph that `labels` take; how far they came, and the series that could be trusted, the
 /// longest first.
