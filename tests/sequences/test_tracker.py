@@ -296,9 +296,9 @@ def test_boxes_that_are_brought_to_a_moment_are_those_of_the_points_to_the_last_
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():
     tracker = ldls.Tracker()
     place = [((6, 0), True)]
-    stamps_and_categories = [(0.0, 1), (0.1, 3), (0.2, 1), (9.0, 1)]
+    stamps_and_categories = [(0.0, 1), (0.1, 3), (0.2, 1), (10.1, 1), (20.3, 1)]
     rows = [tracks_of(tracker, [sweep_at(stamp, place, category=kind)]) for stamp, kind in stamps_and_categories]
-    assert rows == [[[1]], [[2]], [[1]], [[3]]]
+    assert rows == [[[1]], [[2]], [[1]], [[1]], [[3]]]
 
 
 def test_sweeps_without_objects_change_nothing():

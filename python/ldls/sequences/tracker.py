@@ -25,7 +25,7 @@ from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, mistaken, overloo
 from ldls.sequences.sweeps import Sweep
 from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought, gap
 
-LONGEST_GAP_S = 5.0
+LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
 NEAR_M = 2.0
 """Distance from above up to which an object may be a track."""
