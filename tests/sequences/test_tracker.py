@@ -10,6 +10,7 @@ from conftest import pinhole
 from ldls.sequences.moment import Moment
 from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES, mistaken
 from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought
+from ldls.sequences.tracker import TWO_OBJECTS
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
 WIDE = pinhole(100.0, (320.0, 240.0), T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -156,6 +157,14 @@ def test_tracks_of_one_object_are_joined(ends_m):
     assert [rows[2][0], rows[2][4]] == [1, 2]
     assert rows[4][4] == (1 if one else 2)
     assert rows[5][0] == 1
+
+
+@pytest.mark.parametrize(("sweeps_apart", "numbers"), [(TWO_OBJECTS - 1, {1, 3}), (TWO_OBJECTS, {1, 2})])
+def test_tracks_that_images_show_apart_are_two_objects_though_one_mask_shows_both(sweeps_apart, numbers):
+    masks = [*([LEFT, RIGHT] for _ in range(sweeps_apart)), [(*LEFT, 2, *RIGHT)], [LEFT, RIGHT]]
+    rows = tracks_of(ldls.Tracker(), [car_at(k, 0, *parts) for k, parts in enumerate(masks)])
+    assert rows[0][::4] == [1, 2]
+    assert set(rows[-1][::4]) == numbers
 
 
 def test_tracks_joined_within_a_window_have_one_number_in_all_of_it():

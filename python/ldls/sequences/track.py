@@ -121,6 +121,11 @@ class Track:
         x, y = self.velocity.tolist()
         return replace(instance, track=self.number, velocity=(x, y))
 
+    def shown_with(self, other: Track) -> int:
+        """Sweeps of the last two seconds of whose images each has a mask of its own."""
+        own, others = ({each.stamp for each in track.sightings if each.shown} for track in (self, other))
+        return len(own & others)
+
     def at(self, stamp: float) -> Footprint:
         """Where the points of all its sightings are at a moment."""
         return brought(self.sightings, self.velocity, stamp)

@@ -39,6 +39,8 @@ ON_M = 0.2
 """Mean distance, seen from above, up to which they are on it."""
 SAME_OF_FEW = 0.5
 """Share of the usual length of their category up to which two objects of so few points in every sweep are one."""
+TWO_OBJECTS = 4
+"""Sweeps whose images have masks of both, from which on two tracks are two objects, however near."""
 MOST_POINTS = 48
 """Points that stand for an object in a sweep; of more, some."""
 
@@ -207,8 +209,8 @@ class Tracker:
         """The track of each label that is paired with one, after tracks of one object are joined.
 
         An object that had two labels for a while has two tracks, and would go on by the one or the other. Where a label
-        and its track are the `same` as tracks that have no label now, the one that most images showed goes on, and the
-        others end.
+        and its track are the `same` as tracks that have no label now, and images do not show them apart, the one that
+        most images showed goes on, and the others end.
 
         Args:
             pairs: The track of each label, both by their place in the order.
@@ -217,7 +219,9 @@ class Tracker:
         free = set(range(len(self._tracks))) - set(pairs.values())
         joined, ended = {}, set()
         for i, j in pairs.items():
-            others = [other for other in sorted(free) if same[i, other]] if same[i, j] else []
+            track = self._tracks[j]
+            near = [other for other in sorted(free) if same[i, other]] if same[i, j] else []
+            others = [other for other in near if track.shown_with(self._tracks[other]) < TWO_OBJECTS]
             free.difference_update(others)
             one, *doubles = sorted((self._tracks[k] for k in (j, *others)), key=lambda track: -track.n_images)
             joined[i] = one
