@@ -1,7 +1,7 @@
 //! The weights b that the pixels around points give them (method, steps 2 and 4).
 
 use super::label_image::{LabelImage, WindowCounts};
-use crate::memory::{push, with_room};
+use crate::memory::with_room;
 use crate::projection::nearest_pixel;
 use crate::{Cancel, Error, Real, Result};
 use rayon::prelude::*;
@@ -115,20 +115,29 @@ impl PixelLabels {
         cancel: &Cancel,
     ) -> Result<PixelLabels<f64>> {
         let count = points.map_or(self.rows(), <[_]>::len);
+        let row_at = |at: usize| {
+            let point = points.map_or(at, |points| points[at] as usize);
+            (point, self.offsets[point]..self.offsets[point + 1])
+        };
         let of_task = |task: usize| {
             cancel.check()?;
             let places = task * POINTS_A_TASK..count.min((task + 1) * POINTS_A_TASK);
-            let mut some = PixelLabels::default();
-            for at in places {
-                let point = points.map_or(at, |points| points[at] as usize);
+            let entries = places.clone().map(|at| row_at(at).1.len()).sum();
+            let mut some = PixelLabels {
+                offsets: with_room(places.len())?,
+                labels: with_room(entries)?,
+                weights: with_room(entries)?,
+                mass: with_room(places.len())?,
+            };
+            for (point, row) in places.map(row_at) {
                 let pixel = f64::from(scale(point)) * pixel_weight;
-                let counted = |weight: f32| pixel_weight * (f64::from(weight) / pixel).round();
-                let row = self.offsets[point]..self.offsets[point + 1];
-                for (&label, &weight) in self.labels[row.clone()].iter().zip(&self.weights[row]) {
-                    push(&mut some.labels, label)?;
-                    push(&mut some.weights, counted(weight))?;
-                }
-                some.mass.push(counted(self.mass[point]));
+                // to the nearest number of pixels
+                let counted = |weight: &f32| {
+                    pixel_weight * f64::from((f64::from(*weight) / pixel + 0.5) as u32)
+                };
+                some.labels.extend_from_slice(&self.labels[row.clone()]);
+                some.weights.extend(self.weights[row].iter().map(counted));
+                some.mass.push(counted(&self.mass[point]));
                 some.offsets.push(some.labels.len());
             }
             Ok(some)
