@@ -40,7 +40,7 @@ ON_M = 0.2
 SAME_OF_FEW = 0.5
 """Share of the usual length of their category up to which two objects of so few points in every sweep are one."""
 TWO_OBJECTS = 4
-"""Sweeps whose images have masks of both, from which on two tracks are two objects, however near."""
+"""Sweeps of the last two seconds with masks of both, from which on two tracks are two objects, however near."""
 MOST_POINTS = 48
 """Points that stand for an object in a sweep; of more, some."""
 
@@ -223,7 +223,7 @@ class Tracker:
             near = [other for other in sorted(free) if same[i, other]] if same[i, j] else []
             others = [other for other in near if track.shown_with(self._tracks[other]) < TWO_OBJECTS]
             free.difference_update(others)
-            one, *doubles = sorted((self._tracks[k] for k in (j, *others)), key=lambda track: -track.n_images)
+            one, *doubles = sorted((self._tracks[k] for k in (j, *others)), key=lambda each: -each.n_images)
             joined[i] = one
             for double in doubles:
                 ended.add(double)
