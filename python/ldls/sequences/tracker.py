@@ -73,10 +73,10 @@ class Tracker:
     def track(self, sweeps: Sequence[Sweep], results: Sequence[Segmentation]) -> tuple[Segmentation, ...]:
         """Return the results with track and velocity of each instance that has points in any of the sweeps.
 
-        An object that images overlook has points where it was, or went by its velocity, within 1.2 s of a sweep that
-        shows it: if ten images did before, or three where the images of the sweep show nothing at all. Confidence there
-        is 0.85, and `diffused_labels` stay; objects without a label among these sweeps are added to the instances. A
-        point of what stands, around which earlier points are of another such object, has the label of that. Two
+        An object that images overlook has points where it was, or went by its velocity, within two seconds of a sweep
+        that shows it: if five images did before, or three where the images of the sweep show nothing at all. Confidence
+        there is 0.82, and `diffused_labels` stay; objects without a label among these sweeps are added to the
+        instances. A point around which earlier points are of another object that stands has the label of that. Two
         instances in one place are one object, and so is one of three points or fewer with that on which they lie, or
         near another of so few, by the length of their category: they have one number, and the points of both the label
         of the first.
