@@ -8,8 +8,8 @@ import pytest
 import ldls
 from conftest import pinhole
 from ldls.sequences.moment import Moment
-from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FARTHEST_S, FEW_IMAGES, mistaken
-from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought
+from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FEW_IMAGES, mistaken
+from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, box_brought, brought
 from ldls.sequences.tracker import TWO_OBJECTS
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
@@ -375,7 +375,7 @@ def test_what_few_images_showed_or_none_for_long_has_no_label_where_it_has_no_ma
     count = FEW_IMAGES if blind else ENOUGH_IMAGES
     beside = [] if blind else [((6, 3), True)]
     often, seldom = ([sweep_at(0.1 * k, [((6, 0), True), *beside]) for k in range(n)] for n in (count, count - 1))
-    soon, late = (0.1 * (count - 1) + after for after in (FARTHEST_S - 0.05, FARTHEST_S + 0.05))
+    soon, late = (0.1 * (count - 1) + after for after in (MEMORY_S - 0.05, MEMORY_S + 0.05))
     gone = [((6, 0), False), *beside]
     assert tracks_of(ldls.Tracker(), [*often, sweep_at(soon, gone)])[-1][0] == 1
     assert tracks_of(ldls.Tracker(), [*often, sweep_at(late, gone)])[-1][0] == 0

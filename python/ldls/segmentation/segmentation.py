@@ -57,7 +57,7 @@ class Segmentation:
             and one sweep `masks[m - 1]`.
         diffused_labels: (N,) int32: the same before outlier removal, and before a tracker.
         confidence: (N,) float32 in [0, 1]: probability that the label is of the right class, or, where the parameters
-            are not `calibrated`, likelihood of the diffused label over the sum of all; 0 out of view, and 0.85 where a
+            are not `calibrated`, likelihood of the diffused label over the sum of all; 0 out of view, and 0.82 where a
             tracker gave the label.
         in_view: (n,) int64: indices of the points that any camera sees, ascending.
         instances: What the labels 1, 2, ... stand for.

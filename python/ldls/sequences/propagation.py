@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.sequences.moment import Boxes, Ints, Moment
-from ldls.sequences.track import Floats, Track
+from ldls.sequences.track import MEMORY_S, Floats, Track
 
-FARTHEST_S = 2.0
-"""Time over which labels go on."""
 ENOUGH_IMAGES = 5
 """Images that must have shown an object, or what others do not show is rather not there."""
 FEW_IMAGES = 3
@@ -52,7 +50,7 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
     """
     found = np.zeros(len(moment.points), np.int64)
     distances = np.full(len(moment.points), np.inf)
-    others = [each for each in moments if each is not moment and abs(each.stamp - moment.stamp) <= FARTHEST_S]
+    others = [each for each in moments if each is not moment and abs(each.stamp - moment.stamp) <= MEMORY_S]
     for track in tracks:
         if track.n_images < (FEW_IMAGES if moment.blind else ENOUGH_IMAGES):
             continue

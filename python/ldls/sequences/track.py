@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ldls.segmentation import Instance
 
 MEMORY_S = 2.0
-"""Time over which a velocity is constant."""
+"""Time over which a velocity is constant, and labels go on."""
 SLOWEST_M_S = 0.5
 """What is slower stands still."""
 FASTEST_M_S = 60.0

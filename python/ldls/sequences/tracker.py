@@ -21,9 +21,9 @@ from ldls.checks import checked
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.moment import Ints, Moment
-from ldls.sequences.propagation import CONFIDENCE, FARTHEST_S, mistaken, overlooked
+from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import Footprint, Sighting, Track, box_brought, brought, gap
+from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, box_brought, brought, gap
 
 LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
@@ -104,7 +104,7 @@ class Tracker:
         of_number = {number: label for label, number in sorted(numbers.items(), reverse=True)}
         results = [_relabelled(result, {label: of_number[numbers[label]] for label in numbers}) for result in results]
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
-        known = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= FARTHEST_S]
+        known = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= MEMORY_S]
         self._moments = known + moments
         # of points with a label, and of those without
         others = mistaken(moments, known, self._tracks)
