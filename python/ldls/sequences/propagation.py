@@ -65,6 +65,8 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
         low, high = own.min(axis=0) - (NEAR_M, NEAR_M, BELOW_M), own.max(axis=0) + NEAR_M
         free = moment.within(low, high)
         free = free[moment.tracks[free] == 0]
+        if not len(free):
+            continue
         beside = there.within(low - NEAR_M, high + NEAR_M)
         beside = beside[there.tracks[beside] != number]
         to_own = _distances(moment.points[free], own)
