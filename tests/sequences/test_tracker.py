@@ -7,9 +7,9 @@ import pytest
 
 import ldls
 from conftest import pinhole
-from ldls.sequences.moment import Moment
-from ldls.sequences.propagation import CONFIDENCE, ENOUGH_IMAGES, FEW_IMAGES, mistaken
-from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, box_brought, brought
+from ldls.sequences.moment import Boxes, Moment
+from ldls.sequences.propagation import BELOW_M, CONFIDENCE, ENOUGH_IMAGES, FEW_IMAGES, NEAR_M, mistaken, overlooked
+from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track
 from ldls.sequences.tracker import TWO_OBJECTS
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
@@ -204,7 +204,7 @@ def test_an_object_that_begins_keeps_its_points_where_another_was():
     def moment(stamp, number, other=None):
         numbers = np.full(len(points), number)
         numbers[-1] = other or number
-        return Moment(stamp, points, numbers, np.arange(len(points)), {}, blind=False)
+        return Moment(stamp, points, numbers, np.arange(len(points)), blind=False)
 
     assert not mistaken([moment(0.1, 2)], [moment(0.0, 1)], tracks)[0].any()
     # with a point of its own before it is known, and outvoted
@@ -218,8 +218,8 @@ def test_a_point_of_what_passes_is_of_what_stands_there_and_not_the_other_way_ro
     tracks[moves - 1].velocity = np.array([0.0, 5.0])
     points = box_of_points(8, 0)
     rows = np.arange(len(points))
-    before = Moment(0.0, points, np.where(rows < 5, 2, 1), rows, {}, blind=False)
-    now = Moment(0.1, points, np.full(len(points), 2), rows, {}, blind=False)
+    before = Moment(0.0, points, np.where(rows < 5, 2, 1), rows, blind=False)
+    now = Moment(0.1, points, np.full(len(points), 2), rows, blind=False)
     (found,) = mistaken([now], [before], tracks)
     assert np.mean(found == 1) > 0.8 if moves == 2 else not found.any()
 
@@ -306,13 +306,40 @@ def test_what_stands_has_no_velocity_though_few_of_its_points_are_seen_in_the_la
     assert track.velocity.tolist() == [0, 0]
 
 
-def test_boxes_that_are_brought_to_a_moment_are_those_of_the_points_to_the_last_bit():
+def test_boxes_hold_the_points_within_them():
     generator = np.random.default_rng(3)
-    for count in (1, 2, 7):
-        places = [Footprint(generator.normal(50, 3, (n, 2))) for n in generator.integers(1, 9, count)]
-        sightings = [Sighting(0.1 * k, place, shown=True) for k, place in enumerate(places)]
-        moment = (sightings, generator.normal(0, 7, 2), 0.83)
-        assert box_brought(*moment) == brought(*moment).box
+    points = generator.uniform(0, 10, (400, 3)).round(1)
+    points = points[np.argsort(points[:, 0])]
+    low = generator.uniform(0, 8, (9, 3)).round(1)
+    boxes = Boxes(np.arange(9), low, low + 3)
+    expected = [np.flatnonzero(np.all((points >= one) & (points <= one + 3), axis=1)) for one in low]
+    assert [held.tolist() for held in boxes.hold(points)] == [each.tolist() for each in expected]
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (6.0, -3.0)])
+def test_overlooked_points_are_those_nearest_to_an_object_where_it_has_gone(velocity):
+    generator = np.random.default_rng(5)
+
+    def moment(stamp, of_track):
+        points = generator.uniform((0, 0, 0), (12, 6, 1), (500, 3))
+        points = points[np.argsort(points[:, 0])]
+        tracks = np.where(points[:, 0] < 6, 1, 2) * (points[:, 1] > 3) * of_track
+        return Moment(stamp, points, tracks, np.arange(len(points)), blind=False)
+
+    now, there = moment(0.1, of_track=0), moment(0.0, of_track=1)
+    instance = ldls.Instance(label=1, category=3, name="car", score=1.0, sources=())
+    tracks = [Track(number, instance, n_images=ENOUGH_IMAGES) for number in (1, 2)]
+    for track, its in zip(tracks, ((0.0, 0.0), velocity), strict=True):
+        track.velocity = np.array(its)
+    gone = there.points + 0.1 * np.where(there.tracks == 2, 1, 0)[:, None] * (*velocity, 0)
+    distances = np.linalg.norm(now.points[:, None] - gone, axis=2)
+    expected = np.where(distances.min(axis=1) < NEAR_M, there.tracks[distances.argmin(axis=1)], 0)
+    lowest = {number: there.points[there.tracks == number, 2].min() - BELOW_M for number in (1, 2)}
+    expected = [
+        number if number and z >= lowest[number] else 0 for number, z in zip(expected, now.points[:, 2], strict=True)
+    ]
+    assert set(expected) == {0, 1, 2}
+    assert overlooked(now, [there, now], tracks).tolist() == expected
 
 
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():

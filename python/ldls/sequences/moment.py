@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, Self
@@ -35,16 +35,33 @@ class Boxes(NamedTuple):
     def around(cls, numbers: Ints, low: Floats, high: Floats) -> Self:
         """That of each number around all boxes (n, 3), or points, that have it."""
         order = np.argsort(numbers, kind="stable")
-        each, starts = np.unique(numbers[order], return_index=True)
-        if not len(each):
-            return cls(each, low, high)
+        starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
+        if not len(starts):
+            return cls(numbers, low, high)
+        each = numbers[order[starts]]
         return cls(each, np.minimum.reduceat(low[order], starts), np.maximum.reduceat(high[order], starts))
 
-    def hold(self, points: Floats, some: NDArray[np.bool_], around_m: float) -> NDArray[np.bool_]:
-        """(n,) whether any of `some` (k,) boxes, longer by so many metres at each end, holds each of points (n, 3)."""
-        held = np.zeros(len(points), bool)
-        for low, high in zip(self.low[some], self.high[some], strict=True):
-            held |= np.all((points >= low - around_m) & (points <= high + around_m), axis=1)
+    def of(self, numbers: Sequence[int]) -> Self:
+        """Those of objects of some of the numbers."""
+        return self.some(np.searchsorted(self.numbers, numbers))
+
+    def some(self, at: NDArray[np.bool_] | Ints) -> Self:
+        """Those at some places."""
+        return type(self)(self.numbers[at], self.low[at], self.high[at])
+
+    def longer(self, by_m: float) -> Self:
+        """Boxes that reach so many metres farther at each end."""
+        return self._replace(low=self.low - by_m, high=self.high + by_m)
+
+    def hold(self, points: Floats) -> list[Ints]:
+        """Indices of the points (n, 3) that each box holds, where points are in the order of x."""
+        x, y, z = points.T
+        starts, ends = np.searchsorted(x, self.low[:, 0]), np.searchsorted(x, self.high[:, 0], "right")
+        held = []
+        for start, end, low, high in zip(starts.tolist(), ends.tolist(), self.low, self.high, strict=True):
+            y_of, z_of = y[start:end], z[start:end]
+            inside = (y_of >= low[1]) & (y_of <= high[1]) & (z_of >= low[2]) & (z_of <= high[2])
+            held.append(start + np.flatnonzero(inside))
         return held
 
 
@@ -54,10 +71,9 @@ class Moment:
 
     Attributes:
         stamp: Time of the sweep in seconds.
-        points: (n, 3) x y z in metres, all x before all y in memory.
+        points: (n, 3) x y z in metres, in the order of x.
         tracks: (n,) number of the object of each point; 0 of none.
         rows: (n,) row of each in the points of its sweep.
-        counts: Points of each object.
         blind: True if no image shows anything.
     """
 
@@ -65,21 +81,38 @@ class Moment:
     points: Floats
     tracks: Ints
     rows: Ints
-    counts: Mapping[int, int]
     blind: bool
 
     @classmethod
     def of(cls, sweep: Sweep, result: Segmentation, numbers: Mapping[int, int]) -> Self:
         """The moment of a sweep whose labels stand for objects of these `numbers`."""
-        rows = result.in_view
-        xyz = np.asfortranarray(transformed(result.points[rows], sweep.pose))
+        xyz = transformed(result.points[result.in_view], sweep.pose)
+        order = np.argsort(xyz[:, 0])
+        xyz, rows = xyz[order], result.in_view[order]
         of_label = np.zeros(len(result.instances) + 1, np.int64)
         of_label[list(numbers)] = list(numbers.values())
         tracks = of_label[np.maximum(result.labels[rows], 0)]
-        counts = np.bincount(tracks)
-        each = 1 + np.flatnonzero(counts[1:])
         blind = not any(instance.sources for instance in result.instances)
-        return cls(sweep.stamp, xyz, tracks, rows, dict(zip(each.tolist(), counts[each].tolist(), strict=True)), blind)
+        return cls(sweep.stamp, xyz, tracks, rows, blind)
+
+    @cached_property
+    def counts(self) -> Ints:
+        """Points of each object by its number, and before the first those of none."""
+        return np.bincount(self.tracks)
+
+    def counts_of(self, numbers: Sequence[int]) -> Ints:
+        """Points of objects of these numbers, which need not be there."""
+        return np.append(self.counts, 0)[np.minimum(numbers, len(self.counts))]
+
+    @cached_property
+    def free(self) -> Ints:
+        """Indices of the points of no object."""
+        return np.flatnonzero(self.tracks == 0)
+
+    @cached_property
+    def free_points(self) -> Floats:
+        """These points, ordered as all are."""
+        return self.points[self.free]
 
     @cached_property
     def labelled(self) -> Ints:
@@ -98,16 +131,6 @@ class Moment:
 
     def renumbered(self, number: int, other: int) -> Self:
         """The same, where an object of a number has another, which may be there too."""
-        counts = dict(self.counts)
-        if (count := counts.pop(number, 0)) == 0:
+        if self.counts_of([number]) == 0:
             return self
-        counts[other] = counts.get(other, 0) + count
-        return replace(self, tracks=np.where(self.tracks == number, other, self.tracks), counts=counts)
-
-    def within(self, low: Floats, high: Floats) -> Ints:
-        """Indices of the points in a box."""
-        x = self.points[:, 0]
-        inside: Ints = np.flatnonzero((x >= low[0]) & (x <= high[0]))
-        _, y, z = self.points[inside].T
-        inside = inside[(y >= low[1]) & (y <= high[1]) & (z >= low[2]) & (z <= high[2])]
-        return inside
+        return replace(self, tracks=np.where(self.tracks == number, other, self.tracks))

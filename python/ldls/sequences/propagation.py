@@ -40,8 +40,8 @@ NO_CATEGORY = -1
 def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track]) -> Ints:
     """(n,) number of an object for each point of a moment that has none and must be of one; 0 for all others.
 
-    A point is of an object if the nearest point that this has at the nearest moment that shows it, which moves with it,
-    is nearer than all others there, which stay where they are, and is not below all of the object.
+    A point is of an object if of all points of the nearest moment that shows the object, one of the object is nearest,
+    and it is not below all of it. Objects of which that is the nearest have gone on by their velocity since.
 
     Args:
         moment: The moment.
@@ -49,30 +49,62 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
         tracks: The objects that are known.
     """
     found = np.zeros(len(moment.points), np.int64)
-    distances = np.full(len(moment.points), np.inf)
     others = [each for each in moments if each is not moment and abs(each.stamp - moment.stamp) <= MEMORY_S]
-    for track in tracks:
-        if track.n_images < (FEW_IMAGES if moment.blind else ENOUGH_IMAGES):
-            continue
-        number = track.number
-        most = max((each.counts.get(number, 0) for each in others), default=0)
-        if most == 0:
-            continue
-        shown = (each for each in others if each.counts.get(number, 0) >= LEAST_SHOWN * most)
-        there = min(shown, key=lambda each: abs(each.stamp - moment.stamp))
-        way = np.array([*track.velocity, 0.0]) * (moment.stamp - there.stamp)
-        own = there.points[there.tracks == number] + way
-        low, high = own.min(axis=0) - (NEAR_M, NEAR_M, BELOW_M), own.max(axis=0) + NEAR_M
-        free = moment.within(low, high)
-        free = free[moment.tracks[free] == 0]
-        if not len(free):
-            continue
-        beside = there.within(low - NEAR_M, high + NEAR_M)
-        beside = beside[there.tracks[beside] != number]
-        to_own = _distances(moment.points[free], own)
-        nearer = (to_own < _distances(moment.points[free], there.points[beside])) & (to_own < distances[free])
-        found[free[nearer]] = number
-        distances[free[nearer]] = to_own[nearer]
+    enough = FEW_IMAGES if moment.blind else ENOUGH_IMAGES
+    tracks = [track for track in tracks if track.n_images >= enough]
+    if not others or not tracks:
+        return found
+    counts = np.array([each.counts_of([track.number for track in tracks]) for each in others])
+    most = counts.max(axis=0)
+    since = np.abs([moment.stamp - each.stamp for each in others])
+    shown = np.where(counts >= LEAST_SHOWN * most, since[:, None], np.inf)
+    nearest = np.where(most > 0, shown.argmin(axis=0), -1)
+    distances = np.full(len(moment.points), np.inf)
+    for at in set(nearest.tolist()) - {-1}:
+        of_moment = [tracks[i] for i in np.flatnonzero(nearest == at)]
+        rows, numbers, apart = _of_nearest(moment, others[at], of_moment)
+        nearer = apart < distances[rows]
+        found[rows[nearer]] = numbers[nearer]
+        distances[rows[nearer]] = apart[nearer]
+    return found
+
+
+def _of_nearest(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple[Ints, Ints, Floats]:
+    """Points of a moment that have no object, are nearest to one of these of another moment, and not below all of it.
+
+    Returns:
+        (m,) the indices of the points, the number of the object of each, and how far it is in metres.
+    """
+    boxes = there.boxes.of([track.number for track in tracks])
+    ways = np.array([[*track.velocity, 0.0] for track in tracks]) * (moment.stamp - there.stamp)
+    around = Boxes(boxes.numbers, boxes.low + ways - (NEAR_M, NEAR_M, BELOW_M), boxes.high + ways + NEAR_M)
+    held = around.hold(moment.free_points)
+    rows = moment.free[_any(held, len(moment.free))]
+    if not len(rows):
+        return rows, rows, np.zeros(0)
+    at = np.flatnonzero([len(each) for each in held])
+    is_beside = _any(around.some(at).longer(NEAR_M).hold(there.points), len(there.points))
+    move = [(boxes.numbers[i], ways[i]) for i in at if ways[i].any()]
+    for number, _ in move:
+        is_beside |= there.tracks == number
+    points, numbers = there.some(np.flatnonzero(is_beside))
+    for number, way in move:
+        points[numbers == number] += way
+    tree = require("scipy.spatial", "eval").KDTree(points, balanced_tree=False, compact_nodes=False)
+    apart, nearest = tree.query(moment.points[rows], distance_upper_bound=NEAR_M)
+    # where nothing is so near, the tree says that it is after the last
+    numbers = np.append(numbers, 0)[nearest]
+    lowest = np.full(len(there.counts), np.inf)
+    lowest[boxes.numbers] = around.low[:, 2]
+    kept = moment.points[rows, 2] >= lowest[numbers]
+    return rows[kept], numbers[kept], apart[kept]
+
+
+def _any(rows: Sequence[Ints], n: int) -> NDArray[np.bool_]:
+    """(n,) whether it is in any of the rows."""
+    found = np.zeros(n, bool)
+    for each in rows:
+        found[each] = True
     return found
 
 
@@ -136,7 +168,8 @@ def _beside(
     rivals &= meet.all(axis=2)
     for at in np.flatnonzero(rivals.any(axis=1)):
         rows = np.flatnonzero(moment.tracks == own.numbers[at])
-        rows = rows[known.hold(moment.points[rows], rivals[at], AROUND_M)]
+        held = known.some(rivals[at]).longer(AROUND_M).hold(moment.points[rows])
+        rows = rows[_any(held, len(rows))]
         if len(rows):
             yield rows, int(category[at]), np.append(known.numbers[rivals[at]], own.numbers[at])
 
@@ -166,11 +199,3 @@ def _together(parts: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
     """Points of all moments, and the number of the object of each."""
     points, numbers = zip(*parts, strict=True)
     return np.concatenate(points), np.concatenate(numbers)
-
-
-def _distances(points: Floats, others: Floats) -> Floats:
-    """Distance in metres of each point to the nearest other; infinite beyond `NEAR_M`."""
-    if not len(points) or not len(others):
-        return np.full(len(points), np.inf)
-    distances, _ = require("scipy.spatial", "eval").KDTree(others).query(points, distance_upper_bound=NEAR_M)
-    return np.asarray(distances, np.float64)

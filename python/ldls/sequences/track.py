@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls._optional import require
 from ldls.segmentation import Instance
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 MEMORY_S = 2.0
 """Time over which a velocity is constant, and labels go on."""
@@ -52,9 +57,16 @@ class Footprint:
         return middle
 
     @cached_property
+    def tree(self) -> KDTree:
+        """What finds the nearest of them."""
+        tree: KDTree = require("scipy.spatial", "eval").KDTree(self.points, balanced_tree=False, compact_nodes=False)
+        return tree
+
+    @cached_property
     def length(self) -> float:
         """Diagonal of the box, in metres."""
-        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+        left, below, right, above = self.box
+        return math.hypot(right - left, above - below)
 
 
 class Sighting(NamedTuple):
@@ -107,14 +119,20 @@ class Track:
         """(2,) x y in the world, in metres a second; zeros where it stands."""
         return _velocity(self.sightings)
 
+    @property
+    def moves(self) -> bool:
+        """Whether it does not stand."""
+        return bool(self.velocity.any())
+
     def advance(self, instance: Instance, sighting: Sighting) -> None:
         """Note that it was seen again."""
         self.instance = instance
         self.n_images += sighting.shown
         first = sighting.stamp - MEMORY_S
         self.sightings = [*(each for each in self.sightings if each.stamp >= first), sighting]
-        # found anew when it is asked for, which is not after every sweep
-        self.__dict__.pop("velocity", None)
+        # found anew when they are asked for, which is not after every sweep
+        for name in ("velocity", "_place"):
+            self.__dict__.pop(name, None)
 
     def as_instance(self, instance: Instance) -> Instance:
         """The instance with number and velocity."""
@@ -128,24 +146,17 @@ class Track:
 
     def at(self, stamp: float) -> Footprint:
         """Where the points of all its sightings are at a moment."""
-        return brought(self.sightings, self.velocity, stamp)
+        return brought(self.sightings, self.velocity, stamp) if self.moves else self._place
+
+    @cached_property
+    def _place(self) -> Footprint:
+        """Where they were."""
+        return Footprint(np.concatenate([each.footprint.points for each in self.sightings]))
 
 
 def brought(sightings: Sequence[Sighting], velocity: Floats, stamp: float) -> Footprint:
     """Where the points of all sightings are at a moment, at a velocity."""
     return Footprint(np.concatenate([own.points + velocity * (stamp - then) for then, own, _ in sightings]))
-
-
-def box_brought(sightings: Sequence[Sighting], velocity: Floats, stamp: float) -> Box:
-    """The box around those points."""
-    x, y = velocity.tolist()
-    boxes = [(*each.footprint.box, stamp - each.stamp) for each in sightings]
-    return (
-        min(left + x * since for left, _, _, _, since in boxes),
-        min(below + y * since for _, below, _, _, since in boxes),
-        max(right + x * since for _, _, right, _, since in boxes),
-        max(above + y * since for _, _, _, above, since in boxes),
-    )
 
 
 def gap(one: Box, other: Box) -> float:
@@ -163,23 +174,20 @@ def _velocity(sightings: Sequence[Sighting]) -> Floats:
     counts = np.array([len(each.footprint.points) for each in sightings])
     shares = counts / counts.sum()
     since = stamps - shares @ stamps
-    spread = float(shares * since @ since)
+    spread = float(shares @ since**2)
     if spread == 0:
         return np.zeros(2)
     middles = np.array([each.footprint.middle for each in sightings])
+    middles -= shares @ middles
     slope: Floats = shares * since @ middles / spread
-    if _variance(middles - np.outer(since, slope), shares) > MOVES * _variance(middles, shares):
+    speed = math.hypot(*slope.tolist())
+    along_line, variance = spread * speed**2, float(shares @ np.sum(middles**2, axis=1))
+    if not SLOWEST_M_S <= speed <= FASTEST_M_S or along_line < (1 - MOVES) * variance:
         return np.zeros(2)
     first, last = sightings[0], sightings[-1]
     way = slope * (last.stamp - first.stamp)
     begin, end = first.footprint.points, last.footprint.points
-    moves = _apart(begin + way, end) < MOVES * _apart(begin, end)
-    return slope if moves and SLOWEST_M_S <= np.linalg.norm(slope) <= FASTEST_M_S else np.zeros(2)
-
-
-def _variance(middles: Floats, shares: Floats) -> float:
-    """Mean squared distance of middles from theirs, where each has a share."""
-    return float(shares @ np.sum((middles - shares @ middles) ** 2, axis=1))
+    return slope if _apart(begin + way, end) < MOVES * _apart(begin, end) else np.zeros(2)
 
 
 def _apart(one: Floats, other: Floats) -> float:
@@ -187,5 +195,5 @@ def _apart(one: Floats, other: Floats) -> float:
 
     It is the less of both ways: of a standing object more may be visible at one of the moments.
     """
-    distances = np.linalg.norm(one[:, None] - other, axis=2)
+    distances = require("scipy.spatial.distance", "eval").cdist(one, other)
     return float(min(distances.min(axis=0).mean(), distances.min(axis=1).mean()))

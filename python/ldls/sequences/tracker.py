@@ -9,6 +9,7 @@ say more of points that images overlook, or give to another object (propagation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import pairwise
@@ -23,7 +24,7 @@ from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, box_brought, brought, gap
+from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, brought, gap
 
 LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
@@ -63,7 +64,6 @@ class Tracker:
             ImportError: `ldls[eval]` is not installed.
         """
         self._assign = require("scipy.optimize", "eval").linear_sum_assignment
-        self._tree = require("scipy.spatial", "eval").KDTree
         self._tracks: list[Track] = []
         self._moments: list[Moment] = []
         self._count = 0
@@ -163,20 +163,21 @@ class Tracker:
                 place or a few points on it, and they are joined with no other.
         """
         self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
+        if not sightings:
+            return {}
         labels = list(sightings)
+        stood = [brought(sightings[label], np.zeros(2), stamp) for label in labels]
         costs = np.full((len(labels), len(self._tracks)), np.inf)
         on = np.zeros(costs.shape, bool)
         for j, track in enumerate(self._tracks):
             like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
             if not like:
                 continue
-            box = box_brought(track.sightings, track.velocity, stamp)
-            own = {i: (sightings[labels[i]], track.velocity, stamp) for i in like}
-            near = [i for i in like if gap(box_brought(*own[i]), box) <= NEAR_M]
-            if near:
-                there = track.at(stamp)
-                for i in near:
-                    costs[i, j], on[i, j] = self._apart(brought(*own[i]), there)
+            there = track.at(stamp)
+            for i in like:
+                own = brought(sightings[labels[i]], track.velocity, stamp) if track.moves else stood[i]
+                if gap(own.box, there.box) <= NEAR_M:
+                    costs[i, j], on[i, j] = _apart(own, there)
         first = [sightings[label][0].footprint for label in labels]
         few = np.array([len(footprint.points) <= FEW_POINTS for footprint in first], bool)
         lengths = [footprint.length for footprint in first]
@@ -238,19 +239,20 @@ class Tracker:
         self._tracks.append(Track(self._count, instance))
         return self._tracks[-1]
 
-    def _apart(self, one: Footprint, other: Footprint) -> tuple[float, bool]:
-        """How far apart objects are in metres, infinite beyond `NEAR_M`, and whether one lies on the other.
 
-        The former is the mean of two distances: of the points of the one of fewer to the nearest of the other, and of
-        the middles.
-        """
-        few, many = sorted((one.points, other.points), key=len)
-        distances, _ = self._tree(many).query(few)
-        if distances.min() > NEAR_M:
-            return float("inf"), False
-        middle = np.linalg.norm(one.middle - other.middle)
-        apart = float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
-        return apart, bool(distances.mean() < ON_M)
+def _apart(one: Footprint, other: Footprint) -> tuple[float, bool]:
+    """How far apart objects are in metres, infinite beyond `NEAR_M`, and whether one lies on the other.
+
+    The former is the mean of two distances: of the points of the one of fewer to the nearest of the other, and of the
+    middles.
+    """
+    few, many = sorted((one, other), key=lambda each: len(each.points))
+    distances, _ = many.tree.query(few.points)
+    if distances.min() > NEAR_M:
+        return float("inf"), False
+    middle = math.dist(one.middle.tolist(), other.middle.tolist())
+    apart = float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
+    return apart, bool(distances.mean() < ON_M)
 
 
 def _relabelled(result: Segmentation, label_of: Mapping[int, int]) -> Segmentation:
