@@ -6,16 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.segmentation import Instance
-
-if TYPE_CHECKING:
-    from scipy.spatial import KDTree
 
 MEMORY_S = 2.0
 """Time over which a velocity is constant, and labels go on."""
@@ -55,12 +52,6 @@ class Footprint:
         in_order = np.sort(self.points, axis=0)  # NumPy's median takes four times as long for so few
         middle: Floats = (in_order[(len(in_order) - 1) // 2] + in_order[len(in_order) // 2]) / 2
         return middle
-
-    @cached_property
-    def tree(self) -> KDTree:
-        """What finds the nearest of them."""
-        tree: KDTree = require("scipy.spatial", "eval").KDTree(self.points, balanced_tree=False, compact_nodes=False)
-        return tree
 
     @cached_property
     def length(self) -> float:
@@ -195,5 +186,11 @@ def _apart(one: Floats, other: Floats) -> float:
 
     It is the less of both ways: of a standing object more may be visible at one of the moments.
     """
-    distances = require("scipy.spatial.distance", "eval").cdist(one, other)
-    return float(min(distances.min(axis=0).mean(), distances.min(axis=1).mean()))
+    squared = squared_distances(one, other)
+    return float(min(np.sqrt(squared.min(axis=0)).mean(), np.sqrt(squared.min(axis=1)).mean()))
+
+
+def squared_distances(one: Floats, other: Floats) -> Floats:
+    """(n, m) squared distance of each of n points from each of m: of so few, a tree takes longer."""
+    squared: Floats = require("scipy.spatial.distance", "eval").cdist(one, other, "sqeuclidean")
+    return squared

@@ -24,7 +24,7 @@ from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, brought, gap
+from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, brought, gap, squared_distances
 
 LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
@@ -246,8 +246,8 @@ def _apart(one: Footprint, other: Footprint) -> tuple[float, bool]:
     The former is the mean of two distances: of the points of the one of fewer to the nearest of the other, and of the
     middles.
     """
-    few, many = sorted((one, other), key=lambda each: len(each.points))
-    distances, _ = many.tree.query(few.points)
+    few, many = sorted((one.points, other.points), key=len)
+    distances = np.sqrt(squared_distances(few, many).min(axis=1))
     if distances.min() > NEAR_M:
         return float("inf"), False
     middle = math.dist(one.middle.tolist(), other.middle.tolist())
