@@ -342,6 +342,15 @@ def test_overlooked_points_are_those_nearest_to_an_object_where_it_has_gone(velo
     assert overlooked(now, [there, now], tracks).tolist() == expected
 
 
+def test_what_has_gone_away_leaves_no_label_where_it_was():
+    instance = ldls.Instance(label=1, category=3, name="car", score=1.0, sources=())
+    stands, moves = (Track(number, instance, n_images=ENOUGH_IMAGES) for number in (1, 2))
+    stands.velocity, moves.velocity = np.zeros(2), np.array([30.0, 0.0])
+    there = Moment(0.0, np.array([[0.0, 0, 0], [0.7, 0, 0]]), np.array([1, 2]), np.arange(2), blind=False)
+    now = Moment(0.1, np.array([[0.1, 0, 0], [0.6, 0, 0]]), np.zeros(2, np.int64), np.arange(2), blind=False)
+    assert overlooked(now, [there, now], [stands, moves]).tolist() == [1, 0]
+
+
 def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():
     tracker = ldls.Tracker()
     place = [((6, 0), True)]

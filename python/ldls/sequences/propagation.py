@@ -82,9 +82,11 @@ def _of_nearest(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple
     rows = moment.free[_any(held, len(moment.free))]
     if not len(rows):
         return rows, rows, np.zeros(0)
+    # the others are near no point: they are in the way, where they were
     at = np.flatnonzero([len(each) for each in held])
-    is_beside = _any(around.some(at).longer(NEAR_M).hold(there.points), len(there.points))
-    move = [(boxes.numbers[i], ways[i]) for i in at if ways[i].any()]
+    around, ways = around.some(at), ways[at]
+    is_beside = _any(around.longer(NEAR_M).hold(there.points), len(there.points))
+    move = [(number, way) for number, way in zip(around.numbers, ways, strict=True) if way.any()]
     for number, _ in move:
         is_beside |= there.tracks == number
     points, numbers = there.some(np.flatnonzero(is_beside))
@@ -95,7 +97,7 @@ def _of_nearest(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple
     # where nothing is so near, the tree says that it is after the last
     numbers = np.append(numbers, 0)[nearest]
     lowest = np.full(len(there.counts), np.inf)
-    lowest[boxes.numbers] = around.low[:, 2]
+    lowest[around.numbers] = around.low[:, 2]
     kept = moment.points[rows, 2] >= lowest[numbers]
     return rows[kept], numbers[kept], apart[kept]
 
