@@ -132,7 +132,7 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
     known = Boxes(known.numbers[goes_on], known.low[goes_on], known.high[goes_on])
     of_known = [of_number[number] for number in known.numbers.tolist()]
     categories = np.array([track.instance.category for track in of_known], np.int64)
-    stand = np.array([not track.velocity.any() for track in of_known], bool)
+    stand = np.array([not track.moves for track in of_known], bool)
     # the category of each point that is asked, and the objects that it may be of
     asked = [np.full(len(each.points), NO_CATEGORY) for each in moments]
     involved: dict[int, set[int]] = {}
