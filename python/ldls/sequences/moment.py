@@ -42,11 +42,11 @@ class Boxes(NamedTuple):
         return cls(each, np.minimum.reduceat(low[order], starts), np.maximum.reduceat(high[order], starts))
 
     def of(self, numbers: Sequence[int]) -> Self:
-        """Those of objects of some of the numbers."""
+        """Those of objects of these numbers, which must be there."""
         return self.some(np.searchsorted(self.numbers, numbers))
 
     def some(self, at: NDArray[np.bool_] | Ints) -> Self:
-        """Those at some places."""
+        """Those at some places, or where a mask (k,) is true."""
         return type(self)(self.numbers[at], self.low[at], self.high[at])
 
     def longer(self, by_m: float) -> Self:
@@ -97,21 +97,21 @@ class Moment:
 
     @cached_property
     def counts(self) -> Ints:
-        """Points of each object by its number, and before the first those of none."""
+        """(largest number + 1,) points of each object by its number; at 0 those of none."""
         return np.bincount(self.tracks)
 
     def counts_of(self, numbers: Sequence[int]) -> Ints:
-        """Points of objects of these numbers, which need not be there."""
+        """(k,) points of objects of k numbers, which need not be there."""
         return np.append(self.counts, 0)[np.minimum(numbers, len(self.counts))]
 
     @cached_property
     def free(self) -> Ints:
-        """Indices of the points of no object."""
+        """(m,) indices of the points of no object."""
         return np.flatnonzero(self.tracks == 0)
 
     @cached_property
     def free_points(self) -> Floats:
-        """These points, ordered as all are."""
+        """(m, 3) the points of no object, in metres, in the order of x."""
         return self.points[self.free]
 
     @cached_property

@@ -41,7 +41,7 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
     """(n,) number of an object for each point of a moment that has none and must be of one; 0 for all others.
 
     A point is of an object if of all points of the nearest moment that shows the object, one of the object is nearest,
-    and it is not below all of it. Objects of which that is the nearest have gone on by their velocity since.
+    and it is not below all of it. Objects for which this is that moment are moved from there by their velocity.
 
     Args:
         moment: The moment.
@@ -62,14 +62,14 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
     distances = np.full(len(moment.points), np.inf)
     for at in set(nearest.tolist()) - {-1}:
         of_moment = [tracks[i] for i in np.flatnonzero(nearest == at)]
-        rows, numbers, apart = _of_nearest(moment, others[at], of_moment)
+        rows, numbers, apart = _nearest_to(moment, others[at], of_moment)
         nearer = apart < distances[rows]
         found[rows[nearer]] = numbers[nearer]
         distances[rows[nearer]] = apart[nearer]
     return found
 
 
-def _of_nearest(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple[Ints, Ints, Floats]:
+def _nearest_to(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple[Ints, Ints, Floats]:
     """Points of a moment that have no object, are nearest to one of these of another moment, and not below all of it.
 
     Returns:
@@ -79,19 +79,18 @@ def _of_nearest(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple
     ways = np.array([[*track.velocity, 0.0] for track in tracks]) * (moment.stamp - there.stamp)
     around = Boxes(boxes.numbers, boxes.low + ways - (NEAR_M, NEAR_M, BELOW_M), boxes.high + ways + NEAR_M)
     held = around.hold(moment.free_points)
-    rows = moment.free[_any(held, len(moment.free))]
+    rows = moment.free[_in_any(held, len(moment.free))]
     if not len(rows):
         return rows, rows, np.zeros(0)
-    # the others are near no point: they are in the way, where they were
+    # objects around which no point is free find none, and stay where they were
     at = np.flatnonzero([len(each) for each in held])
     around, ways = around.some(at), ways[at]
-    is_beside = _any(around.longer(NEAR_M).hold(there.points), len(there.points))
-    move = [(number, way) for number, way in zip(around.numbers, ways, strict=True) if way.any()]
-    for number, _ in move:
-        is_beside |= there.tracks == number
+    way_of = np.zeros((len(there.counts), 3))
+    way_of[around.numbers] = ways
+    is_beside = _in_any(around.longer(NEAR_M).hold(there.points), len(there.points))
+    is_beside |= np.isin(there.tracks, around.numbers[np.any(ways, axis=1)])
     points, numbers = there.some(np.flatnonzero(is_beside))
-    for number, way in move:
-        points[numbers == number] += way
+    points += way_of[numbers]
     tree = require("scipy.spatial", "eval").KDTree(points, balanced_tree=False, compact_nodes=False)
     apart, nearest = tree.query(moment.points[rows], distance_upper_bound=NEAR_M)
     # where nothing is so near, the tree says that it is after the last
@@ -102,8 +101,8 @@ def _of_nearest(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple
     return rows[kept], numbers[kept], apart[kept]
 
 
-def _any(rows: Sequence[Ints], n: int) -> NDArray[np.bool_]:
-    """(n,) whether it is in any of the rows."""
+def _in_any(rows: Sequence[Ints], n: int) -> NDArray[np.bool_]:
+    """(n,) whether each index is in any of the rows."""
     found = np.zeros(n, bool)
     for each in rows:
         found[each] = True
@@ -129,7 +128,7 @@ def mistaken(moments: Sequence[Moment], before: Sequence[Moment], tracks: Sequen
     of_number = {track.number: track for track in tracks}
     # a call may be longer than tracks live
     goes_on = np.isin(known.numbers, [*of_number])
-    known = Boxes(known.numbers[goes_on], known.low[goes_on], known.high[goes_on])
+    known = known.some(goes_on)
     of_known = [of_number[number] for number in known.numbers.tolist()]
     categories = np.array([track.instance.category for track in of_known], np.int64)
     stand = np.array([not track.moves for track in of_known], bool)
@@ -171,7 +170,7 @@ def _beside(
     for at in np.flatnonzero(rivals.any(axis=1)):
         rows = np.flatnonzero(moment.tracks == own.numbers[at])
         held = known.some(rivals[at]).longer(AROUND_M).hold(moment.points[rows])
-        rows = rows[_any(held, len(rows))]
+        rows = rows[_in_any(held, len(rows))]
         if len(rows):
             yield rows, int(category[at]), np.append(known.numbers[rivals[at]], own.numbers[at])
 

@@ -141,7 +141,7 @@ class Track:
 
     @cached_property
     def _place(self) -> Footprint:
-        """Where they were."""
+        """The points of all its sightings, where they were."""
         return Footprint(np.concatenate([each.footprint.points for each in self.sightings]))
 
 
@@ -178,10 +178,10 @@ def _velocity(sightings: Sequence[Sighting]) -> Floats:
     first, last = sightings[0], sightings[-1]
     way = slope * (last.stamp - first.stamp)
     begin, end = first.footprint.points, last.footprint.points
-    return slope if _apart(begin + way, end) < MOVES * _apart(begin, end) else np.zeros(2)
+    return slope if _mean_distance(begin + way, end) < MOVES * _mean_distance(begin, end) else np.zeros(2)
 
 
-def _apart(one: Floats, other: Floats) -> float:
+def _mean_distance(one: Floats, other: Floats) -> float:
     """Mean distance in metres of the points of one to the nearest of the other.
 
     It is the less of both ways: of a standing object more may be visible at one of the moments.
@@ -191,6 +191,6 @@ def _apart(one: Floats, other: Floats) -> float:
 
 
 def squared_distances(one: Floats, other: Floats) -> Floats:
-    """(n, m) squared distance of each of n points from each of m: of so few, a tree takes longer."""
+    """(n, m) squared distance of each of n points from each of m, in square metres: of so few, a tree takes longer."""
     squared: Floats = require("scipy.spatial.distance", "eval").cdist(one, other, "sqeuclidean")
     return squared
