@@ -1,6 +1,6 @@
 //! A point cloud as it lies in memory: rows of three or more columns, x y z first, single or double precision.
 
-use crate::memory::{tabulate, with_room};
+use crate::memory::tabulate;
 use crate::{Cancel, Result};
 use std::array::from_fn;
 use std::ops::Range;
@@ -78,18 +78,22 @@ pub fn brought_together(
     keep_origin: bool,
     cancel: &Cancel,
 ) -> Result<Vec<[f64; 3]>> {
-    let mut all = with_room(clouds.iter().map(|(cloud, _)| cloud.len()).sum())?;
-    for (cloud, matrix) in clouds {
-        let place = |row: usize| {
-            let xyz = cloud.xyz(row);
-            if xyz == [0.0; 3] && !keep_origin {
-                return xyz;
-            }
-            matrix.map(|[x, y, z, shift]| x * xyz[0] + y * xyz[1] + z * xyz[2] + shift)
-        };
-        all.extend(tabulate(cloud.len(), place, cancel)?);
-    }
-    Ok(all)
+    let mut n = 0;
+    let starts = clouds.iter().map(|(cloud, _)| {
+        n += cloud.len();
+        n - cloud.len()
+    });
+    let starts: Vec<usize> = starts.collect();
+    let place = |row: usize| {
+        let at = starts.partition_point(|&start| start <= row) - 1;
+        let (cloud, matrix) = &clouds[at];
+        let xyz = cloud.xyz(row - starts[at]);
+        if xyz == [0.0; 3] && !keep_origin {
+            return xyz;
+        }
+        matrix.map(|[x, y, z, shift]| x * xyz[0] + y * xyz[1] + z * xyz[2] + shift)
+    };
+    tabulate(n, place, cancel)
 }
 
 #[inline(always)]

@@ -178,7 +178,8 @@ impl<'a> Images<'a> {
             view.masks
                 .depth_groups(&sighting.uv, distances, &standing, params, cancel)
         };
-        self.views.iter().zip(sightings).map(of_view).collect()
+        let views = self.views.par_iter().zip(sightings);
+        views.map(of_view).collect()
     }
 
     /// True if the point at `slot` of the sighting of `image` takes `label` from the pixels around it.

@@ -90,29 +90,24 @@ fn agreements_of(
     shown: &[Shown],
     [one, other]: [usize; 2],
 ) -> Vec<(Pair, Agreement)> {
-    let counts = |image: usize| vec![0_usize; views[image].masks.len() + 1];
-    let (mut here, mut there) = (counts(one), counts(other));
+    let common = |image: usize, other: usize| {
+        let mut counts = vec![0_usize; views[image].masks.len() + 1];
+        let marks = shown[image].marks.iter();
+        let seen = marks.filter(|(point, _)| shown[other].slot(*point).is_some());
+        seen.for_each(|&(_, m)| counts[m as usize] += 1);
+        counts
+    };
+    let (here, there) = (common(one, other), common(other, one));
     let width = there.len();
     let mut both = vec![0; here.len() * width];
-    for &(slot, point) in &shown[one].on_masks {
-        let Some(also_at) = shown[other].slot(point) else {
-            continue;
-        };
-        for m in shown[one].instances(slot) {
-            here[m as usize] += 1;
-            for k in shown[other].instances(also_at) {
-                both[m as usize * width + k as usize] += 1;
-            }
+    let mut marks = &shown[other].marks[..];
+    for &(point, m) in &shown[one].marks {
+        marks = &marks[marks.iter().take_while(|(at, _)| *at < point).count()..];
+        for &(_, k) in marks.iter().take_while(|(at, _)| *at == point) {
+            both[m as usize * width + k as usize] += 1;
         }
     }
-    for &(slot, point) in &shown[other].on_masks {
-        if shown[one].slot(point).is_some() {
-            shown[other]
-                .instances(slot)
-                .for_each(|k| there[k as usize] += 1);
-        }
-    }
-    let common = both.into_iter().enumerate().filter(|(_, both)| *both > 0);
+    let met = both.into_iter().enumerate().filter(|(_, both)| *both > 0);
     let agreement = |(at, both)| {
         let (m, k) = (at / width, at % width);
         let other_category = views[one].categories[m - 1] != views[other].categories[k - 1];
@@ -130,7 +125,7 @@ fn agreements_of(
             )
         })
     };
-    common.filter_map(agreement).collect()
+    met.filter_map(agreement).collect()
 }
 
 #[cfg(test)]

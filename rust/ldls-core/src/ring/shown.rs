@@ -3,7 +3,7 @@
 use super::slots::Slots;
 use crate::depth::DepthGroups;
 use crate::masks::LabelImage;
-use crate::memory::{collect, push};
+use crate::memory::{push, tabulate};
 use crate::projection::{Sighting, nearest_pixel};
 use crate::{Cancel, Result};
 
@@ -16,8 +16,8 @@ pub(super) struct Shown<'a> {
     sets: Vec<u32>,
     /// How far away the objects of the masks are, and the points, where that is asked for.
     depths: Option<&'a DepthGroups>,
-    /// Slots and points that fall on any mask.
-    pub(super) on_masks: Vec<(u32, u32)>,
+    /// Each point on the mask of an instance that is as far away, and the instance, in the order of the points.
+    pub(super) marks: Vec<(u32, u32)>,
 }
 
 impl<'a> Shown<'a> {
@@ -28,25 +28,27 @@ impl<'a> Shown<'a> {
         depths: Option<&'a DepthGroups>,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let set = |uv: &[f64; 2]| {
-            let pixel = nearest_pixel(*uv, image.height, image.width);
+        let set = |slot: usize| {
+            let pixel = nearest_pixel(sighting.uv[slot], image.height, image.width);
             pixel.map_or(0, |pixel| image.set_at(pixel))
         };
-        let sets = collect(sighting.uv.iter().map(set), cancel)?;
-        let mut on_masks = Vec::new();
-        for ((slot, &point), &set) in (0..).zip(&sighting.seen).zip(&sets) {
-            if set > 0 {
-                push(&mut on_masks, (slot, point))?;
-            }
-        }
-        Ok(Self {
+        let sets = tabulate(sighting.uv.len(), set, cancel)?;
+        let mut shown = Self {
             sighting,
             slots,
             image,
             sets,
             depths,
-            on_masks,
-        })
+            marks: Vec::new(),
+        };
+        let mut marks = Vec::new();
+        for (slot, &point) in (0..).zip(&sighting.seen) {
+            for m in shown.instances(slot) {
+                push(&mut marks, (point, m))?;
+            }
+        }
+        shown.marks = marks;
+        Ok(shown)
     }
 
     /// Position of a point in the sighting, if the image sees it.
