@@ -9,7 +9,6 @@ say more of points that images overlook, or give to another object (propagation.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from itertools import pairwise
@@ -21,25 +20,14 @@ from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
+from ldls.sequences.comparison import compared
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track, brought, gap, squared_distances
+from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track
 
 LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
-NEAR_M = 2.0
-"""Distance from above up to which an object may be a track."""
-SAME = 0.3
-"""Share of the longer of two objects, seen from above, up to which they may be apart and are one object."""
-SAME_M = 1.0
-"""The same in metres."""
-FEW_POINTS = 3
-"""Points of which so many or fewer on an object are part of it, where both have labels of the same sweeps."""
-ON_M = 0.2
-"""Mean distance, seen from above, up to which they are on it."""
-SAME_OF_FEW = 0.5
-"""Share of the usual length of their category up to which two objects of so few points in every sweep are one."""
 TWO_OBJECTS = 4
 """Sweeps of the last two seconds with masks of both, from which on two tracks are two objects, however near."""
 MOST_POINTS = 48
@@ -166,45 +154,15 @@ class Tracker:
         if not sightings:
             return {}
         labels = list(sightings)
-        stood = [brought(sightings[label], np.zeros(2), stamp) for label in labels]
-        costs = np.full((len(labels), len(self._tracks)), np.inf)
-        on = np.zeros(costs.shape, bool)
-        for j, track in enumerate(self._tracks):
-            like = [i for i, label in enumerate(labels) if instances[label].category == track.instance.category]
-            if not like:
-                continue
-            there = track.at(stamp)
-            for i in like:
-                own = brought(sightings[labels[i]], track.velocity, stamp) if track.moves else stood[i]
-                if gap(own.box, there.box) <= NEAR_M:
-                    costs[i, j], on[i, j] = _apart(own, there)
-        first = [sightings[label][0].footprint for label in labels]
-        few = np.array([len(footprint.points) <= FEW_POINTS for footprint in first], bool)
-        lengths = [footprint.length for footprint in first]
-        of_tracks = [track.sightings[-1].footprint.length for track in self._tracks]
-        same = costs < np.minimum(SAME_M, SAME * np.maximum.outer(lengths, of_tracks))
-        most_points = [max(len(own.footprint.points) for own in sightings[label]) for label in labels]
-        same |= costs < self._reach_of_few(most_points)
+        objects = [(instances[label].category, sightings[label]) for label in labels]
+        apart, same, part = compared(objects, self._tracks, stamp)
         goes_on = np.array([track in going_on for track in self._tracks], bool)
-        costs[goes_on & ~(same | on & few[:, None])] = np.inf
+        apart[goes_on & ~(same | part)] = np.inf
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
-        rows, columns = self._assign(np.minimum(costs, NEAR_M))
-        pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(costs[i, j])}
+        rows, columns = self._assign(np.minimum(apart, 1.0))
+        pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(apart[i, j])}
         known = {labels[i]: track for i, track in self._joined(pairs, same & ~goes_on).items()}
         return {label: known.get(label) or self._begin(instances[label]) for label in labels}
-
-    def _reach_of_few(self, most_points: Sequence[int]) -> NDArray[np.float64]:
-        """(labels, tracks) distance in metres up to which two of few points in every sweep are the same; 0 for others.
-
-        Args:
-            most_points: Most points that each label has in a sweep.
-        """
-        few = np.array([track.most_points <= FEW_POINTS for track in self._tracks], bool)
-        category = np.array([track.instance.category for track in self._tracks], np.int64)
-        lengths = np.array([track.length for track in self._tracks], np.float64)
-        usual = {each: float(np.median(lengths[~few & (category == each)])) for each in set(category[~few].tolist())}
-        reach = np.array([SAME_OF_FEW * usual.get(each, 0.0) for each in category.tolist()]) * few
-        return np.outer(np.array(most_points) <= FEW_POINTS, reach)
 
     def _joined(self, pairs: Mapping[int, int], same: NDArray[np.bool_]) -> dict[int, Track]:
         """The track of each label that is paired with one, after tracks of one object are joined.
@@ -238,21 +196,6 @@ class Tracker:
         self._count += 1
         self._tracks.append(Track(self._count, instance))
         return self._tracks[-1]
-
-
-def _apart(one: Footprint, other: Footprint) -> tuple[float, bool]:
-    """How far apart objects are in metres, infinite beyond `NEAR_M`, and whether one lies on the other.
-
-    The former is the mean of two distances: of the points of the one of fewer to the nearest of the other, and of the
-    middles.
-    """
-    few, many = sorted((one.points, other.points), key=len)
-    distances = np.sqrt(squared_distances(few, many).min(axis=1))
-    if distances.min() > NEAR_M:
-        return float("inf"), False
-    middle = math.dist(one.middle.tolist(), other.middle.tolist())
-    apart = float(np.minimum(distances, NEAR_M).mean() + min(middle, NEAR_M)) / 2
-    return apart, bool(distances.mean() < ON_M)
 
 
 def _relabelled(result: Segmentation, label_of: Mapping[int, int]) -> Segmentation:
