@@ -271,7 +271,14 @@ def test_a_few_points_on_an_object_may_be_another_in_sweeps_apart():
 
 
 @pytest.mark.parametrize(
-    ("apart", "beside_lorry", "numbers"), [(3.9, True, [2, 2]), (3.9, False, [1, 2]), (4.9, True, [2, 3])]
+    ("apart", "beside_lorry", "numbers"),
+    [
+        (1.2, True, [2, 2]),
+        (1.2, False, [1, 2]),
+        (3.9, True, [2, 2]),
+        (3.9, False, [1, 2]),
+        (4.9, True, [2, 3]),
+    ],
 )
 def test_single_points_are_one_object_where_others_of_its_category_are_long(apart, beside_lorry, numbers):
     lorry = [((8, 0.2 * part), True) for part in range(-15, 16)]

@@ -78,22 +78,21 @@ pub fn brought_together(
     keep_origin: bool,
     cancel: &Cancel,
 ) -> Result<Vec<[f64; 3]>> {
-    let mut n = 0;
-    let starts = clouds.iter().map(|(cloud, _)| {
-        n += cloud.len();
-        n - cloud.len()
+    let ends = clouds.iter().scan(0, |end, (cloud, _)| {
+        *end += cloud.len();
+        Some(*end)
     });
-    let starts: Vec<usize> = starts.collect();
+    let ends: Vec<usize> = ends.collect();
     let place = |row: usize| {
-        let at = starts.partition_point(|&start| start <= row) - 1;
+        let at = ends.partition_point(|&end| end <= row);
         let (cloud, matrix) = &clouds[at];
-        let xyz = cloud.xyz(row - starts[at]);
+        let xyz = cloud.xyz(row + cloud.len() - ends[at]);
         if xyz == [0.0; 3] && !keep_origin {
             return xyz;
         }
         matrix.map(|[x, y, z, shift]| x * xyz[0] + y * xyz[1] + z * xyz[2] + shift)
     };
-    tabulate(n, place, cancel)
+    tabulate(ends.last().copied().unwrap_or(0), place, cancel)
 }
 
 #[inline(always)]
