@@ -159,7 +159,7 @@ def test_tracks_of_one_object_are_joined(ends_m):
     assert rows[5][0] == 1
 
 
-@pytest.mark.parametrize(("sweeps_apart", "numbers"), [(TWO_OBJECTS - 1, {1, 3}), (TWO_OBJECTS, {1, 2})])
+@pytest.mark.parametrize(("sweeps_apart", "numbers"), [(TWO_OBJECTS - 1, {1}), (TWO_OBJECTS, {1, 2})])
 def test_tracks_that_images_show_apart_are_two_objects_though_one_mask_shows_both(sweeps_apart, numbers):
     masks = [*([LEFT, RIGHT] for _ in range(sweeps_apart)), [(*LEFT, 2, *RIGHT)], [LEFT, RIGHT]]
     rows = tracks_of(ldls.Tracker(), [car_at(k, 0, *parts) for k, parts in enumerate(masks)])
@@ -236,6 +236,24 @@ def test_a_second_label_in_the_place_of_an_object_is_the_object():
     for result, before in zip(ldls.Tracker().track(sweeps, results), results, strict=True):
         assert result.instance_ids[1:].tolist() == [1, 1]
         np.testing.assert_array_equal(result.labels, np.minimum(before.labels, 1))
+
+
+@pytest.mark.parametrize(
+    ("beside_m", "n_before", "numbers"),
+    [(None, 2, {1}), (3.0, 2, {1}), (1.5, 2, {1}), (1.5, TWO_OBJECTS, {1, 2})],
+    ids=["alone", "beside another", "near another", "near one that images show apart from it"],
+)
+def test_labels_that_begin_together_in_the_place_of_an_object_are_the_object(beside_m, n_before, numbers):
+    """Every other point of an object has another label, where images overlook what stood beside it."""
+    tracker = ldls.Tracker()
+    places = [((8, y), True) for y in (0, beside_m) if y is not None]
+    tracks_of(tracker, [sweep_at(0.1 * k, places) for k in range(n_before)])
+    sweep = sweep_at(0.1 * n_before, [((8, 0), True)])
+    (result,) = ldls.segment_sweeps([sweep], params=PARAMS)
+    labels = np.where(np.arange(125) % 2, 2, 1).astype(np.int32)
+    instances = (*result.instances, replace(result.instances[0], label=2))
+    (tracked,) = tracker.track([sweep], [replace(result, labels=labels, instances=instances)])
+    assert set(tracked.instance_ids[1:].tolist()) == numbers
 
 
 def test_a_second_label_beside_an_object_is_another():

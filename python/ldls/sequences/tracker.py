@@ -2,9 +2,10 @@
 
 Seen from above, an object goes on as itself where its points lie near those that a track had in the last seconds, all
 moved to one moment by its velocity. Pairs are chosen together (linear assignment), so that neighbours do not swap.
-Tracks of one object are joined. Within sweeps that were segmented together an object keeps its label, and so its
-number; a label that begins later goes on with a track that has none then, or in whose very place it is. Other moments
-say more of points that images overlook, or give to another object (propagation.py).
+Tracks of one object are joined, and labels of one object have one track. Within sweeps that were segmented together an
+object keeps its label, and so its number; a label that begins later goes on with a track that has none then, or in
+whose very place it is. Other moments say more of points that images overlook, or give to another object
+(propagation.py).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ldls.sequences.comparison import compared
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track
+from ldls.sequences.track import MEMORY_S, Floats, Footprint, Sighting, Track
 
 LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
@@ -161,11 +162,36 @@ class Tracker:
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
         rows, columns = self._assign(np.minimum(apart, 1.0))
         pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(apart[i, j])}
-        known = {labels[i]: track for i, track in self._joined(pairs, same & ~goes_on).items()}
-        return {label: known.get(label) or self._begin(instances[label]) for label in labels}
+        twins = self._twins(pairs, apart, same)
+        known = self._joined(pairs, same & ~goes_on)
+        known |= {i: known[other] for i, other in twins.items()}
+        return {label: known.get(i) or self._begin(instances[label]) for i, label in enumerate(labels)}
+
+    def _twins(self, pairs: Mapping[int, int], apart: Floats, same: NDArray[np.bool_]) -> dict[int, int]:
+        """The other label of its object for each that has one, both by their place in the order.
+
+        A label is of the object of another if it is the `same` as the track of that, and nearer to it than to its own,
+        and images do not show the two tracks apart.
+
+        Args:
+            pairs: The track of each label, both by their place in the order.
+            apart: As `compared` says.
+            same: The same.
+        """
+        twins = {}
+        for i in range(len(apart)):
+            own = pairs.get(i)
+            nearer = [
+                (apart[i, j], other)
+                for other, j in pairs.items()
+                if same[i, j] and (own is None or (apart[i, j] < apart[i, own] and not self._are_two(own, j)))
+            ]
+            if nearer:
+                twins[i] = min(nearer)[1]
+        return twins
 
     def _joined(self, pairs: Mapping[int, int], same: NDArray[np.bool_]) -> dict[int, Track]:
-        """The track of each label that is paired with one, after tracks of one object are joined.
+        """The track of each label that is paired with one, by its place, after tracks of one object are joined.
 
         An object that had two labels for a while has two tracks, and would go on by the one or the other. Where a label
         and its track are the `same` as tracks that have no label now, and images do not show them apart, the one that
@@ -178,9 +204,8 @@ class Tracker:
         free = set(range(len(self._tracks))) - set(pairs.values())
         joined, ended = {}, set()
         for i, j in pairs.items():
-            track = self._tracks[j]
             near = [other for other in sorted(free) if same[i, other]] if same[i, j] else []
-            others = [other for other in near if track.shown_with(self._tracks[other]) < TWO_OBJECTS]
+            others = [other for other in near if not self._are_two(j, other)]
             free.difference_update(others)
             one, *doubles = sorted((self._tracks[k] for k in (j, *others)), key=lambda each: -each.n_images)
             joined[i] = one
@@ -191,6 +216,10 @@ class Tracker:
                 double.number = one.number
         self._tracks = [track for track in self._tracks if track not in ended]
         return joined
+
+    def _are_two(self, one: int, other: int) -> bool:
+        """Whether images show two tracks apart."""
+        return self._tracks[one].shown_with(self._tracks[other]) >= TWO_OBJECTS
 
     def _begin(self, instance: Instance) -> Track:
         self._count += 1
