@@ -10,7 +10,7 @@ from conftest import pinhole
 from ldls.sequences.moment import Boxes, Moment
 from ldls.sequences.propagation import BELOW_M, CONFIDENCE, ENOUGH_IMAGES, FEW_IMAGES, NEAR_M, mistaken, overlooked
 from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track
-from ldls.sequences.tracker import TWO_OBJECTS
+from ldls.sequences.tracker import TWO_LABELS, TWO_OBJECTS
 from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_frame
 
 WIDE = pinhole(100.0, (320.0, 240.0), T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -239,21 +239,29 @@ def test_a_second_label_in_the_place_of_an_object_is_the_object():
 
 
 @pytest.mark.parametrize(
-    ("beside_m", "n_before", "numbers"),
-    [(None, 2, {1}), (3.0, 2, {1}), (1.5, 2, {1}), (1.5, TWO_OBJECTS, {1, 2})],
-    ids=["alone", "beside another", "near another", "near one that images show apart from it"],
+    ("beside_m", "n_before", "n_sweeps", "numbers"),
+    [
+        (None, 2, 1, {1}),
+        (3.0, 2, 1, {1}),
+        (1.5, 2, 1, {1}),
+        (1.5, TWO_OBJECTS, 1, {1, 2}),
+        (None, 2, TWO_LABELS, {1, 2}),
+    ],
+    ids=["alone", "beside another", "near another", "near one shown apart from it", "two that are shown apart"],
 )
-def test_labels_that_begin_together_in_the_place_of_an_object_are_the_object(beside_m, n_before, numbers):
+def test_labels_that_begin_together_in_the_place_of_an_object_are_the_object(beside_m, n_before, n_sweeps, numbers):
     """Every other point of an object has another label, where images overlook what stood beside it."""
     tracker = ldls.Tracker()
     places = [((8, y), True) for y in (0, beside_m) if y is not None]
     tracks_of(tracker, [sweep_at(0.1 * k, places) for k in range(n_before)])
-    sweep = sweep_at(0.1 * n_before, [((8, 0), True)])
-    (result,) = ldls.segment_sweeps([sweep], params=PARAMS)
-    labels = np.where(np.arange(125) % 2, 2, 1).astype(np.int32)
-    instances = (*result.instances, replace(result.instances[0], label=2))
-    (tracked,) = tracker.track([sweep], [replace(result, labels=labels, instances=instances)])
-    assert set(tracked.instance_ids[1:].tolist()) == numbers
+    sweeps = [sweep_at(0.1 * (n_before + k), [((8, 0), True)]) for k in range(n_sweeps)]
+    results = []
+    for result in ldls.segment_sweeps(sweeps, params=PARAMS):
+        labels = np.where(np.arange(125) % 2, 2, 1).astype(np.int32)
+        instances = (*result.instances, replace(result.instances[0], label=2))
+        results.append(replace(result, labels=labels, instances=instances))
+    for tracked in tracker.track(sweeps, results):
+        assert set(tracked.instance_ids[1:].tolist()) == numbers
 
 
 def test_a_second_label_beside_an_object_is_another():

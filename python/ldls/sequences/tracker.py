@@ -31,6 +31,8 @@ LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
 TWO_OBJECTS = 4
 """Sweeps of the last two seconds with masks of both, from which on two tracks are two objects, however near."""
+TWO_LABELS = 2
+"""Sweeps of a call with masks of both, from which on two labels are of two objects."""
 MOST_POINTS = 48
 """Points that stand for an object in a sweep; of more, some."""
 
@@ -162,29 +164,35 @@ class Tracker:
         # to stay alone is as dear as the worst pair: two bad pairs do not outweigh a good one
         rows, columns = self._assign(np.minimum(apart, 1.0))
         pairs = {i: j for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if np.isfinite(apart[i, j])}
-        twins = self._twins(pairs, apart, same)
+        shown = [{each.stamp for each in sightings[label] if each.shown} for label in labels]
+        twins = self._twins(pairs, shown, apart, same)
         known = self._joined(pairs, same & ~goes_on)
         known |= {i: known[other] for i, other in twins.items()}
         return {label: known.get(i) or self._begin(instances[label]) for i, label in enumerate(labels)}
 
-    def _twins(self, pairs: Mapping[int, int], apart: Floats, same: NDArray[np.bool_]) -> dict[int, int]:
+    def _twins(
+        self, pairs: Mapping[int, int], shown: Sequence[Set[float]], apart: Floats, same: NDArray[np.bool_]
+    ) -> dict[int, int]:
         """The other label of its object for each that has one, both by their place in the order.
 
         A label is of the object of another if it is the `same` as the track of that, and nearer to it than to its own,
-        and images do not show the two tracks apart.
+        and images show neither the labels apart nor the tracks.
 
         Args:
             pairs: The track of each label, both by their place in the order.
+            shown: When images have a mask of each label.
             apart: As `compared` says.
             same: The same.
         """
         twins = {}
-        for i in range(len(apart)):
+        for i in range(len(shown)):
             own = pairs.get(i)
             nearer = [
                 (apart[i, j], other)
                 for other, j in pairs.items()
-                if same[i, j] and (own is None or (apart[i, j] < apart[i, own] and not self._are_two(own, j)))
+                if same[i, j]
+                and len(shown[i] & shown[other]) < TWO_LABELS
+                and (own is None or (apart[i, j] < apart[i, own] and not self._are_two(own, j)))
             ]
             if nearer:
                 twins[i] = min(nearer)[1]
