@@ -180,9 +180,9 @@ class Tracker:
 
         Args:
             pairs: The track of each label, both by their place in the order.
-            shown: When images have a mask of each label.
-            apart: As `compared` says.
-            same: The same.
+            shown: Stamps of the sweeps whose images have a mask of each label, in seconds.
+            apart: (labels, tracks) how far apart they are, as `compared` says.
+            same: (labels, tracks) whether they are too near to be two objects.
         """
         twins = {}
         for i in range(len(shown)):
