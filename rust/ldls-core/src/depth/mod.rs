@@ -9,6 +9,7 @@ mod pixels;
 
 use crate::masks::InstanceMasks;
 use crate::memory::{collect, push, zeros};
+use crate::neighbors::arrange;
 use crate::{Cancel, Params, Result, Rle};
 use edges::Edges;
 use groups::{Cells, object_of};
@@ -45,6 +46,18 @@ impl DepthGroups {
         }
     }
 
+    /// The same objects, and some of the points, in the order of `points`.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+    pub(crate) fn of_points(&self, points: &[u32], cancel: &Cancel) -> Result<Self> {
+        Ok(Self {
+            intervals: self.intervals.clone(),
+            distances: arrange(points, &self.distances, cancel)?,
+            unsure: arrange(points, &self.unsure, cancel)?,
+        })
+    }
+
     /// The same objects, and points of other moments at `distances` from the camera in metres. An object that no point of
     /// its own moment falls on is at any distance.
     pub(crate) fn at_other_moments(&self, distances: Vec<f64>) -> Self {
@@ -74,7 +87,12 @@ impl InstanceMasks {
         params: &Params,
         cancel: &Cancel,
     ) -> Result<DepthGroups> {
-        let pixels = Pixels::of(uv, standing, [self.height(), self.width()], cancel)?;
+        let pixels = Pixels::of(
+            (uv, &distances),
+            standing,
+            [self.height(), self.width()],
+            cancel,
+        )?;
         let of_mask = |mask: &Rle| {
             cancel.check()?;
             let Some(edges) = Edges::of(mask, params.edge_margin, cancel)? else {
@@ -83,12 +101,11 @@ impl InstanceMasks {
             let (mut cells, mut beside) = (Cells::new(params), Vec::new());
             for column in edges.columns() {
                 cancel.check()?;
-                for &(row, point) in pixels.of_column(column) {
-                    let distance = distances[point as usize];
-                    match edges.steps_at([column, row as usize]) {
+                for point in pixels.of_column(column) {
+                    match edges.steps_at([column, point.row as usize]) {
                         0 => {}
-                        steps @ 1.. => cells.add(distance, steps.unsigned_abs().into())?,
-                        _ => push(&mut beside, (distance, point))?,
+                        steps @ 1.. => cells.add(point.distance, steps.unsigned_abs().into())?,
+                        _ => push(&mut beside, (point.distance, point.number))?,
                     }
                 }
             }

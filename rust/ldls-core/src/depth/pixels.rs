@@ -1,23 +1,34 @@
 //! The nearest pixels of points, column by column, so that a mask need not look at all of them.
 
-use crate::memory::{with_room, zeros};
+use crate::memory::{filled, with_room, zeros};
 use crate::projection::nearest_pixel;
 use crate::{Cancel, Result};
 
 /// Points between two looks at the flag.
 const POINTS_A_BLOCK: usize = 1 << 16;
 
-/// Row of the nearest pixel and number of some points, by the column of the pixel.
+/// Some points by the column of their nearest pixel.
 pub(super) struct Pixels {
     /// Those of column c lie at `offsets[c]..offsets[c + 1]`.
     offsets: Vec<usize>,
-    points: Vec<(u32, u32)>,
+    points: Vec<Point>,
+}
+
+/// A point, with all that masks ask of it in one place.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Point {
+    /// Distance to the camera, in metres.
+    pub(super) distance: f64,
+    /// Row of its nearest pixel.
+    pub(super) row: u32,
+    pub(super) number: u32,
 }
 
 impl Pixels {
-    /// The pixels nearest to `uv` of the points that are `wanted`, in an image of `height` x `width` pixels.
+    /// The pixels nearest to `uv` of the points that are `wanted`, at these `distances` from the camera in metres, in an
+    /// image of `height` x `width` pixels.
     pub(super) fn of(
-        uv: &[[f64; 2]],
+        (uv, distances): (&[[f64; 2]], &[f64]),
         wanted: &[bool],
         [height, width]: [usize; 2],
         cancel: &Cancel,
@@ -32,14 +43,19 @@ impl Pixels {
             for (point, &uv) in wanted {
                 if let Some([column, row]) = nearest_pixel(uv, height, width) {
                     offsets[column + 1] += 1;
-                    seen.push((column, (row as u32, point as u32)));
+                    let seen_at = Point {
+                        distance: distances[point],
+                        row: row as u32,
+                        number: point as u32,
+                    };
+                    seen.push((column, seen_at));
                 }
             }
         }
         for column in 0..width {
             offsets[column + 1] += offsets[column];
         }
-        let mut points = zeros(seen.len(), cancel)?;
+        let mut points = filled(Point::default(), seen.len(), cancel)?;
         for block in seen.chunks(POINTS_A_BLOCK) {
             cancel.check()?;
             for &(column, point) in block {
@@ -53,8 +69,8 @@ impl Pixels {
         Ok(Self { offsets, points })
     }
 
-    /// Rows and numbers of the points of a column.
-    pub(super) fn of_column(&self, column: usize) -> &[(u32, u32)] {
+    /// The points of a column.
+    pub(super) fn of_column(&self, column: usize) -> &[Point] {
         &self.points[self.offsets[column]..self.offsets[column + 1]]
     }
 }

@@ -182,12 +182,6 @@ impl<'a> Images<'a> {
         views.map(of_view).collect()
     }
 
-    /// True if the point at `slot` of the sighting of `image` takes `label` from the pixels around it.
-    fn admits(&self, image: usize, slot: usize, label: u32) -> bool {
-        let depths = self.depths.get(image);
-        depths.is_none_or(|depths| depths.admits(slot, label))
-    }
-
     /// Number of labels, the background counted.
     pub(crate) fn n_labels(&self) -> usize {
         self.objects.len() + 1
@@ -218,7 +212,13 @@ impl<'a> Images<'a> {
                 seen.extend(points.iter().filter_map(|&point| slots.of(point)));
             }
             let uv = arrange(&seen, &self.sightings[image].uv, cancel)?;
-            let admitted = |at: usize, label| self.admits(image, seen[at] as usize, label);
+            let depths = self.depths.get(image);
+            let depths = depths.map(|depths| depths.of_points(&seen, cancel));
+            let depths = depths.transpose()?;
+            let admitted = |at: usize, label| {
+                let depths = depths.as_ref();
+                depths.is_none_or(|depths| depths.admits(at, label))
+            };
             let (window, weight) = (params.window, params.pixel_weight);
             painted.pixel_labels(&uv, window, weight, admitted, cancel)
         });
