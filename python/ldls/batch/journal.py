@@ -111,13 +111,15 @@ class Journal:
         """Put the lines in the `order` of the frames of the source; nothing is appended any more."""
         self.close()
         places: dict[str, int] = {}
-        known = set(order)
-        with whole_file(self._path) as file:
+        # those that the source has no more come last
+        frames = [*order, *sorted(self._places.keys() - set(order))]
+        with self._path.open("rb") as before, whole_file(self._path) as file:
             file.write(_line(self._header))
-            # those that the source has no more come last
-            for record in self.records([*order, *sorted(self._places.keys() - known)]):
-                places[record["frame"]] = file.tell()
-                file.write(_line(record))
+            for frame in frames:
+                if frame in self._places:
+                    places[frame] = file.tell()
+                    before.seek(self._places[frame])
+                    file.write(before.readline())
         self._places = places
         sync_folder(self._folder)
 
