@@ -532,8 +532,9 @@ def test_masks_that_are_nowhere(few, tmp_path):
 
 
 def test_neither_masks_nor_a_segmenter(few, tmp_path):
-    with pytest.raises(ParameterError, match=r"got neither, and .*source names no masks of its own"):
+    with pytest.raises(ParameterError, match=r"got neither, and .*source names no masks of its own") as failed:
         batch.run(few, tmp_path / "out", batch.RunSettings())
+    assert str(failed.value).endswith(f"; perhaps masks={few / 'masks'}?")
 
 
 @pytest.mark.parametrize(

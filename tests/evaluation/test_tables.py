@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from evaluation.samples import disturbed, labeling, random_labeling
 from ldls.errors import ParameterError
@@ -120,6 +121,9 @@ def test_tracking_has_a_row_a_class_and_one_of_all():
         ("m", "Pedestrian", None, 100.0, 100.0, 1, 2, 0, 0.0, 100.0),
         ("m", "all", pytest.approx(100 * 0.75**0.5), 100.0, 75.0, 2, 4, 1, 25.0, 75.0),
     )
+    console = Console(file=io.StringIO(), width=80)
+    console.print(table.rich())
+    assert console.file.getvalue().count("Pedestrian") == 1
     one = TrackingScores(("Car",))
     assert tracking_table({"m": one}).rows == (("m", "Car", None, None, None, 0, 0, 0, None, None),)
 

@@ -82,7 +82,9 @@ class Table:
 
         grid = RichTable(title=self.title, caption=self.note or None)
         for c, column in enumerate(self.columns):
-            grid.add_column(Text(column), justify="right" if self._is_number(c) else "left")
+            is_number = self._is_number(c)
+            # heads are of several words and can be wrapped, names of classes would be cut
+            grid.add_column(Text(column), justify="right" if is_number else "left", no_wrap=not is_number)
         for row in self.rows:
             grid.add_row(*(Text(_shown(cell)) for cell in row))
         return grid

@@ -269,6 +269,20 @@ def sweep(folder: str | PathLike[str]) -> int:
     return len(left)
 
 
+def perhaps(folder: str | PathLike[str], beginnings: str | tuple[str, ...], what: str = "") -> str:
+    """What a message adds where a folder has no such files: that one in it, by the beginning of its name, may be meant.
+
+    Args:
+        folder: The folder.
+        beginnings: How names of folders with such files begin.
+        what: What stands before the path, as "masks=".
+    """
+    folder = Path(folder)
+    inside = sorted(folder.iterdir()) if folder.is_dir() else []
+    likely = next((path for path in inside if path.name.startswith(beginnings) and path.is_dir()), None)
+    return "" if likely is None else f"; perhaps {what}{likely}?"
+
+
 def below(folder: Path, name: str, *, place: str) -> Path:
     """The path `name` below `folder`; links that lie there may lead on, for whoever put them there meant them to.
 

@@ -58,6 +58,9 @@ def test_folders_without_labels_and_wrong_options(tmp_path):
     empty = touch(tmp_path / "empty", "a.png")
     with pytest.raises(InputError, match="empty: holds no labels, expected files that end in .label"):
         label_files(empty, "label")
+    touch(empty / "annotations", "a.txt")
+    with pytest.raises(InputError, match=r"holds no labels, .*; perhaps .*empty/annotations\?$"):
+        label_files(empty)
     with pytest.raises(FileNotFoundError):
         label_files(tmp_path / "none")
     with pytest.raises(ParameterError, match="missing: got 'x'"):
