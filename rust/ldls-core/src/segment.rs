@@ -118,7 +118,7 @@ pub fn segment(
     };
     let components = || {
         timed(&mut t.components, || {
-            let place = |row: usize| cloud.xyz(in_view.indices[order[row] as usize] as usize);
+            let place = |row: usize| cloud.xyz(rows.of_graph[row] as usize);
             remove_outliers(&a, &diffused.labels, order, params, place, cancel)
         })
     };
@@ -218,7 +218,7 @@ fn remove_outliers(
     labels: &[u32],
     order: &[u32],
     params: &Params,
-    place: impl Fn(usize) -> [f64; 3],
+    place: impl Fn(usize) -> [f64; 3] + Sync,
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     if !params.remove_outliers {

@@ -3,7 +3,7 @@
 use super::box_tree::BoxTree;
 use super::disjoint_sets::DisjointSets;
 use super::point_graph::PointGraph;
-use crate::memory::{collect, filled, push, zeros};
+use crate::memory::{collect, filled, push, tabulate, zeros};
 use crate::{Cancel, Error, Result};
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ pub fn remove_outliers(
     graph: &PointGraph,
     labels: &[u32],
     part_gap: f64,
-    place: impl Fn(usize) -> [f64; 3],
+    place: impl Fn(usize) -> [f64; 3] + Sync,
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     let indices = collect(0..labels.len() as u32, cancel)?;
@@ -36,7 +36,7 @@ pub(crate) fn remove_outliers_by_index(
     labels: &[u32],
     indices: &[u32],
     part_gap: f64,
-    place: impl Fn(usize) -> [f64; 3],
+    place: impl Fn(usize) -> [f64; 3] + Sync,
     cancel: &Cancel,
 ) -> Result<Vec<u32>> {
     if labels.len() != graph.len() {
@@ -80,8 +80,8 @@ pub(crate) fn remove_outliers_by_index(
     if part_gap > 0.0 {
         let rows = rows_of_each(&mut components, &members, &mut sets, cancel)?;
         let tree = |component: &Component| {
-            let rows = rows[component.rows()].iter();
-            let points = collect(rows.map(|&row| place(row as usize)), cancel)?;
+            let rows = &rows[component.rows()];
+            let points = tabulate(rows.len(), |at| place(rows[at] as usize), cancel)?;
             BoxTree::around(points, cancel)
         };
         keep_parts(&mut components, labels, &largest, (part_gap, tree), cancel)?;
