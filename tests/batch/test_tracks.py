@@ -5,6 +5,7 @@ import json
 import re
 import signal
 import sys
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -72,7 +73,7 @@ def numbered(monkeypatch):
 @pytest.mark.parametrize("sweeps", [0, 1])
 def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, sweeps):
     out = tmp_path / "out"
-    run(simulated, out, masks=str(simulated / "masks_02"), sweeps=sweeps)
+    summary = run(simulated, out, masks=str(simulated / "masks_02"), sweeps=sweeps)
     source, tracker = open_source(simulated, truth=False), ldls.Tracker()
     found = iter(rows(out))
     for window in ((0, 1, 2), (3, 4)) if sweeps else ((0,), (1,), (2,), (3,), (4,)):
@@ -100,6 +101,9 @@ def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, s
                     velocity = [float(row[f"velocity_{axis}_m_s"]) for axis in "xy"]
                     np.testing.assert_allclose(velocity, result.instances[each.label - 1].velocity, atol=1e-4)
     assert next(found, None) is None
+    last_names = {row["track"]: row["name"] for row in rows(out)}
+    assert summary.tracks == Counter(last_names.values())
+    assert summary.tracks["car"] < summary.objects["car"]
     by_frame = [{row["track"] for row in rows(out) if row["frame"] == name} for name in source.names]
     assert len(set.intersection(*by_frame)) >= 3, "objects go on as themselves over all windows"
 
@@ -252,6 +256,7 @@ def test_killed_while_tracks_are_written(drive, tracked, tmp_path, step, n):
     outcome = runs.resumed(words)
     assert outcome.exit_code == 0, outcome.output
     assert f"tracks in {out / 'tracks'}" in outcome.output
+    assert re.search(r"category +\S objects +\S tracks", outcome.output)
     assert runs.contents(out) == runs.contents(tracked[0])
 
 

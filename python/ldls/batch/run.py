@@ -170,6 +170,7 @@ def run(
         n_nothing_in_view=sum(map(len, doubts.values())),
         failures=failures,
         objects=count_objects(journal.records(names)),
+        tracks={} if tracks is None else tracks.counted(),
         seconds=dict(seconds),
         elapsed=elapsed,
     )

@@ -16,7 +16,9 @@ import csv
 import hashlib
 import io
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -140,8 +142,7 @@ class RunTracks:
             names: Names of all frames of the source, in their order.
         """
         order = {name: number for number, name in enumerate(names)}
-        with open_file(self._folder / TABLE, "table of tracks", limit=LARGE_BYTES) as file:
-            rows = csv.DictReader(io.TextIOWrapper(file, encoding="utf-8", newline=""))
+        with self._table() as rows:
             of_frames = groupby(rows, key=lambda row: row["frame"])
             frame, tracked = next(of_frames, (None, iter(())))
             for each in objects:
@@ -149,6 +150,18 @@ class RunTracks:
                     frame, tracked = next(of_frames, (None, iter(())))
                 known = {int(row["label"]): row for row in tracked} if frame == each.frame else {}
                 yield replace(each, rows=[_numbered(row, known.get(row["label"])) for row in each.rows])
+
+    def counted(self) -> dict[str, int]:
+        """Objects over the drive by the name that each had last, the most frequent first."""
+        with self._table() as rows:
+            names = {row["track"]: row["name"] for row in rows}
+        return dict(Counter(names.values()).most_common())
+
+    @contextmanager
+    def _table(self) -> Iterator[Iterator[dict[str, str]]]:
+        """The rows of the table that was written, by their columns."""
+        with open_file(self._folder / TABLE, "table of tracks") as file:
+            yield csv.DictReader(io.TextIOWrapper(file, encoding="utf-8", newline=""))
 
     def _tracked(self, records: Iterable[Record]) -> Iterator[tuple[str, Sweep, Segmentation]]:
         """Name, sweep and tracked result of each frame, window by window."""

@@ -195,14 +195,16 @@ def show(summary: Summary, out: Path) -> None:
 
 
 def object_counts(summary: Summary) -> Table:
-    """Objects with points of each category."""
+    """Objects with points of each category: in each frame, added up, and over the drive where they are numbered."""
     from rich.table import Table
 
+    counts = {"objects": summary.objects} | ({"tracks": summary.tracks} if summary.tracks else {})
     table = Table(title="objects found")
     table.add_column("category")
-    table.add_column("objects", justify="right")
-    for name, count in summary.objects.items():
-        table.add_row(name, f"{count:,}")
+    for heading in counts:
+        table.add_column(heading, justify="right")
+    for name in {**summary.objects, **summary.tracks}:
+        table.add_row(name, *(f"{count.get(name, 0):,}" for count in counts.values()))
     return table
 
 
