@@ -17,7 +17,7 @@ from ldls.datasets import CameraImage, Frame, Source
 from ldls.datasets.stored_masks import StoredMasks, fill, own_masks
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_result
-from ldls.io.files import perhaps
+from ldls.io.files import folder_hint
 from ldls.io.objects import FrameObjects
 from ldls.label_diffusion import nothing_in_view
 from ldls.masks import InstanceMasks
@@ -62,7 +62,7 @@ class FrameWork:
         if settings.masks is None and settings.segmenter is None and not self._own_masks:
             raise ParameterError(
                 f"masks, segmenter: give one of them, got neither, and {source.path} names no masks of its own"
-                + perhaps(source.path, "masks", "masks=")
+                + folder_hint(source.path, "masks", option="masks=")
             )
         self._stored = None if settings.masks is None else StoredMasks(settings.masks)
         if self._stored is not None:

@@ -118,8 +118,7 @@ class Journal:
             for frame in frames:
                 if frame in self._places:
                     places[frame] = file.tell()
-                    before.seek(self._places[frame])
-                    file.write(before.readline())
+                    file.write(_line_at(before, self._places[frame]))
         self._places = places
         sync_folder(self._folder)
 
@@ -255,9 +254,13 @@ def _is_of_image(image: object) -> bool:
 
 
 def _record_at(file: IO[bytes], place: int) -> Record:
-    file.seek(place)
-    record: Record = json.loads(file.readline())
+    record: Record = json.loads(_line_at(file, place))
     return record
+
+
+def _line_at(file: IO[bytes], place: int) -> bytes:
+    file.seek(place)
+    return file.readline()
 
 
 def _line(record: Record) -> bytes:

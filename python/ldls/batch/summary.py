@@ -40,7 +40,7 @@ class Summary:
         n_earlier: Of these, those of earlier runs that were interrupted.
         n_nothing_in_view: Of those done, frames without a point in view, or on a mask.
         failures: Frames that failed, in their order.
-        objects: Objects with points in each frame, by category name.
+        objects: Objects with points, each counted in every frame, by category name.
         tracks: Objects over the drive where they are numbered, by the name that each had last.
         seconds: Time of each stage, added up over the frames of this run.
         elapsed: Time of this run in seconds.

@@ -269,18 +269,18 @@ def sweep(folder: str | PathLike[str]) -> int:
     return len(left)
 
 
-def perhaps(folder: str | PathLike[str], beginnings: str | tuple[str, ...], what: str = "") -> str:
-    """What a message adds where a folder has no such files: that one in it, by the beginning of its name, may be meant.
+def folder_hint(folder: str | PathLike[str], *beginnings: str, option: str = "") -> str:
+    """The end of a message that a folder has no such files: which folder in it may be meant; empty where there is none.
 
     Args:
         folder: The folder.
         beginnings: How names of folders with such files begin.
-        what: What stands before the path, as "masks=".
+        option: What takes it, as "masks=".
     """
     folder = Path(folder)
     inside = sorted(folder.iterdir()) if folder.is_dir() else []
     likely = next((path for path in inside if path.name.startswith(beginnings) and path.is_dir()), None)
-    return "" if likely is None else f"; perhaps {what}{likely}?"
+    return "" if likely is None else f"; perhaps {option}{likely}?"
 
 
 def below(folder: Path, name: str, *, place: str) -> Path:

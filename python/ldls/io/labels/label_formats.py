@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
 from ldls.errors import InputError, ParameterError, UnsupportedFormatError, some
-from ldls.io.files import open_file, perhaps
+from ldls.io.files import folder_hint, open_file
 from ldls.io.labels.annotations import is_annotation, read_annotations
 from ldls.io.labels.kitti_objects import is_kitti_object, read_kitti_boxes
 from ldls.io.labels.labeling_npz import read_labeling_npz
@@ -216,8 +216,8 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
             continue  # notes beside labels
         files = {name: LabelFile(entry, of_all) for name, entry in new.items()} | files
     if not files:
-        inside = perhaps(path, ("annotations", "label"))
-        raise InputError(f"{path}: holds no labels, expected files that end in {', '.join(endings)}{inside}")
+        hint = folder_hint(path, "annotations", "label")
+        raise InputError(f"{path}: holds no labels, expected files that end in {', '.join(endings)}{hint}")
     return files
 
 

@@ -21,6 +21,7 @@ pub(super) struct Point {
     pub(super) distance: f64,
     /// Row of its nearest pixel.
     pub(super) row: u32,
+    /// Its number among all that the image sees.
     pub(super) number: u32,
 }
 
@@ -40,15 +41,15 @@ impl Pixels {
             let wanted = (block * POINTS_A_BLOCK..)
                 .zip(uv)
                 .filter(|(point, _)| wanted[*point]);
-            for (point, &uv) in wanted {
+            for (number, &uv) in wanted {
                 if let Some([column, row]) = nearest_pixel(uv, height, width) {
                     offsets[column + 1] += 1;
-                    let seen_at = Point {
-                        distance: distances[point],
+                    let point = Point {
+                        distance: distances[number],
                         row: row as u32,
-                        number: point as u32,
+                        number: number as u32,
                     };
-                    seen.push((column, seen_at));
+                    seen.push((column, point));
                 }
             }
         }

@@ -215,10 +215,7 @@ impl<'a> Images<'a> {
             let depths = self.depths.get(image);
             let depths = depths.map(|depths| depths.of_points(&seen, cancel));
             let depths = depths.transpose()?;
-            let admitted = |at: usize, label| {
-                let depths = depths.as_ref();
-                depths.is_none_or(|depths| depths.admits(at, label))
-            };
+            let admitted = |at: usize, label| depths.iter().all(|depths| depths.admits(at, label));
             let (window, weight) = (params.window, params.pixel_weight);
             painted.pixel_labels(&uv, window, weight, admitted, cancel)
         });
