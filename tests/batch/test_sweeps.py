@@ -245,7 +245,8 @@ def test_a_gap_in_a_drive_ends_a_window(tmp_path):
 @pytest.mark.parametrize("settings", [{}, {"sweeps": 0, "track": True}])
 def test_without_poses_nothing_is_begun(tmp_path, settings):
     drive = drives.small_drive(tmp_path / "drive", 2, poses=False)
-    with pytest.raises(PoseError, match=r"kitti-odometry\) have no poses, .* if poses\.txt .* give --poses FILE"):
+    whence = r"they come with poses\.txt and times\.txt; else give --poses FILE, or --poses kiss-icp"
+    with pytest.raises(PoseError, match=rf"kitti-odometry\) have no poses, .*; {whence}"):
         run(drive, tmp_path / "out", **settings)
     (drive / "times.txt").unlink()
     with pytest.raises(PoseError, match="have no stamps, expected them"):

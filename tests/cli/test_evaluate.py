@@ -426,6 +426,18 @@ def test_numbers_of_every_format_that_has_them_are_followed(drive):
         assert (rows[method, "all"]["LSTQ"], rows[method, "all"]["objects"]) == (100.0, 3)
 
 
+def test_labels_of_single_frames_are_no_drive_where_their_run_has_tracks(drive):
+    for method in ("anew", "steady"):
+        (drive / method / "tracks").mkdir()
+    (drive / "anew/tracks/tracks.json").write_text("{}")
+    words = [str(drive / "steady"), str(drive / "truth"), f"--beside=anew={drive / 'anew'}"]
+    outcome = run(app, ["evaluate", *words, "--track"])
+    assert outcome.exit_code == 1
+    assert f"--track: files in {drive / 'anew'} number the objects of each frame anew" in outcome.stderr
+    assert outcome.stderr.rstrip().endswith(f"which are in {drive / 'anew/tracks'}")
+    assert run(app, ["evaluate", *words]).exit_code == 0
+
+
 def test_what_masks_allow_is_no_drive(results):
     outcome = evaluate(results, "--track", "--out", results / "t")
     assert outcome.exit_code == 0, outcome.output

@@ -145,6 +145,14 @@ def test_the_topics_of_a_bag_are_listed(tmp_path):
     assert "no images, so that" not in done.output
 
 
+def test_whether_there_are_poses_is_said_and_what_they_come_with(tmp_path):
+    assert "none; they come with oxts/ and the day's" in run(layouts.kitti_raw(tmp_path / "raw", n_frames=2)).output
+    pytest.importorskip("rosbags")
+    bag = ros_samples.Recording(moving=(("odom", "base"),)).write(tmp_path / "small.bag")
+    assert "none; they come with --option world=odom " in run(bag).output
+    assert "in 3 of 3 frames" in run(bag, "--option", "world=odom").output
+
+
 def test_a_bag_without_clouds_is_refused_with_its_topics(tmp_path):
     pytest.importorskip("rosbags")
     with BagWriter(tmp_path / "other.bag", "rosbag1") as bag:

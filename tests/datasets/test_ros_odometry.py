@@ -87,6 +87,26 @@ def test_without_a_world_nothing_has_a_pose(tmp_path):
     assert opened(written(tmp_path, {"/odom": [{"stamp_ns": START_NS, "xyzw": (0, 0, 0, 0)}]}), None)[0].pose is None
 
 
+def test_worlds_are_the_frames_that_transforms_lead_to_and_the_topics(tmp_path):
+    """Static transforms lead to no world."""
+    path = written(
+        tmp_path,
+        {"/lio": drive(world="start")},
+        edges=(("base", "lidar"), ("base", "hood")),
+        moving=(("map", "odom"), ("odom", "base")),
+    )
+    bag = opened(path, None)
+    assert bag.worlds() == ["odom", "map", "/lio"]
+    assert bag.poses_from == "--option world=odom or --option world=map or --option world=/lio"
+    for world in bag.worlds():
+        assert opened(path, world)[1].pose is not None
+
+
+def test_a_bag_without_any_way_has_no_worlds(tmp_path):
+    bag = opened(written(tmp_path, {}), None)
+    assert (bag.worlds(), bag.poses_from) == ([], "")
+
+
 def test_transforms_come_before_odometry_and_a_topic_before_transforms(tmp_path):
     path = written(tmp_path, {"/wheels": drive(), "/lio": drive(2.0)}, moving=(("odom", "base"),))
     by_transforms = [frame.pose for frame in opened(path)]

@@ -20,10 +20,6 @@ from ldls.io.poses import tum
 from ldls.io.poses.read import format_of
 from ldls.sequences import Trajectory
 
-WHENCE = (
-    "kitti-raw has them if oxts/ and the day's calib_imu_to_velo.txt are there, kitti-odometry if poses.txt and "
-    "times.txt are, nuscenes always, rosbag with --option world=odom; else give --poses FILE, or --poses kiss-icp"
-)
 ODOMETRY = "kiss-icp"
 """What stands in the place of a file where the sweeps themselves are to say how the lidar moved."""
 FOUND = "poses.txt"
@@ -121,9 +117,12 @@ class Poses:
                 "ascending stamps to track objects; take one drive, as by --option scene=NAME"
             )
         if self._trajectory is None and not self._has_poses(chosen):
+            # of sources whose frames may have poses
+            own = getattr(self._source, "poses_from", "")
             raise PoseError(
                 f"{self._source.path}: frames of this source ({self._source.kind}) have no poses, expected them for "
-                f"--sweeps and --track; {WHENCE}"
+                f"--sweeps and --track; {f'they come with {own}; else ' if own else ''}give --poses FILE, or --poses "
+                f"{ODOMETRY}"
             )
 
     def _has_poses(self, chosen: Frames) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -127,6 +128,8 @@ def evaluate(
         background=words(background),
     )
     places = _places(predictions, name, beside or [])
+    if track:
+        _check_tracked(path for path, _ in places.values())
     true_path, true_format = parse_place(truth)
     files = {}
     for method, (path, format) in places.items():
@@ -169,6 +172,22 @@ def _places(predictions: str, name: str | None, beside: list[str]) -> dict[str, 
             raise ParameterError(f"--beside: {method!r} is the name of another method; give each its own (--name)")
         places[method] = parse_place(place)
     return places
+
+
+def _check_tracked(paths: Iterable[Path]) -> None:
+    """Refuse the labels of single frames where the same run has tracks.
+
+    Raises:
+        ParameterError: A path is the folder of such a run.
+    """
+    from ldls.batch.run_tracks import FOLDER, STATE
+
+    for path in paths:
+        if (path / FOLDER / STATE).is_file():
+            raise ParameterError(
+                f"--track: files in {path} number the objects of each frame anew; expected files whose numbers mean "
+                f"the same object throughout, which are in {path / FOLDER}"
+            )
 
 
 def _show(by_method: dict[str, Evaluation], left_out_by: set[str], out: Path | None) -> None:

@@ -120,7 +120,7 @@ def stamps_of(source: Source) -> tuple[float | None, ...]:
 
 
 def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[float | None]) -> Table:
-    """Kind, frames, time, points and truth."""
+    """Kind, frames, time, poses, masks, points and truth."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -135,6 +135,7 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
     if left_out:
         table.add_row("left out", f"{len(left_out):,} ({counts_of(left_out)})")
     table.add_row("time", _time(stamps))
+    table.add_row("poses", escape(_poses(source, facts)))
     counts = [each.n_points for each in facts if each.n_points] or [0]
     masks = ", ".join(f"{camera}: {place}" for camera, place in own_masks(source).items())
     table.add_row("masks", escape(masks) or "none of its own")
@@ -216,6 +217,15 @@ def write_picture(frame: Frame, path: Path) -> None:
     if not frame.images:
         raise ParameterError(f"--picture: frame {frame.name} has no image")
     save_picture(path, depth_picture(frame))
+
+
+def _poses(source: Source, facts: Sequence[FrameFacts]) -> str:
+    posed = sum(each.has_pose for each in facts)
+    if posed:
+        return f"in {posed} of {len(facts)} frames"
+    # of sources whose frames may have poses
+    own = getattr(source, "poses_from", "")
+    return f"none; they come with {own}" if own else "none of its own"
 
 
 def _range(low: str, high: str) -> str:

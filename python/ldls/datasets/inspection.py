@@ -49,6 +49,7 @@ class FrameFacts:
         in_view: Share of the points that each camera sees, by its name.
         offsets_s: Time of each image after the sweep, in seconds, where both stamps are known.
         truth: Points of each class that truth has; None without truth.
+        has_pose: True if the source says where the lidar was.
         findings: Faults of the frame.
     """
 
@@ -57,6 +58,7 @@ class FrameFacts:
     in_view: Mapping[str, float] = field(default_factory=dict)
     offsets_s: Mapping[str, float] = field(default_factory=dict)
     truth: Mapping[str, int] | None = None
+    has_pose: bool = False
     findings: tuple[Finding, ...] = ()
 
 
@@ -81,6 +83,7 @@ def inspect(source: Source, index: int) -> FrameFacts:
         in_view=shares,
         offsets_s=offsets,
         truth=None if frame.truth is None else {n: c for n, c in frame.truth.counts().items() if c},
+        has_pose=frame.pose is not None,
         findings=(
             *_of_cloud(frame),
             *(finding for image in frame.images for finding in _of_image(frame, image)),

@@ -40,6 +40,7 @@ class KittiOdometrySource(FileSource):
 
     kind = "kitti-odometry"
     looks_for = "velodyne/ and calib.txt, in the folder, or in NN/ or sequences/NN/ below it"
+    poses_from = "poses.txt and times.txt"
 
     def __init__(
         self,

@@ -62,6 +62,7 @@ class KittiRawSource(FileSource):
 
     kind = "kitti-raw"
     looks_for = "velodyne_points/, in the folder or in one *_sync/ below it"
+    poses_from = "oxts/ and the day's calib_imu_to_velo.txt"
 
     def __init__(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Self
@@ -41,6 +42,8 @@ from ldls.sequences.trajectory import LONGEST_S
 TIME = "time"
 """What `fields` calls the field of times."""
 STATIC_TRANSFORMS, MOVING_TRANSFORMS = "/tf_static", "/tf"
+FIRST_TRANSFORMS = 1000
+"""Messages of /tf that tell which frames there are: a second of them or more."""
 UNPICKLED = ("_bag", "_tree", "_odometry")
 """Attributes that another process makes itself."""
 
@@ -145,6 +148,22 @@ class RosBag:
         stamps = [str(sweep.header.stamp_ns) for sweep in self._sweeps]
         repeated = len(set(stamps)) < len(stamps)
         self.names = tuple(f"{number:06d}" for number in range(len(stamps))) if repeated else tuple(stamps)
+
+    @property
+    def poses_from(self) -> str:
+        """The options that give frames poses, by what the bag has, for messages."""
+        return " or ".join(f"--option world={world}" for world in self.worlds())
+
+    def worlds(self) -> list[str]:
+        """Return what `world` can be: frames that /tf leads to, the nearest first, and topics of Odometry.
+
+        Raises:
+            CorruptFileError: A message cannot be read.
+        """
+        cloud, static = self._sweeps[0].header.frame_id, list(self._transforms(STATIC_TRANSFORMS))
+        some = islice(self._transforms(MOVING_TRANSFORMS), FIRST_TRANSFORMS)
+        fixed, above = (TransformTree(messages).ancestors(cloud) for messages in (static, [*static, *some]))
+        return [frame for frame in above if frame not in fixed] + odometry_topics(self._bag)
 
     @property
     def offsets_s(self) -> NDArray[np.float64]:
