@@ -14,6 +14,7 @@ import ldls
 from datasets import layouts
 from ldls.cli import app
 from ldls.cli.recording_options import default_target
+from ldls.viewing import overlay
 from viewing.recorded import Recorded, vectors
 
 
@@ -220,5 +221,24 @@ def test_a_result_as_pictures_needs_no_recording(saved, tmp_path):
     assert (tmp_path / "seen.rrd").is_file()
 
 
-def test_a_source_has_no_pictures(tmp_path):
-    assert "pictures show a result" in run(tmp_path, "--picture", "seen.png").output
+def test_frames_of_a_source_as_pictures_have_the_tracks_of_their_run(drive, tmp_path, monkeypatch):
+    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track"]
+    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    done = run(drive, "--results", "out/tracks", "--frames", "1:", "--picture", "seen.png")
+    assert done.exit_code == 0 and "2 of 3 frames; wrote seen-FRAME.png and others" in done.output, done.output
+    source = ldls.datasets.open_source(drive)
+    kinds = ("", "-birds-eye", "-comparison")
+    expected = {f"seen-{name}{kind}.png" for name in source.names[1:] for kind in kinds}
+    assert {path.name for path in tmp_path.glob("*.png")} == expected
+    tracked = ldls.read_result(f"out/tracks/{source.names[1]}.npz")
+    assert any(instance.track for instance in tracked.instances)
+    picture = overlay(tracked, source[1].images[0].read())
+    np.testing.assert_array_equal(np.asarray(Image.open(f"seen-{source.names[1]}.png")), np.asarray(picture))
+
+
+@pytest.mark.parametrize("more", [[], ["--rerun", "a.rrd"]], ids=["alone", "beside a recording"])
+def test_frames_without_labels_are_no_pictures(drive, tmp_path, more):
+    done = run(drive, "--frames", "1", "--picture", "seen.png", *more)
+    assert done.exit_code == 1 and "no labels to draw; give --masks, --segmenter or --results" in done.output
+    assert not list(tmp_path.glob("*.png"))

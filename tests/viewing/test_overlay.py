@@ -140,17 +140,37 @@ def test_masks_alone_are_drawn_in_the_same_colours(small_scene) -> None:
     np.testing.assert_allclose(middle, 0.72 * grey + 0.28 * colour, atol=2)
 
 
-def test_only_objects_with_points_are_named(small_scene, monkeypatch) -> None:
+@pytest.fixture
+def drawn(monkeypatch):
+    """The tags that pictures have."""
+    tags = []
+    # the package has a function of the module's name
+    module = importlib.import_module("ldls.viewing.overlay")
+    monkeypatch.setattr(module, "draw_tags", lambda picture, of_picture, *_: tags.extend(of_picture))
+    return tags
+
+
+def test_only_objects_with_points_are_named(small_scene, drawn) -> None:
     points, masks, camera = small_scene
     nowhere = np.zeros((60, 80), bool)
     nowhere[:6, :6] = True
     masks = ldls.InstanceMasks.from_array([nowhere, *masks.to_array()], categories=[18, 1, 3])
-    named = []
-    # the package has a function of the module's name
-    module = importlib.import_module("ldls.viewing.overlay")
-    monkeypatch.setattr(module, "draw_tags", lambda picture, tags, *_: named.extend(tag.text for tag in tags))
     overlay(ldls.segment(points, masks, camera))
-    assert named == ["person 2", "car 3"]
+    assert [tag.text for tag in drawn] == ["person 2", "car 3"]
+
+
+def test_objects_that_an_image_overlooks_are_named_at_their_points(small_scene, drawn) -> None:
+    points, masks, camera = small_scene
+    result = ldls.segment(points, masks, camera)
+    (seen,) = result.views
+    car_alone = replace(seen, view=ldls.View(masks.select([1]), camera), labels=seen.labels[1:])
+    overlay(replace(result, views=(car_alone,)))
+    car, person = drawn
+    assert [tag.text for tag in drawn] == ["car 2", "person 1"]
+    assert [tag.colour for tag in (person, car)] == Shown.of(result, "final").colours
+    at_px = seen.pixels[result.labels[seen.in_view] == 1]
+    box = 1800 / 80 * (np.concatenate([at_px.min(axis=0), at_px.max(axis=0)]) + 0.5)
+    np.testing.assert_allclose(person.box, box, atol=0.5)
 
 
 def test_masks_without_pixels_are_no_trouble(small_scene) -> None:

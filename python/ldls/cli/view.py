@@ -1,4 +1,4 @@
-"""`ldls view`: a result, or the frames of a source, in the Rerun viewer."""
+"""`ldls view`: a result, or the frames of a source, in the Rerun viewer or as pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import FRAMES_FAILED, PictureOption, refuse
 from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, where_recorded
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
-from ldls.cli.view_source import MOST_FRAMES, chosen_frames, labelled, record_frames
+from ldls.cli.view_source import MOST_FRAMES, chosen_frames, labelled, show_frames
 from ldls.errors import InputError
 
 if TYPE_CHECKING:
@@ -69,12 +69,13 @@ def view(
     diffusion: DiffusionOption = None,
     picture: PictureOption = None,
 ) -> None:
-    """Show a result, or the frames of a source, in the Rerun viewer (extra viz), or a result as pictures.
+    """Show a result, or the frames of a source, in the Rerun viewer (extra viz) or as pictures.
 
     Frames of a source are segmented with --masks, --segmenter or the masks that the source names itself, or taken from
     --results; without any of these they are shown as they are, with their truth. A frame that fails is passed over; the
     exit status is then 2.
-    With --picture, pictures are written, and nothing is recorded unless --rerun says so.
+    With --picture, pictures are written, of a source with the name of each frame after that of FILE, and nothing is
+    recorded unless --rerun says so.
 
     Examples:
     ldls view results/000571.npz --image image_2/000571.png
@@ -82,6 +83,8 @@ def view(
     ldls view results/000571.npz --image image_2/000571.png --picture 000571.png
 
     ldls view kitti/training --masks kitti/training/masks --frames 0:20 --rerun kitti.rrd
+
+    ldls view DRIVE --results labels/tracks --picture pictures/drive.png
     """
     from ldls.io.results import FORMATS
 
@@ -96,17 +99,20 @@ def view(
         message = view_result(path, image or [], target, name=name, diffusion=diffusion, picture=picture)
     else:
         refuse({"image": image}, f"{path} is a source, which has its images")
-        refuse({"picture": picture}, f"{path} is a source; pictures show a result")
-        assert target is not None
         source, indices = chosen_frames(path, dataset, option or [], frames)
         label = labelled(
             source, masks=masks, segmenter=segmenter, min_score=min_score, categories=categories, results=results
         )
-        failures = record_frames(source, indices, target, name=name, diffusion=diffusion, label=label)
+        failures = show_frames(
+            source, indices, label=label, picture=picture, target=target, name=name, diffusion=diffusion
+        )
         for failure in failures:
             console().print(failure, highlight=False, soft_wrap=True)
-        count = f"{len(indices) - len(failures):,} of {len(source):,} frames; "
-        message = count + where_recorded(target)
+        message = f"{len(indices) - len(failures):,} of {len(source):,} frames"
+        if picture is not None:
+            message += f"; wrote {picture.stem}-FRAME{picture.suffix} and others to {picture.parent}"
+        if target is not None:
+            message += f"; {where_recorded(target)}"
     console().print(message, highlight=False, soft_wrap=True)
     if failures:
         raise typer.Exit(FRAMES_FAILED)

@@ -1,8 +1,9 @@
-"""The frames of a source, one after the other into a recording."""
+"""The frames of a source, one after the other, as pictures and in a recording."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -78,40 +79,59 @@ def labelled(
     return partial(_segmented, source, FrameWork(source, settings, Path()))
 
 
-def record_frames(
+def show_frames(
     source: Source,
     indices: Sequence[int],
-    target: str,
     *,
+    label: Labelled,
+    picture: Path | None,
+    target: str | None,
     name: str,
     diffusion: int | None,
-    label: Labelled,
 ) -> list[str]:
-    """Record frames of a source, labelled by `label`; a line for each that cannot be.
+    """Draw and record frames of a source, labelled by `label`; a line for each that cannot be.
+
+    Args:
+        source: The source.
+        indices: Numbers of the frames.
+        label: Gives each its labels.
+        picture: Where pictures go, each with the name of its frame; None for no pictures.
+        target: Where the recording goes; None for none.
+        name: Name of the recording.
+        diffusion: See `every_of`.
 
     Raises:
         LdlsError: None can be; the error is that of the first.
     """
+    from ldls.view import camera_names
+    from ldls.viewing import save_pictures
     from ldls.viewing.recording import open_recording
 
     every = every_of(diffusion, len(indices))
     failures: list[tuple[str, Exception]] = []
-    with open_recording(target, name=name) as recording:
-        for index in progress(indices, len(indices), "recording"):
+    with nullcontext() if target is None else open_recording(target, name=name) as recording:
+        for index in progress(indices, len(indices), "drawing" if recording is None else "recording"):
             try:
                 frame, result = label(index)
                 if result is None:
+                    if recording is None or picture is not None:
+                        raise InputError("--picture: no labels to draw; give --masks, --segmenter or --results")
                     recording.add_frame(frame)
                     continue
-                recording.add(
-                    result,
-                    images={image.name: image.read() for image in frame.images},
-                    truth=frame.truth,
-                    name=frame.name,
-                    stamp=frame.stamp,
-                    diffusion=every,
-                    alone=len(indices) == 1,
-                )
+                images = {image.name: image.read() for image in frame.images}
+                if picture is not None:
+                    path = picture.with_name(f"{picture.stem}-{frame.name}{picture.suffix}")
+                    save_pictures(path, result, [images.get(camera) for camera in camera_names(result.views)])
+                if recording is not None:
+                    recording.add(
+                        result,
+                        images=images,
+                        truth=frame.truth,
+                        name=frame.name,
+                        stamp=frame.stamp,
+                        diffusion=every,
+                        alone=len(indices) == 1,
+                    )
             except (LdlsError, OSError) as error:
                 failures.append((source.names[index], error))
         if len(failures) == len(indices):

@@ -32,6 +32,8 @@ def overlay(
 ) -> Image.Image:
     """The camera image with masks, points in the colour of their instance, and the names of those that have points.
 
+    An object that an image overlooks is named at its points.
+
     Args:
         result: The segmentation.
         images: (H, W, 3) uint8 RGB image; for several cameras one for each, None where there is none. Without an image
@@ -107,7 +109,8 @@ def overlays_of(each: Sequence[Shown], seen: SeenView, image: NDArray[np.uint8],
         with_points = set(shown.labels.tolist())
         names = [shown.names[label - 1] if label in with_points else None for label in labels]
         picture = _with_points(masked, shown, seen, scale)
-        draw_tags(picture, _tags(masks, colours, names, scale), covered, _pen_px(picture))
+        tags = _tags(masks, colours, names, scale) + _tags_of_points(shown, seen, scale)
+        draw_tags(picture, tags, covered, _pen_px(picture))
         pictures.append(picture)
     return pictures
 
@@ -133,14 +136,24 @@ def _tags(masks: InstanceMasks, colours: Sequence[Colour], names: Sequence[str |
     for mask, colour, name in zip(masks, colours, names, strict=True):
         if name is not None:
             top, left, height, width = mask.bounding_box
-            box = (
-                round(scale * left),
-                round(scale * top),
-                round(scale * (left + width)),
-                round(scale * (top + height)),
-            )
-            tags.append(Tag(name, colour, box))
+            tags.append(_tag(name, colour, (left, top, left + width, top + height), scale))
     return tags
+
+
+def _tags_of_points(shown: Shown, seen: SeenView, scale: float) -> list[Tag]:
+    """A tag for each object that the image overlooks: one that has points there and no mask."""
+    labels, tags = shown.labels[seen.in_view], []
+    for label in sorted({*labels[labels > 0].tolist()} - {*seen.labels.tolist()}):
+        at_px = seen.pixels[labels == label] + 0.5
+        box = (*at_px.min(axis=0).tolist(), *at_px.max(axis=0).tolist())
+        tags.append(_tag(shown.names[label - 1], shown.colours[label - 1], box, scale))
+    return tags
+
+
+def _tag(name: str, colour: Colour, box: tuple[float, float, float, float], scale: float) -> Tag:
+    """A tag at left, top, right and bottom of the image."""
+    left, top, right, bottom = (round(scale * edge) for edge in box)
+    return Tag(name, colour, (left, top, right, bottom))
 
 
 def _with_points(picture: Image.Image, shown: Shown, seen: SeenView, scale: float) -> Image.Image:
