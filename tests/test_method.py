@@ -1,5 +1,7 @@
 """The whole method against the float64 oracle and the reference labels of real frames."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -49,6 +51,25 @@ def test_random_scenes_equal_the_oracle(seed, added):
     outside[result.in_view] = False
     assert (result.labels[outside] == -1).all()
     assert (result.confidence[outside] == 0).all()
+
+
+@pytest.mark.parametrize("iterations", [10, 30])
+def test_boxes_over_one_another_in_a_dense_cloud_equal_the_oracle(iterations):
+    """Most of thousands of near-ties are told by seeds: far around, all labels have the same."""
+    generator = np.random.default_rng(iterations)
+    points = generator.uniform([-3, -2, 4], [3, 2, 8], (4000, 3))
+    camera = ldls.Camera(projection=[[60, 0, 60], [0, 60, 40], [0, 0, 1]], T_camera_lidar=np.eye(4))
+    pixels = np.zeros((6, 80, 120), bool)
+    for number, mask in enumerate(pixels):
+        mask[5 + number : 75 - 2 * number, 10 : 60 + 10 * number] = True
+    params = replace(ldls.Params.paper(), iterations=iterations)
+    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera, params=params)
+    assert result.report.n_refined > 1100
+    expected = oracle.segment(points, pixels, camera.projection @ camera.T_camera_lidar, params)
+    np.testing.assert_array_equal(result.in_view, expected.in_view)
+    values = np.take_along_axis(expected.likelihood, result.diffused_labels[result.in_view, None], axis=1)[:, 0]
+    best = expected.likelihood.max(axis=1)
+    assert (best - values <= 1e-12 * best).all()
 
 
 def random_scene(generator, added=False):

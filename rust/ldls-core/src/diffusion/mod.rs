@@ -79,9 +79,10 @@ pub fn diffuse(
         }
         Ok(())
     };
-    let (mut convergence, trusted) = for_each_pass(a, b, &labels, iterations, cancel, choose)?;
+    let (mut convergence, trusted, schedule) =
+        for_each_pass(a, b, &labels, iterations, cancel, choose)?;
     convergence.refined = near_ties::decide(
-        (a, b),
+        (a, b, &schedule),
         &mut winners,
         (&Errors { a, probed }, convergence.error),
         (iterations, &trusted),
@@ -118,7 +119,7 @@ pub fn likelihoods(
         }
         Ok(())
     };
-    let (convergence, _) = for_each_pass(a, b, &labels, iterations, cancel, write)?;
+    let (convergence, ..) = for_each_pass(a, b, &labels, iterations, cancel, write)?;
     Ok((all, convergence))
 }
 

@@ -14,8 +14,8 @@ use crate::{Cancel, Result};
 /// Share of the largest likelihood that a series may leave out.
 pub(super) const TOLERANCE: f64 = 5e-8;
 
-/// Calls `done` with each pass over the graph that `labels` take; how far they came, and the series that could be trusted, the
-/// longest first.
+/// Calls `done` with each pass over the graph that `labels` take; how far they came, the series that could be trusted, the
+/// longest first, and the schedule of the graph.
 pub(super) fn for_each_pass(
     a: &PointGraph,
     b: &PixelLabels,
@@ -23,7 +23,7 @@ pub(super) fn for_each_pass(
     iterations: Option<usize>,
     cancel: &Cancel,
     mut done: impl FnMut(&mut Pass<f32, WIDTH_F32>) -> Result<()>,
-) -> Result<(Convergence, Vec<Series>)> {
+) -> Result<(Convergence, Vec<Series>, Schedule)> {
     // parts of each are for one thread alone
     let (mut series, schedule) = rayon::join(
         || Series::of_graph(a, iterations, TOLERANCE),
@@ -57,6 +57,6 @@ pub(super) fn for_each_pass(
             probe = false;
             labels.retain(|label| seeds.plan.lanes.iter().all(|(other, _)| other != label));
         }
-        return Ok((convergence, series));
+        return Ok((convergence, series, schedule));
     }
 }

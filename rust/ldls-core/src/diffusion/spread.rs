@@ -1,4 +1,4 @@
-//! Where labels come to from their seeds, one edge farther with every step.
+//! Where labels come to, one edge farther with every step: from their seeds, or from where other labels have larger ones.
 
 use super::schedule::{BLOCK, BLOCKS_A_TASK, Schedule};
 use crate::bits::ones;
@@ -11,10 +11,14 @@ use std::mem::take;
 use std::ops::Range;
 
 /// Labels that are followed together: one bit each.
-const TOGETHER: usize = u32::BITS as usize;
+pub(super) const TOGETHER: usize = u32::BITS as usize;
 
 /// Steps in which labels fill what is small, and stop there.
 const STEPS_TO_SETTLE: usize = 4;
+/// How many times each block may be looked at, on average, to see where labels are behind.
+const MOST_LOOKS: f64 = 10.0;
+/// Steps in which they have come everywhere, or nearly so.
+const MANY_STEPS: usize = 200;
 
 /// Some of the blocks of rows of a graph.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -56,22 +60,62 @@ pub(super) fn spread<T: Real>(
     cancel: &Cancel,
 ) -> Result<Option<Vec<Blocks>>> {
     let of_labels = |labels: &[u32]| {
-        let mut spread = Spread::new((a, b), schedule, labels, cancel)?;
-        for step in 0..steps {
-            cancel.check()?;
-            let awake = spread.awake.len() as f64 / schedule.blocks() as f64;
-            if step == STEPS_TO_SETTLE && awake > most_awake {
-                return Ok(None);
-            }
-            if !spread.advance()? {
-                break;
-            }
+        let bits = bits_of(labels);
+        let seeded = |row: usize| {
+            let bits = b.row(row).filter_map(|(label, _)| bits.get(label));
+            bits.fold(0, |all, bit| all | bit)
+        };
+        let mut spread = Spread::new(a, schedule, seeded, cancel)?;
+        if !spread.take(steps, most_awake, cancel)? {
+            return Ok(None);
         }
         spread.blocks(labels.len(), cancel).map(Some)
     };
     let shares = labels.par_chunks(TOGETHER).map(of_labels);
     let shares = shares.collect::<Result<Option<Vec<_>>>>()?;
     Ok(shares.map(|shares| shares.concat()))
+}
+
+/// Of each row of `a` those of up to [`TOGETHER`] `labels`, a bit each, that another label is ahead of by a seed in `b` which comes
+/// there in at most so many `steps`. None where it would cost too much to say.
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+pub(super) fn behind<T: Real>(
+    (a, b): (&PointGraph<T>, &PixelLabels<T>),
+    schedule: &Schedule,
+    labels: &[u32],
+    steps: usize,
+    cancel: &Cancel,
+) -> Result<Option<Vec<u32>>> {
+    let bits = bits_of(labels);
+    let all = bits.iter().fold(0, |all, bit| all | bit);
+    let smaller = |row: usize| {
+        let (mut largest, mut ahead) = (T::default(), all);
+        for (label, seed) in b.row(row) {
+            if seed > largest {
+                (largest, ahead) = (seed, 0);
+            }
+            if seed == largest {
+                ahead |= bits.get(label).copied().unwrap_or(0);
+            }
+        }
+        all & !ahead
+    };
+    let mut spread = Spread::new(a, schedule, smaller, cancel)?;
+    let most_awake = MOST_LOOKS / steps.min(MANY_STEPS) as f64;
+    let is_known = spread.take(steps, most_awake, cancel)?;
+    Ok(is_known.then_some(spread.come))
+}
+
+/// The bit of each label up to the highest of `labels`, 0 for those that are not among them.
+fn bits_of(labels: &[u32]) -> Vec<u32> {
+    let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
+    let mut bits = vec![0; n_labels];
+    for (bit, &label) in labels.iter().enumerate() {
+        bits[label as usize] = 1_u32 << bit;
+    }
+    bits
 }
 
 /// How far some labels have come, a bit for each of them.
@@ -89,27 +133,18 @@ struct Spread<'a, T> {
 }
 
 impl<'a, T: Real> Spread<'a, T> {
-    /// The `labels` at their seeds.
+    /// The labels `of_row` at each row.
     fn new(
-        (a, b): (&'a PointGraph<T>, &PixelLabels<T>),
+        a: &'a PointGraph<T>,
         schedule: &'a Schedule,
-        labels: &[u32],
+        of_row: impl Fn(usize) -> u32 + Sync,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let n_labels = labels.iter().max().map_or(0, |&label| label as usize + 1);
-        let mut bits = vec![0; n_labels];
-        for (bit, &label) in labels.iter().enumerate() {
-            bits[label as usize] = 1_u32 << bit;
-        }
-        let of_row = |row: usize| {
-            let bits = b.row(row).filter_map(|(label, _)| bits.get(label));
-            bits.fold(0, |all, bit| all | bit)
-        };
         let blocks = schedule.blocks();
         let mut spread = Self {
             a,
             schedule,
-            come: tabulate(b.rows(), of_row, cancel)?,
+            come: tabulate(a.len(), of_row, cancel)?,
             full: Vec::new(),
             near: zeros(blocks, cancel)?,
             awake: Vec::new(),
@@ -143,6 +178,22 @@ impl<'a, T: Real> Spread<'a, T> {
             }
         }
         Ok(())
+    }
+
+    /// Takes so many steps, or as many as lead anywhere; false if after [`STEPS_TO_SETTLE`] some go on in more than the share
+    /// `most_awake` of all blocks.
+    fn take(&mut self, steps: usize, most_awake: f64, cancel: &Cancel) -> Result<bool> {
+        for step in 0..steps {
+            cancel.check()?;
+            let awake = self.awake.len() as f64 / self.schedule.blocks() as f64;
+            if step == STEPS_TO_SETTLE && awake > most_awake {
+                return Ok(false);
+            }
+            if !self.advance()? {
+                break;
+            }
+        }
+        Ok(true)
     }
 
     /// Takes a step; false if it led nowhere.
@@ -201,7 +252,8 @@ impl<'a, T: Real> Spread<'a, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::one_seed_each;
+    use crate::test_support::{one_seed_each, seeds_by_point};
+    use proptest::prelude::*;
 
     /// The blocks that labels come to in a ring of points with edges from the one before each, where each label has one seed.
     fn followed(points: u32, seeds: &[usize], steps: (usize, f64)) -> Option<Vec<Vec<usize>>> {
@@ -256,5 +308,67 @@ mod tests {
         both.add(&one);
         both.add(&other);
         assert_eq!(both.iter().collect::<Vec<_>>(), [0, 1, 64, 65]);
+    }
+
+    /// The graph of points to each of which others flow.
+    fn graph(flows: &[Vec<u32>]) -> PointGraph {
+        let offsets = (0..=flows.len()).map(|i| flows[..i].iter().map(Vec::len).sum());
+        let columns = flows.concat();
+        let weights = vec![0.25; columns.len()];
+        PointGraph::from_csr(offsets.collect(), columns, weights).unwrap()
+    }
+
+    #[test]
+    fn where_labels_are_behind_is_not_followed_through_too_many_blocks() {
+        let n = 100 * BLOCK as u32;
+        let ring: Vec<Vec<u32>> = (0..n).map(|i| vec![(i + 1) % n]).collect();
+        let a = graph(&ring);
+        let schedule = Schedule::new(&a, Cancel::never()).unwrap();
+        let is_known = |every: u32, steps| {
+            let seeds = (0..n).map(|i| vec![(1 + u32::from(i % every == 0), 0.5)]);
+            let seeds: Vec<Vec<(u32, f64)>> = seeds.collect();
+            let seeds: Vec<&[(u32, f64)]> = seeds.iter().map(Vec::as_slice).collect();
+            let b = seeds_by_point(n as usize, &seeds);
+            let found = behind((&a, &b), &schedule, &[1], steps, Cancel::never());
+            found.unwrap().is_some()
+        };
+        let [few, many] = [n, 3 * BLOCK as u32];
+        assert!(is_known(few, MANY_STEPS) && is_known(many, 9));
+        assert!(!is_known(many, MANY_STEPS) && !is_known(many, usize::MAX));
+    }
+
+    proptest! {
+        #[test]
+        fn a_label_is_behind_where_another_has_a_larger_seed_within_so_many_edges(
+            rows in proptest::collection::vec((proptest::collection::vec(0..60_u32, 0..3), 0..16_u32), 60),
+            steps in 0..8_usize,
+        ) {
+            let flows: Vec<Vec<u32>> = rows.iter().map(|(from, _)| from.clone()).collect();
+            let a = graph(&flows);
+            // labels 0 to 3 have a seed, a larger one or none; few points have any
+            let kinds: [&[(u32, f64)]; 5] = [
+                &[(1, 0.5)], &[(1, 0.5), (3, 0.5)], &[(0, 0.25), (3, 0.5)], &[(0, 0.5), (1, 0.5), (2, 0.25), (3, 0.5)], &[],
+            ];
+            let kind = |&(_, kind): &(Vec<u32>, u32)| kinds[(kind as usize).min(4)];
+            let seeds: Vec<&[(u32, f64)]> = rows.iter().map(kind).collect();
+            let b = seeds_by_point(rows.len(), &seeds);
+            let labels = [1, 2, 3];
+            let smaller = |seeds: &&[(u32, f64)]| {
+                let seed = |label| seeds.iter().find(|(other, _)| *other == label).map_or(0.0, |(_, seed)| *seed);
+                let largest = seeds.iter().fold(0.0, |largest: f64, (_, seed)| largest.max(*seed));
+                let bits = labels.iter().enumerate().filter(|(_, label)| seed(**label) < largest);
+                bits.fold(0_u32, |all, (bit, _)| all | 1 << bit)
+            };
+            let mut expected: Vec<u32> = seeds.iter().map(smaller).collect();
+            for _ in 0..steps {
+                let before = expected.clone();
+                for (all, from) in expected.iter_mut().zip(&flows) {
+                    *all |= from.iter().fold(0, |all, from| all | before[*from as usize]);
+                }
+            }
+            let schedule = Schedule::new(&a, Cancel::never()).unwrap();
+            let found = behind((&a, &b), &schedule, &labels, steps, Cancel::never());
+            prop_assert_eq!(found.unwrap(), Some(expected));
+        }
     }
 }
