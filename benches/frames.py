@@ -109,13 +109,24 @@ def street_frame(n: int) -> Frame:
     ground = np.column_stack([ahead, rng.uniform(-0.8, 0.8, n) * ahead, rng.normal(-1.7, 0.02, n)])
     walls = np.column_stack([ahead, 10 * side + rng.normal(0, 0.05, n), rng.uniform(-1.7, 0.2 * ahead)])
     cloud = np.where(rng.random((n, 1)) < 0.5, ground, walls).astype(np.float32)
+    return _seen_ahead(cloud, "points of a street")
+
+
+def random_frame(n: int) -> Frame:
+    """`n` points at random in the space ahead, all in view of one camera: no lidar sees so, and all hang together."""
+    cloud = np.random.default_rng(0).uniform([5, -20, -2], [60, 20, 3], (n, 3)).astype(np.float32)
+    return _seen_ahead(cloud, "random points")
+
+
+def _seen_ahead(cloud: NDArray[np.float32], name: str) -> Frame:
+    """Those of the points that a camera sees which looks along x."""
     camera = ldls.Camera(
         projection=[[720, 0, 620], [0, 720, 187], [0, 0, 1]],
         T_camera_lidar=[[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]],
     )
     rows, _ = ldls.stages.project(cloud, camera, image_size=(375, 1242))
     masks = ldls.InstanceMasks.from_array(np.zeros((0, 375, 1242), bool))
-    return Frame(f"{len(rows):,} points of a street", np.ascontiguousarray(cloud[rows]), masks, camera)
+    return Frame(f"{len(rows):,} {name}", np.ascontiguousarray(cloud[rows]), masks, camera)
 
 
 def overlapping_boxes(frame: Frame, count: int, seed: int) -> ldls.InstanceMasks:

@@ -13,7 +13,7 @@ import numpy as np
 from rich.table import Table
 
 import ldls
-from benches.frames import Frame, overlapping_boxes, street_frame, suite_frames, tiled_frame
+from benches.frames import Frame, overlapping_boxes, random_frame, street_frame, suite_frames, tiled_frame
 from benches.measuring import medians
 from benches.memory import extra_bytes
 from benches.runs import one_a_thread
@@ -90,7 +90,8 @@ def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
         "the paper's": ldls.Params.paper(threads=options.threads),
         "defaults": ldls.Params(threads=options.threads),
     }
-    frames = ((tiled_frame(measured.in_view(), n, 0), range(8)), (street_frame(n), range(3)))
+    tiles = tiled_frame(measured.in_view(), n, 0)
+    frames = ((tiles, range(8)), (street_frame(n), range(3)), (random_frame(n), range(1)))
     for (name, params), (each, seeds) in product(parameters.items(), frames):
         for seed in seeds:
             boxes = overlapping_boxes(each, 20, seed)
