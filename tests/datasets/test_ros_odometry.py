@@ -9,7 +9,7 @@ pytest.importorskip("rosbags")
 
 from datasets.ros_samples import START_NS, STEP_NS, Recording, transforms
 from ldls.datasets import RosBag
-from ldls.errors import PoseError
+from ldls.errors import CalibrationError, PoseError
 from ldls.io.ros.messages import ODOMETRY, POINTS, TRANSFORMS, Header, Topic, make, make_header
 from ldls.io.ros.point_cloud2 import encode
 from ldls.io.ros.writer import BagWriter
@@ -100,6 +100,17 @@ def test_worlds_are_the_frames_that_transforms_lead_to_and_the_topics(tmp_path):
     assert bag.poses_from == "--option world=odom or --option world=map or --option world=/lio"
     for world in bag.worlds():
         assert opened(path, world)[1].pose is not None
+
+
+def test_worlds_are_told_by_names_alone(tmp_path, monkeypatch):
+    """Transforms of frames that nobody asks for may be broken, as those of a joint that reports zeros."""
+
+    def refuse(*_):
+        raise CalibrationError("a quaternion of zeros")
+
+    bag = opened(written(tmp_path, {}, moving=(("odom", "base"), ("base", "arm"))), None)
+    monkeypatch.setattr("ldls.datasets.ros_transforms._matrix", refuse)
+    assert bag.worlds() == ["odom"]
 
 
 def test_a_bag_without_any_way_has_no_worlds(tmp_path):

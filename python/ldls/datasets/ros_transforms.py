@@ -131,7 +131,7 @@ class TransformTree:
             PoseError: The poses jump.
         """
         # those above both of them cancel out
-        names = set(self.ancestors(plain(source))) ^ set(self.ancestors(plain(world)))
+        names = set(self._ancestors(plain(source))) ^ set(self._ancestors(plain(world)))
         moments = [self._edges[name].stamps_between(from_ns, to_ns) for name in names if name in self._edges]
         stamps, poses = [], []
         for stamp_ns in sorted(set().union(*moments)):
@@ -149,27 +149,36 @@ class TransformTree:
                 self._add(moving())
             return self._connected(one, other)
 
-    def ancestors(self, frame: str) -> list[str]:
-        """A frame and those above it, the nearest first, as far as transforms have been read."""
-        chain = [plain(frame)]
-        while chain[-1] in self._edges and self._edges[chain[-1]].parent not in chain:
-            chain.append(self._edges[chain[-1]].parent)
-        return chain
+    def _ancestors(self, frame: str) -> list[str]:
+        return ancestors(frame, lambda name: self._edges[name].parent if name in self._edges else None)
 
     def _connected(self, one: str, other: str) -> bool:
-        return one == other or self.ancestors(one)[-1] == self.ancestors(other)[-1]
+        return one == other or self._ancestors(one)[-1] == self._ancestors(other)[-1]
 
     def _to_root(self, frame: str, at: Callable[[_Edge], Matrix]) -> Matrix:
         transform = np.eye(4)
-        for name in self.ancestors(frame)[:-1]:
+        for name in self._ancestors(frame)[:-1]:
             transform = at(self._edges[name]) @ transform
         return transform
 
     def _chains(self) -> str:
         """Every frame that is no parent, and the way up from it."""
         parents = {edge.parent for edge in self._edges.values()}
-        chains = [" <- ".join(reversed(self.ancestors(frame))) for frame in sorted(self._edges.keys() - parents)]
+        chains = [" <- ".join(reversed(self._ancestors(frame))) for frame in sorted(self._edges.keys() - parents)]
         return "; ".join(chains)
+
+
+def ancestors(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
+    """A frame and those above it, the nearest first."""
+    chain = [frame]
+    while (parent := parent_of(chain[-1])) is not None and parent not in chain:
+        chain.append(parent)
+    return chain
+
+
+def parents(messages: Iterable[Message]) -> dict[str, str]:
+    """The parent of each frame that transforms name, whatever else they say."""
+    return {plain(one.child_frame_id): plain(one.header.frame_id) for each in messages for one in each.transforms}
 
 
 def plain(frame_id: str) -> str:

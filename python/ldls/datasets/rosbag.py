@@ -18,7 +18,7 @@ from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.ros_odometry import Odometry, odometry_topics, read_odometry
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
 from ldls.datasets.ros_topics import choose_topics
-from ldls.datasets.ros_transforms import TransformTree, given_transforms
+from ldls.datasets.ros_transforms import TransformTree, ancestors, given_transforms, parents, plain
 from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
@@ -160,9 +160,10 @@ class RosBag:
         Raises:
             CorruptFileError: A message cannot be read.
         """
-        cloud, static = self._sweeps[0].header.frame_id, list(self._transforms(STATIC_TRANSFORMS))
-        some = islice(self._transforms(MOVING_TRANSFORMS), FIRST_TRANSFORMS)
-        fixed, above = (TransformTree(messages).ancestors(cloud) for messages in (static, [*static, *some]))
+        cloud = plain(self._sweeps[0].header.frame_id)
+        static = parents(self._transforms(STATIC_TRANSFORMS))
+        moving = parents(islice(self._transforms(MOVING_TRANSFORMS), FIRST_TRANSFORMS))
+        fixed, above = (ancestors(cloud, known.get) for known in (static, static | moving))
         return [frame for frame in above if frame not in fixed] + odometry_topics(self._bag)
 
     @property

@@ -66,7 +66,7 @@ pub(super) fn spread<T: Real>(
             bits.fold(0, |all, bit| all | bit)
         };
         let mut spread = Spread::new(a, schedule, seeded, cancel)?;
-        if !spread.take(steps, most_awake, cancel)? {
+        if !spread.take_steps(steps, most_awake, cancel)? {
             return Ok(None);
         }
         spread.blocks(labels.len(), cancel).map(Some)
@@ -104,7 +104,7 @@ pub(super) fn behind<T: Real>(
     };
     let mut spread = Spread::new(a, schedule, smaller, cancel)?;
     let most_awake = MOST_LOOKS / steps.min(MANY_STEPS) as f64;
-    let is_known = spread.take(steps, most_awake, cancel)?;
+    let is_known = spread.take_steps(steps, most_awake, cancel)?;
     Ok(is_known.then_some(spread.come))
 }
 
@@ -182,7 +182,7 @@ impl<'a, T: Real> Spread<'a, T> {
 
     /// Takes so many steps, or as many as lead anywhere; false if after [`STEPS_TO_SETTLE`] some go on in more than the share
     /// `most_awake` of all blocks.
-    fn take(&mut self, steps: usize, most_awake: f64, cancel: &Cancel) -> Result<bool> {
+    fn take_steps(&mut self, steps: usize, most_awake: f64, cancel: &Cancel) -> Result<bool> {
         for step in 0..steps {
             cancel.check()?;
             let awake = self.awake.len() as f64 / self.schedule.blocks() as f64;
