@@ -117,7 +117,7 @@ class Poses:
                 "ascending stamps to track objects; take one drive, as by --option scene=NAME"
             )
         if self._trajectory is None and not self._has_poses(chosen):
-            # of sources whose frames may have poses
+            # only sources whose frames may have poses say what these come with
             own = getattr(self._source, "poses_from", "")
             raise PoseError(
                 f"{self._source.path}: frames of this source ({self._source.kind}) have no poses, expected them for "

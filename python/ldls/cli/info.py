@@ -223,7 +223,7 @@ def _poses(source: Source, facts: Sequence[FrameFacts]) -> str:
     posed = sum(each.has_pose for each in facts)
     if posed:
         return f"in {posed} of {len(facts)} frames"
-    # of sources whose frames may have poses
+    # only sources whose frames may have poses say what these come with
     own = getattr(source, "poses_from", "")
     return f"none; they come with {own}" if own else "none of its own"
 
