@@ -73,6 +73,13 @@ def test_an_unknown_ending_of_the_table_is_refused_before_anything_is_done(demo,
     assert not (tmp_path / "out").exists()
 
 
+def test_a_picture_of_another_format_is_refused_before_anything_is_done(demo, tmp_path):
+    outcome = run(app, arguments(demo[0], tmp_path / "out", picture=tmp_path / "seen.jpg"))
+    assert outcome.exit_code == 1
+    assert "cannot write '.jpg' pictures, expected .png" in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
 def test_formats_can_be_chosen_and_an_image_is_not_needed(demo, tmp_path):
     words = arguments(demo[0], tmp_path)
     at = words.index("--image")

@@ -221,6 +221,20 @@ def test_a_result_as_pictures_needs_no_recording(saved, tmp_path):
     assert (tmp_path / "seen.rrd").is_file()
 
 
+@pytest.mark.parametrize(
+    ("picture", "message"),
+    [("seen.jpg", "cannot write '.jpg' pictures, expected .png"), ("nowhere/seen.png", "no such folder to write to")],
+)
+def test_a_place_that_no_picture_can_be_written_to_is_refused_before_anything_is_drawn(
+    saved, drive, tmp_path, picture, message
+):
+    of_frames = [drive, "--masks", drive / "masks_02"]
+    for words in (["frame.npz"], of_frames):
+        done = run(*words, "--picture", picture, "--rerun", "seen.rrd")
+        assert done.exit_code == 1 and message in done.output and "failed" not in done.output, done.output
+    assert {path.name for path in tmp_path.glob("seen*")} == set()
+
+
 def test_frames_of_a_source_as_pictures_have_the_tracks_of_their_run(drive, tmp_path, monkeypatch):
     command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track"]
     assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0

@@ -96,11 +96,14 @@ def segment(
     from ldls.io import read_image, read_points, save
     from ldls.io.objects import FrameObjects, objects_writer
     from ldls.label_diffusion import segment as label_points
+    from ldls.viewing.files import check_picture, save_pictures
     from ldls.viewing.formats import check_formats, write_formats
 
     check_recording(rerun)
     wanted = words(formats)
     check_formats(wanted)
+    if picture is not None:
+        check_picture(picture)
     write_objects = None if objects is None else objects_writer(objects)
     pixels = None if image is None else read_image(image)
     seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
@@ -123,8 +126,6 @@ def segment(
         write_objects([FrameObjects.of(name, result)])
         written.append(objects)
     if picture is not None:
-        from ldls.viewing import save_pictures
-
         written += save_pictures(picture, result, pixels)
     screen = console()
     screen.print(object_table(result.objects))

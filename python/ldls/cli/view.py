@@ -91,6 +91,12 @@ def view(
     name = path.resolve().stem
     target = rerun if picture is not None else rerun or default_target(name)
     check_recording(target)
+    if picture is not None:
+        from ldls.io.files import check_folder
+        from ldls.viewing.files import check_picture
+
+        check_picture(picture)
+        check_folder(picture)
     failures: list[str] = []
     if path.is_file() and any(path.name.lower().endswith(each.ending) for each in FORMATS.values()):
         of_sources = {"dataset": dataset, "option": option, "frames": frames, "masks": masks, "results": results}

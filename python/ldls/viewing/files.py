@@ -31,6 +31,7 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
         UnsupportedFormatError: The name does not end in `.png`.
         InputError: There are more or fewer images than cameras, or one has not the size of the masks.
     """
+    check_picture(path)
     path = Path(path)
     birds_eye, compared = (path.with_name(f"{path.stem}-{what}{path.suffix}") for what in ("birds-eye", "comparison"))
     # the one that takes longest first
@@ -44,8 +45,8 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
     return [path, birds_eye, compared]
 
 
-def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:
-    """Write a picture; the file appears only when it is whole.
+def check_picture(path: str | PathLike[str]) -> None:
+    """Refuse a file of another format than pictures are written in, before one is drawn.
 
     Raises:
         UnsupportedFormatError: The name does not end in `.png`.
@@ -53,5 +54,14 @@ def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:
     path = Path(path)
     if path.suffix.lower() != ".png":
         raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} pictures, expected .png")
+
+
+def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:
+    """Write a picture; the file appears only when it is whole.
+
+    Raises:
+        UnsupportedFormatError: The name does not end in `.png`.
+    """
+    check_picture(path)
     with whole_file(path) as file:
         file.write(png_of(picture))
