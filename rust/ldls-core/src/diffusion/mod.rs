@@ -19,7 +19,6 @@ mod plan;
 mod products;
 mod reach;
 mod schedule;
-mod seed_search;
 mod seeds;
 mod series;
 mod spread;

@@ -1,8 +1,8 @@
 //! The points at which single precision cannot decide between labels.
 //!
-//! At many of them seeds alone show the winner, as where several masks show all that anything flows from: most of many are told by
-//! one look at the whole graph, the others by one at what flows to them. What seeds leave open is decided in double precision, with a
-//! series that leaves out next to nothing. Where that is little, one that leaves out little comes first, and tells most of it apart.
+//! At most of many seeds alone show the winner, as where several masks show all that anything flows from. What seeds leave open is
+//! decided in double precision, with a series that leaves out next to nothing. Where that is little, one that leaves out little comes
+//! first, and tells most of it apart.
 
 use super::errors::Errors;
 use super::lanes::WIDTH_F32;
@@ -10,14 +10,13 @@ use super::leaders::leaders;
 use super::pass::Pass;
 use super::passes;
 use super::schedule::Schedule;
-use super::seed_search::SeedSearch;
 use super::series::Series;
 use super::spread::{TOGETHER, behind};
 use super::winners::{Best, NearTies, Winners, candidates};
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
 use crate::{Cancel, Result};
-use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// What the last series leaves out, as a share of the largest value.
 const TOLERANCE: f64 = 1e-13;
@@ -28,8 +27,6 @@ const FIRST_TOLERANCE: f64 = passes::TOLERANCE / 100.0;
 const FEW: usize = 1 << 10;
 /// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision.
 const LEAD: f64 = 0.05;
-/// Weight of an edge that can be neglected where the winner is 1: after any number of products it moves no value that counts.
-const NEGLIGIBLE: f32 = 1e-18;
 
 /// Puts right the best of `winners` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
 /// points. The `schedule` is that of `a`, `largest` the largest error, and `trusted` are the series that served in single precision or
@@ -47,10 +44,7 @@ pub(super) fn decide(
     let best = &mut winners.best;
     let contested = ties.values().map(Vec::len).sum();
     let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
-    if contested > FEW {
-        settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
-    }
-    settle_by_seeds((a, b), steps, best, &mut ties, cancel)?;
+    settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
     let open: usize = ties.values().map(Vec::len).sum();
     let first = (open <= FEW).then_some((trusted.last(), FIRST_TOLERANCE, LEAD));
     // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
@@ -83,8 +77,8 @@ pub(super) fn decide(
     Ok(contested)
 }
 
-/// Makes the lowest label the best of those `ties` where it is behind no other by a seed that comes there in so many `steps`, and
-/// leaves the other points: most are where all labels have the same seeds far around.
+/// Makes the lowest label the best of those `ties` where none that it ties with anywhere is ahead of it by a seed that comes there
+/// in so many `steps`, and leaves the other points: most are where all labels have the same seeds far around.
 fn settle_lowest(
     (a, b, schedule): (&PointGraph, &PixelLabels, &Schedule),
     steps: usize,
@@ -92,55 +86,23 @@ fn settle_lowest(
     ties: &mut NearTies,
     cancel: &Cancel,
 ) -> Result<()> {
-    let mut lowest: Vec<u32> = ties.keys().map(|labels| labels[0]).collect();
-    lowest.dedup();
-    for lowest in lowest.chunks(TOGETHER) {
-        let Some(behind) = behind((a, b), schedule, lowest, steps, cancel)? else {
-            continue;
-        };
+    let mut rivals: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for labels in ties.keys() {
+        rivals.entry(labels[0]).or_default().extend(&labels[1..]);
+    }
+    let rivals: Vec<(u32, Vec<u32>)> = rivals.into_iter().collect();
+    for rivals in rivals.chunks(TOGETHER) {
+        let behind = behind((a, b), schedule, rivals, steps, cancel)?;
         for (labels, points) in ties.iter_mut() {
-            let Ok(bit) = lowest.binary_search(&labels[0]) else {
-                continue;
-            };
+            let bit = rivals.binary_search_by_key(&labels[0], |(lowest, _)| *lowest);
             points.retain(|&point| {
-                let is_behind = behind[point as usize] >> bit & 1 == 1;
-                if !is_behind {
+                let settled = bit.is_ok_and(|bit| behind[point as usize] >> bit & 1 == 0);
+                if settled {
                     best[point as usize].label = labels[0];
                 }
-                is_behind
+                !settled
             });
         }
-    }
-    ties.retain(|_, points| !points.is_empty());
-    Ok(())
-}
-
-/// Makes those labels the best of `ties` that win by their seeds alone, and leaves the other points.
-fn settle_by_seeds(
-    (a, b): (&PointGraph, &PixelLabels),
-    steps: usize,
-    best: &mut [Best],
-    ties: &mut NearTies,
-    cancel: &Cancel,
-) -> Result<()> {
-    let new = || SeedSearch::new((a, b), steps, cancel);
-    let sets: Vec<(&Vec<u32>, &mut Vec<u32>)> = ties.iter_mut().collect();
-    let sets = sets.into_par_iter();
-    let settled = sets.map_init(new, |search, (labels, points)| {
-        let search = search.as_mut().map_err(|error| error.clone())?;
-        let values = points.iter().map(|&point| best[point as usize].value);
-        let values: Vec<f32> = values.collect();
-        let least = NEGLIGIBLE * values.iter().copied().fold(1.0, f32::min);
-        let winners = search.winners(labels, (points, &values), least, cancel)?;
-        let of_points = points.iter().copied().zip(&winners);
-        let settled = of_points.filter_map(|(point, winner)| Some((point, (*winner)?)));
-        let settled: Vec<(u32, u32)> = settled.collect();
-        let mut winners = winners.iter();
-        points.retain(|_| winners.next().is_some_and(Option::is_none));
-        Ok(settled)
-    });
-    for (point, label) in settled.collect::<Result<Vec<_>>>()?.concat() {
-        best[point as usize].label = label;
     }
     ties.retain(|_, points| !points.is_empty());
     Ok(())
@@ -181,10 +143,11 @@ mod tests {
     }
 
     #[test]
-    fn labels_that_seeds_farther_away_tell_apart_need_no_look_either() {
+    fn the_lowest_needs_none_either_where_a_seed_farther_away_puts_it_ahead() {
         let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
-        let (labels, asked) = decided(&[1e-7, 0.2, 0.2], &[twins, &[], &[(2, 0.25)]]);
-        assert_eq!((labels, asked), (vec![2, 2, 2], 0));
+        let one_ahead = |label| decided(&[1e-7, 0.2, 0.2], &[twins, &[], &[(label, 0.25)]]);
+        assert_eq!(one_ahead(1), (vec![1, 1, 1], 0));
+        assert_eq!(one_ahead(2), (vec![2, 2, 2], 3));
     }
 
     #[test]
@@ -226,9 +189,9 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_beyond_an_edge_of_no_weight_is_not_followed() {
+    fn what_comes_along_an_edge_of_next_to_no_weight_does_not_count() {
         let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
-        let (labels, asked) = decided(&[1e-19, 0.2, 0.2], &[twins, &[], &[(2, 0.25)]]);
-        assert_eq!((labels, asked), (vec![1, 2, 2], 0));
+        let (labels, _) = decided(&[1e-19, 0.2, 0.2], &[twins, &[], &[(2, 0.25)]]);
+        assert_eq!(labels, [1, 2, 2]);
     }
 }
