@@ -53,11 +53,13 @@ def test_random_scenes_equal_the_oracle(seed, added):
     assert (result.confidence[outside] == 0).all()
 
 
-@pytest.mark.parametrize("iterations", [10, 30])
-def test_boxes_over_one_another_in_a_dense_cloud_equal_the_oracle(iterations):
-    """Most of thousands of near-ties are told by seeds: far around, all labels have the same."""
+@pytest.mark.parametrize(("iterations", "n_clumps"), [(10, 0), (30, 0), (200, 80)])
+def test_boxes_over_one_another_in_a_dense_cloud_equal_the_oracle(iterations, n_clumps):
+    """Most of thousands of near-ties are told by seeds: far around, or in all of a clump, all labels have the same."""
     generator = np.random.default_rng(iterations)
     points = generator.uniform([-3, -2, 4], [3, 2, 8], (4000, 3))
+    if n_clumps:
+        points = points[np.arange(4000) % n_clumps] + generator.normal(0, 0.02, points.shape)
     camera = ldls.Camera(projection=[[60, 0, 60], [0, 60, 40], [0, 0, 1]], T_camera_lidar=np.eye(4))
     pixels = np.zeros((6, 80, 120), bool)
     for number, mask in enumerate(pixels):
