@@ -47,7 +47,8 @@ impl Blocks {
 }
 
 /// The blocks with a row that each of `labels` reaches in at most so many steps over `a` from its seeds in `b`. None where it
-/// would cost too much to say: where after [`STEPS_TO_SETTLE`] some go on in more than the share `most_awake` of all blocks.
+/// would cost too much to say: where after [`STEPS_TO_SETTLE`] some go on in more than the share `most_awake` of all blocks, or
+/// before in twice as many.
 ///
 /// # Errors
 /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
@@ -192,12 +193,17 @@ impl<'a, T: Real> Spread<'a, T> {
     }
 
     /// Takes so many steps, or as many as lead anywhere; false if after [`STEPS_TO_SETTLE`] some go on in more than the share
-    /// `most_awake` of all blocks.
+    /// `most_awake` of all blocks, or before in twice as many.
     fn take_steps(&mut self, steps: usize, most_awake: f64, cancel: &Cancel) -> Result<bool> {
         for step in 0..steps {
             cancel.check()?;
             let awake = self.awake.len() as f64 / self.schedule.blocks() as f64;
-            if step == STEPS_TO_SETTLE && awake > most_awake {
+            let most_awake = if step < STEPS_TO_SETTLE {
+                2.0 * most_awake
+            } else {
+                most_awake
+            };
+            if step <= STEPS_TO_SETTLE && awake > most_awake {
                 return Ok(false);
             }
             if !self.advance()? {
@@ -339,7 +345,8 @@ mod tests {
         // each of two goes on in two blocks of seven at most
         assert!(followed(100, &[0, 50], (9, 0.6)).is_some());
         assert!(followed(100, &[0, 50], (9, 0.2)).is_none());
-        assert!(followed(100, &[0, 50], (STEPS_TO_SETTLE, 0.2)).is_some());
+        assert!(followed(100, &[0, 50], (STEPS_TO_SETTLE, 0.29)).is_some());
+        assert!(followed(100, &[0, 50], (STEPS_TO_SETTLE, 0.1)).is_none());
     }
 
     #[test]

@@ -3,13 +3,15 @@
 
 use super::kdtree::{FAN, KdTree, arrange};
 use super::leaf_search::search_leaf;
-use crate::memory::{filled, with_room, zeros};
+use crate::memory::{filled, zeros};
 use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Leaves handled by one task of the thread pool.
 const LEAVES_A_TASK: usize = 16;
+/// Fewest rows for a task of the thread pool.
+const ROWS_A_TASK: usize = 512;
 /// Places of a list beyond the neighbours and the point itself.
 const SPARE: usize = 4;
 
@@ -68,12 +70,16 @@ impl Adjacency {
         for (at, &place) in (0..).zip(places) {
             new[place as usize] = at;
         }
-        let mut columns = with_room(places.len() * self.degree)?;
-        for (at, &place) in (0..).zip(places) {
-            let row = &self.columns[place as usize * self.degree..][..self.degree];
-            let known = row.iter().map(|&column| new[column as usize]);
-            columns.extend(known.map(|column| if column == u32::MAX { at } else { column }));
-        }
+        let mut columns = zeros(places.len() * self.degree, cancel)?;
+        let rows = columns.par_chunks_mut(self.degree).zip(places).enumerate();
+        rows.with_min_len(ROWS_A_TASK)
+            .for_each(|(at, (row, &place))| {
+                let before = &self.columns[place as usize * self.degree..][..self.degree];
+                for (column, &before) in row.iter_mut().zip(before) {
+                    let known = new[before as usize];
+                    *column = if known == u32::MAX { at as u32 } else { known };
+                }
+            });
         Ok(Self {
             order: arrange(places, &self.order, cancel)?,
             points: arrange(places, &self.points, cancel)?,
