@@ -112,6 +112,7 @@ pub(super) fn behind<T: Real>(
     };
     let mut spread = Spread::new(a, schedule, smaller, cancel)?;
     if steps < MANY_STEPS {
+        // in however many blocks they go on
         spread.take_steps(steps, 1.0, cancel)?;
     } else {
         spread.take_all_steps(cancel)?;
@@ -222,7 +223,7 @@ impl<'a, T: Real> Spread<'a, T> {
             self.awake.clear();
             for at in 0..blocks {
                 // labels come through many blocks at once that way, so in turn the other way
-                self.come_on(if upwards { at } else { blocks - 1 - at })?;
+                self.advance_block(if upwards { at } else { blocks - 1 - at })?;
             }
             upwards = !upwards;
         }
@@ -230,7 +231,7 @@ impl<'a, T: Real> Spread<'a, T> {
     }
 
     /// Takes a step of each row of `block`, one after the other.
-    fn come_on(&mut self, block: usize) -> Result<()> {
+    fn advance_block(&mut self, block: usize) -> Result<()> {
         let (near, mut new) = (take(&mut self.near[block]), 0);
         if near != 0 {
             for row in self.rows(block) {
