@@ -33,36 +33,17 @@ type Histogram = [u32; STEPS];
 /// Heights of the ground around a cell above the smooth surface, ascending; infinite where there are no more.
 type Levels = [f64; MOST_LEVELS];
 
-/// Turns `heights` of `places` above the smooth surface, in metres, into those above the ground around each.
-pub(super) fn level(places: &[[f64; 3]], heights: &mut [f64], cancel: &Cancel) -> Result<()> {
-    let (cells, numbers) = Cells::of(places, cancel)?;
-    let mut counts: Vec<Histogram> = zeros(cells.all.len(), cancel)?;
-    for (&number, height) in numbers.iter().zip(heights.iter()) {
-        let step = (height + NEAR_M) / STEP_M;
-        if (0.0..STEPS as f64).contains(&step) {
-            counts[number as usize][step as usize] += 1;
-        }
-    }
-    cancel.check()?;
-    let of_cell = |number| levels_of(&cells.around(&counts, number));
-    let levels = tabulate(cells.all.len(), of_cell, cancel)?;
-    let heights = heights.par_iter_mut().zip(numbers);
-    let heights = heights.with_min_len(POINTS_A_TASK);
-    heights.for_each(|(height, number)| *height -= below(*height, &levels[number as usize]));
-    Ok(())
-}
-
-/// The cells that hold places, by number, and the number of each.
+/// The cells that hold places, by number, and the number of the cell of each place.
 #[derive(Default)]
-struct Cells {
+pub(super) struct Cells {
     all: Vec<Cell>,
     numbers: HashMap<Cell, u32, BuildHasherDefault<CellHasher>>,
+    of_places: Vec<u32>,
 }
 
 impl Cells {
-    /// The cells of `places`, and the number of the cell of each place.
-    fn of(places: &[[f64; 3]], cancel: &Cancel) -> Result<(Self, Vec<u32>)> {
-        let (mut cells, mut numbers) = (Self::default(), with_room(places.len())?);
+    pub(super) fn of(places: &[[f64; 3]], cancel: &Cancel) -> Result<Self> {
+        let (mut cells, mut of_places) = (Self::default(), with_room(places.len())?);
         let mut last = ((i64::MIN, i64::MIN), 0);
         for (at, place) in places.iter().enumerate() {
             if at % POINTS_A_BLOCK == 0 {
@@ -73,9 +54,28 @@ impl Cells {
             if cell != last.0 {
                 last = (cell, cells.number(cell)?);
             }
-            numbers.push(last.1);
+            of_places.push(last.1);
         }
-        Ok((cells, numbers))
+        cells.of_places = of_places;
+        Ok(cells)
+    }
+
+    /// Turns the `heights` of the places above the smooth surface, in metres, into those above the ground around each.
+    pub(super) fn level(&self, heights: &mut [f64], cancel: &Cancel) -> Result<()> {
+        let mut counts: Vec<Histogram> = zeros(self.all.len(), cancel)?;
+        for (&number, height) in self.of_places.iter().zip(heights.iter()) {
+            let step = (height + NEAR_M) / STEP_M;
+            if (0.0..STEPS as f64).contains(&step) {
+                counts[number as usize][step as usize] += 1;
+            }
+        }
+        cancel.check()?;
+        let of_cell = |number| levels_of(&self.around(&counts, number));
+        let levels = tabulate(self.all.len(), of_cell, cancel)?;
+        let heights = heights.par_iter_mut().zip(&self.of_places);
+        let heights = heights.with_min_len(POINTS_A_TASK);
+        heights.for_each(|(height, &number)| *height -= below(*height, &levels[number as usize]));
+        Ok(())
     }
 
     /// The number of `cell`, which gets one where it has none.

@@ -8,6 +8,7 @@ mod surface;
 
 use crate::memory::{filled, tabulate};
 use crate::{Camera, Cancel, Result};
+use local::Cells;
 use surface::Surface;
 
 /// Heights between which points belong to the ground, in metres: lower ones lie in a pit or under a surface that is not
@@ -27,12 +28,17 @@ pub fn ground_heights(
     cancel: &Cancel,
 ) -> Result<Vec<f64>> {
     let places = tabulate(points.len(), |i| camera.upright(&points[i]), cancel)?;
-    let Some(surface) = Surface::fit(&places, cancel)? else {
+    // each is work for one thread alone
+    let (surface, cells) = rayon::join(
+        || Surface::fit(&places, cancel),
+        || local.then(|| Cells::of(&places, cancel)).transpose(),
+    );
+    let (Some(surface), cells) = (surface?, cells?) else {
         return filled(f64::NAN, points.len(), cancel);
     };
     let mut heights = tabulate(places.len(), |i| surface.height(&places[i]), cancel)?;
-    if local {
-        local::level(&places, &mut heights, cancel)?;
+    if let Some(cells) = cells {
+        cells.level(&mut heights, cancel)?;
     }
     Ok(heights)
 }
