@@ -159,6 +159,16 @@ def test_tracks_of_one_object_are_joined(ends_m):
     assert rows[5][0] == 1
 
 
+def test_what_stands_is_not_one_object_with_what_would_have_come_by():
+    """A walker whom images showed more often is overlooked, and stops before the way that he went reaches the other."""
+
+    def places(k):
+        return [((8, -2.0 + 0.2 * min(k, 11)), k < 10), ((8, 1), k >= 8)]
+
+    rows = np.array(tracks_of(ldls.Tracker(), [sweep_at(0.1 * k, places(k)) for k in range(20)]))
+    assert set(rows[:10, 0]) == {1} and set(rows[8:, 1]) == {2}
+
+
 @pytest.mark.parametrize(("sweeps_apart", "numbers"), [(TWO_OBJECTS - 1, {1}), (TWO_OBJECTS, {1, 2})])
 def test_tracks_that_images_show_apart_are_two_objects_though_one_mask_shows_both(sweeps_apart, numbers):
     masks = [*([LEFT, RIGHT] for _ in range(sweeps_apart)), [(*LEFT, 2, *RIGHT)], [LEFT, RIGHT]]

@@ -202,8 +202,8 @@ class Tracker:
         """The track of each label that is paired with one, by its place, after tracks of one object are joined.
 
         An object that had two labels for a while has two tracks, and would go on by the one or the other. Where a label
-        and its track are the `same` as tracks that have no label now, and images do not show them apart, the one that
-        most images showed goes on, and the others end.
+        and its track are the `same` as tracks that have no label now, both move or both stand, and images do not show
+        them apart, the one that most images showed goes on, and the others end.
 
         Args:
             pairs: The track of each label, both by their place in the order.
@@ -213,7 +213,9 @@ class Tracker:
         joined, ended = {}, set()
         for i, j in pairs.items():
             near = [other for other in sorted(free) if same[i, other]] if same[i, j] else []
-            others = [other for other in near if not self._are_two(j, other)]
+            # what moves and would be here by now, if it has gone on, is not what stands here
+            alike = [other for other in near if self._tracks[other].moves == self._tracks[j].moves]
+            others = [other for other in alike if not self._are_two(j, other)]
             free.difference_update(others)
             one, *doubles = sorted((self._tracks[k] for k in (j, *others)), key=lambda each: -each.n_images)
             joined[i] = one
