@@ -68,10 +68,47 @@ def test_boxes_over_one_another_in_a_dense_cloud_equal_the_oracle(iterations, n_
     result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera, params=params)
     assert result.report.n_refined > 1100
     expected = oracle.segment(points, pixels, camera.projection @ camera.T_camera_lidar, params)
+    check_winners(result, expected)
+
+
+def check_winners(result, expected):
+    """Each label before outlier removal has the largest likelihood, or one that rounding does not tell from it."""
     np.testing.assert_array_equal(result.in_view, expected.in_view)
     values = np.take_along_axis(expected.likelihood, result.diffused_labels[result.in_view, None], axis=1)[:, 0]
     best = expected.likelihood.max(axis=1)
     assert (best - values <= 1e-12 * best).all()
+
+
+@pytest.mark.parametrize("apart_m", [4.5, 5.0])
+def test_labels_that_a_far_neighbour_alone_tells_apart_equal_the_oracle(apart_m):
+    """Of a thousand pairs each has two masks, one of them on the first point only: a spectrum of next to no width."""
+    places = np.stack(np.meshgrid(25.0 * np.arange(35), 25.0 * np.arange(35)), axis=-1).reshape(-1, 2)
+    first = np.column_stack([places, np.full(len(places), 100.0)])
+    points = np.concatenate([first, first + np.array([apart_m, 0, 0])])
+    camera = ldls.Camera(projection=[[400, 0, 10], [0, 400, 10], [0, 0, 1]], T_camera_lidar=np.eye(4))
+    pixels = np.ones((2, 3460, 3460), bool)
+    for column in np.unique(10 + 4 * (places[:, 0] + apart_m)).astype(int):
+        pixels[0, :, column - 3 : column + 4] = False
+    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera, params=ldls.Params.paper())
+    assert result.report.n_refined == len(places)
+    assert (result.diffused_labels == 2).all()
+
+
+def test_points_of_a_lattice_that_hardly_hang_together_equal_the_oracle():
+    """The spectrum is narrow: a series on it alone would have rounding divided by its width."""
+    generator = np.random.default_rng(1747)
+    z = generator.uniform(2, 9, 300)
+    rays = np.column_stack([generator.uniform(-0.7, 0.7, 300), generator.uniform(-0.45, 0.45, 300), np.ones(300)])
+    points = np.round(4 * rays * z[:, None]) / 4
+    camera = ldls.Camera(projection=[[40, 0, 30], [0, 40, 20], [0, 0, 1]], T_camera_lidar=np.eye(4))
+    pixels = np.zeros((4, 40, 60), bool)
+    pixels[:, 5:35, 5:55] = True
+    for mask in pixels:
+        row, column = generator.integers(0, 39), generator.integers(0, 59)
+        mask[row : row + 2, column : column + 2] ^= True
+    params = replace(ldls.Params.paper(), sigma=0.01, window=1, neighbors=2)
+    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera, params=params)
+    check_winners(result, oracle.segment(points, pixels, camera.projection @ camera.T_camera_lidar, params))
 
 
 def random_scene(generator, added=False):

@@ -110,9 +110,12 @@ impl Leader {
         labels.min().unwrap_or(0)
     }
 
-    /// How far it is ahead of those that are not equal.
+    /// How far it is ahead of the next: not at all of equal ones.
     pub(super) fn lead(&self) -> f64 {
-        self.value() - self.next
+        match self.equal[..] {
+            [(_, value)] => value - self.next,
+            _ => 0.0,
+        }
     }
 }
 
@@ -134,15 +137,11 @@ mod tests {
     fn of_values_that_rounding_tells_apart_the_lowest_label_leads() {
         let below = 0.5 * (1.0 - f64::EPSILON);
         let found = leader(&[(3, 0.5), (0, below), (7, 0.25)]);
-        assert_eq!(
-            (found.label(), found.lead()),
-            (0, 0.25),
-            "ahead of those that differ"
-        );
+        assert_eq!((found.label(), found.lead()), (0, 0.0));
         assert_eq!(leader(&[(3, 0.0), (5, 0.0)]).label(), 0, "nothing came");
         let below = 0.5 * (1.0 - 1e-12);
-        let found = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
-        assert_eq!((found.label(), found.lead()), (1, 0.5 - below));
+        let found = leader(&[(1, below), (0, 0.25), (2, 0.5)]);
+        assert_eq!((found.label(), found.lead()), (2, 0.5 - below));
     }
 
     proptest! {

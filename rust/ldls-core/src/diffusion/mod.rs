@@ -292,7 +292,15 @@ mod tests {
                 .map(|i| [(i / copies) as f64 * 0.3, 0.0, 0.0])
                 .collect()
         });
-        prop_oneof![scattered, graded, nested, coincident]
+        // neighbours that next to nothing comes from
+        let apart = proptest::collection::vec(0.0..6.0_f64, 1..400).prop_map(|steps| {
+            let places = steps.iter().scan(0.0, |x, step| {
+                *x += step;
+                Some(*x)
+            });
+            places.map(|x| [x, 0.0, 0.0]).collect()
+        });
+        prop_oneof![scattered, graded, nested, coincident, apart]
     }
 
     proptest! {

@@ -25,7 +25,8 @@ const FIRST_TOLERANCE: f64 = passes::TOLERANCE / 100.0;
 /// Points up to which they are a few. More are those of masks that lie over one another, most of whose labels are equal, and differ
 /// so little elsewhere that the first one would leave them open.
 const FEW: usize = 1 << 10;
-/// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision.
+/// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision; what it leaves
+/// out may be all that tells equal ones apart.
 const LEAD: f64 = 0.05;
 
 /// Puts right the best of `winners` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such

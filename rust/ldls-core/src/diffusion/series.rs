@@ -39,8 +39,8 @@ pub(super) struct Series {
 
 impl Series {
     /// The series that stand for so many products with `a`, `None` for endlessly many, and leave out at most the share
-    /// `tolerance` of the largest value: first that of an interval near which all eigenvalues lie, then a shorter one of
-    /// where they lie as a rule. None that cannot be trusted or takes no fewer sweeps.
+    /// `tolerance` of the largest value: first that of an interval near which all eigenvalues lie, and which is never narrow,
+    /// then a shorter one of where they lie as a rule. None that cannot be trusted or takes no fewer sweeps.
     pub(super) fn of_graph<T: Real>(
         a: &PointGraph<T>,
         iterations: Option<usize>,
@@ -51,7 +51,9 @@ impl Series {
         let Some([low, high]) = ends else {
             return Vec::new();
         };
-        let long = Self::on([low, high], iterations, tolerance);
+        // rounding is divided by the width, and in single precision may lead out of an interval that has next to none
+        let wide = [low.min(USUAL_LOW), high];
+        let long = Self::on(wide, iterations, tolerance);
         let mut series: Vec<Self> = long.into_iter().collect();
         // a matrix that was read is asked for its values, which nothing decides again
         let of_cloud = a.degree().is_some() && iterations.is_some();
@@ -284,6 +286,16 @@ mod tests {
         let within = short.within(1e-9, Some(200)).unwrap();
         assert!(short.degree() < within.degree() && within.degree() < 72);
         assert!(short.within(1e-9, Some(10)).is_none());
+    }
+
+    #[test]
+    fn where_eigenvalues_lie_close_together_the_interval_is_as_wide_as_usual() {
+        let own = PointGraph::<f32>::from_csr(vec![0, 1, 2], vec![0, 1], vec![0.9, 0.9 + 1e-7]);
+        let series = Series::of_graph(&own.unwrap(), Some(200), 1e-7);
+        let [series] = &series[..] else {
+            panic!("one series")
+        };
+        assert!((series.middle - series.half_width - USUAL_LOW).abs() < 1e-9);
     }
 
     #[test]
