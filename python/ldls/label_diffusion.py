@@ -59,7 +59,8 @@ def segment(
 
     Args:
         points: (N, >= 3) float32 or float64, x y z first, in metres in the lidar frame. Never modified. Another
-            thread must not write to it meanwhile.
+            thread must not write to it meanwhile. The result has the array itself: give a copy where a buffer is used
+            again while the result is.
         masks: Instance masks of the image; or one `View` for each of several cameras.
         camera: The camera that took the image; None beside views, which have their own.
         params: Parameters of the method; the best known by default.

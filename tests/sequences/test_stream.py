@@ -43,6 +43,30 @@ def test_a_stream_of_a_drive_labels_each_sweep_with_those_before_it(frames, befo
             assert found.report.n_sweeps == min(len(sweeps), before + 1)
 
 
+def test_arrays_may_be_used_again_for_the_next_sweep(frames):
+    camera, least = frames[0].images[0].camera, min(len(frame.points) for frame in frames)
+    buffer, pose = np.empty_like(frames[0].points[:least]), np.empty((4, 4))
+    again, anew = ldls.LabelDiffusion(camera, PARAMS), ldls.LabelDiffusion(camera, PARAMS)
+    results = []
+    for frame in frames:
+        buffer[:], pose[:] = frame.points[:least], frame.pose
+        masks = frame.images[0].masks
+        results.append(again.segment(buffer, masks, pose=pose, stamp=frame.stamp))
+        expected = anew.segment(frame.points[:least], masks, pose=frame.pose, stamp=frame.stamp)
+        np.testing.assert_array_equal(results[-1].labels, expected.labels)
+    np.testing.assert_array_equal(results[0].points, frames[0].points[:least])
+
+
+def test_after_a_second_without_a_sweep_the_next_is_labelled_alone(frames):
+    one, two, three, _, _ = frames
+    stream = ldls.LabelDiffusion(one.images[0].camera, PARAMS)
+
+    def n_sweeps(frame, stamp):
+        return stream.segment(frame.points, frame.images[0].masks, pose=frame.pose, stamp=stamp).report.n_sweeps
+
+    assert [n_sweeps(one, 0.0), n_sweeps(two, 1.0), n_sweeps(three, 2.1)] == [1, 2, 1]
+
+
 def test_a_frame_without_pose_is_none_of_the_drive(frames):
     one, two, _, _, _ = frames
     stream = ldls.LabelDiffusion(one.images[0].camera, PARAMS)

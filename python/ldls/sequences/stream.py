@@ -17,6 +17,7 @@ from ldls.params import Params
 from ldls.segmentation import Segmentation
 from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, segment_sweeps
 from ldls.sequences.tracker import Tracker
+from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.view import View
 
 BEFORE = 2
@@ -29,7 +30,7 @@ class LabelDiffusion:
 
     Does what `segment` does, with camera and parameters that are given once. With pose and stamp a frame is the next
     sweep of a drive: it is labelled together with those before it, as by `segment_sweeps`, and its objects have their
-    tracks, as by a `Tracker`.
+    tracks, as by a `Tracker`. After a second without a sweep it is labelled alone.
 
     Several threads may call at a time, except for sweeps of a drive. Memory is that of some sweeps.
 
@@ -100,8 +101,10 @@ class LabelDiffusion:
         if pose is None or stamp is None:
             share = SAME_OBJECT if same_object is None else same_object
             return segment_views(points, views, self.params, nonfinite, keep_origin, share)
-        sweep = Sweep(as_points(points), views, pose, stamp)  # type: ignore[arg-type]
-        recent = (*self._recent, sweep)[-1 - self.before :]
+        # a copy, for those who give arrays that they use again
+        sweep = Sweep(as_points(points).copy(), views, pose, stamp)  # type: ignore[arg-type]
+        goes_on = self._recent and sweep.stamp - self._recent[-1].stamp <= LONGEST_GAP_S
+        recent = (*(self._recent if goes_on else ()), sweep)[-1 - self.before :]
         results = segment_sweeps(
             recent,
             params=self.params,
