@@ -45,3 +45,10 @@ def test_a_pool_of_processes(small_scene):
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         result = pool.submit(ldls.segment, *small_scene).result()
     np.testing.assert_array_equal(result.labels, ldls.segment(*small_scene).labels)
+
+
+def test_objects_can_be_looked_for_and_counted(small_scene):
+    """As all that holds arrays, an object is equal to itself alone."""
+    one, other = (ldls.segment(*small_scene).objects for _ in range(2))
+    assert one[0] in one and one[0] not in other and one != other
+    assert len({*one, *one}) == len(one) and one[0].box != other[0].box

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ldls.segmentation.oriented_box import OrientedBox
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SegmentedObject:
     """The points of one instance.
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import ldls._ldls as _ldls
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class OrientedBox:
     """An upright box in the lidar frame.
 
