@@ -105,6 +105,17 @@ def test_json_of_several_cameras_has_an_image_of_each(tmp_path):
     assert len({row["camera"] for row in rows}) == 3
 
 
+def test_an_object_that_no_image_shows_is_of_its_frame_and_of_no_image(result, tmp_path):
+    unseen = tuple(replace(i, sources=()) if i.label == 2 else i for i in result.instances)
+    ldls.save_objects({"7": replace(result, instances=unseen)}, tmp_path / "a.csv")
+    assert [(row["camera"], row["mask_left_px"]) for row in read_rows(tmp_path / "a.csv")][1] == ("", "")
+    ldls.save_objects({"7": replace(result, instances=unseen)}, tmp_path / "a.json")
+    shown, hidden = json.loads((tmp_path / "a.json").read_text())["annotations"]
+    assert (shown["image_id"], shown["frame"], shown["label"]) == (1, "7", 1)
+    assert (hidden["image_id"], hidden["bbox"], hidden["area"]) == (None, None, 0)
+    assert (hidden["frame"], hidden["label"], hidden["n_points"]) == ("7", 2, result.objects[1].n_points)
+
+
 @pytest.mark.parametrize("name", ["objects.txt", "objects", "objects.json.gz"])
 def test_other_endings_are_refused(result, tmp_path, name):
     with pytest.raises(UnsupportedFormatError, match=r"cannot write objects as .*, expected \.csv, \.json"):

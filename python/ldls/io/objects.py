@@ -50,8 +50,9 @@ def save_objects(results: Segmentation | Mapping[str, Segmentation], path: str |
     """Write one table with a row for each object with points; the ending of the name chooses the format.
 
     `.csv` has the columns of `Segmentation.to_table` after `frame`; `.json` is a data set after COCO's with an
-    annotation for each object, its box in the lidar frame beside the one in the image. docs/formats.md says what is in
-    each. Numbers are rounded to four decimals. The file appears only when it is whole.
+    annotation for each object, its box in the lidar frame beside the one in the image. An object that no image of its
+    frame shows has empty cells for camera and mask in `.csv`, and null for `image_id` and `bbox` in `.json`.
+    docs/formats.md says what is in each. Numbers are rounded to four decimals. The file appears only when it is whole.
 
     Args:
         results: A result, whose frame has no name in the table, or results by the names of their frames.
@@ -128,18 +129,21 @@ def _annotations(
         for row in each.rows:
             number += 1
             names.setdefault(row["category"], row["name"])
-            yield _annotation(number, ids[row["camera"]], {name: _rounded(value) for name, value in row.items()})
+            rounded = {name: _rounded(value) for name, value in row.items()}
+            yield _annotation(number, each.frame, ids.get(row["camera"]), rounded)
 
 
-def _annotation(number: int, image: int, row: Row) -> dict[str, Any]:
+def _annotation(number: int, frame: str, image: int | None, row: Row) -> dict[str, Any]:
     width, height = row["mask_width_px"], row["mask_height_px"]
     return {
         "id": number,
         "image_id": image,
         "category_id": row["category"],
-        "bbox": [row["mask_left_px"], row["mask_top_px"], width, height],
-        "area": width * height,
+        # readers compare areas with numbers, so that of no image is one too
+        "bbox": None if image is None else [row["mask_left_px"], row["mask_top_px"], width, height],
+        "area": 0 if image is None else width * height,
         "iscrowd": 0,
+        "frame": frame,
         "score": row["score"],
         "label": row["label"],
         "track": row["track"],
