@@ -578,9 +578,11 @@ def test_options_of_the_source_choose_and_belong_to_the_run(tmp_path, by):
     for number in (2, 3):
         out, masks = tmp_path / f"out {number}", source / f"masks/image_{number}"
         if by == "call":
-            batch.run(source, out, batch.RunSettings(masks=str(masks)), options={"camera": number})
+            options = {"camera": number, "truth": False}
+            batch.run(source, out, batch.RunSettings(masks=str(masks)), options=options)
         else:
-            outcome = command("run", source, "--masks", masks, "--option", f"camera={number}", "--out", out)
+            options = ("--option", f"camera={number}", "--option", "truth=false")
+            outcome = command("run", source, "--masks", masks, *options, "--out", out)
             assert outcome.exit_code == 0, outcome.output
         frame = open_source(source, camera=number)[0]
         one = ldls.segment(frame.points, ldls.read_masks(masks / "000000.json"), frame.images[0].camera)

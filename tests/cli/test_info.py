@@ -74,6 +74,11 @@ def test_what_is_wrong_is_found(tmp_path, change, status, message):
         pytest.param(["--dataset", "kitti"], "expected one of kitti-object", id="no such kind"),
         pytest.param(["--option", "camera"], "expected NAME=VALUE", id="an option without a value"),
         pytest.param(["--option", "camera=7"], "from 0 to 3", id="no such camera"),
+        pytest.param(["--option", "camera=2.5"], "camera: got 2.5, expected a whole number or", id="half a camera"),
+        pytest.param(["--option", "drive=5"], "drive: got 5, expected text", id="a number for a name"),
+        pytest.param(["--option", "truth=maybe"], "truth: got 'maybe', expected True or False", id="text for a flag"),
+        pytest.param(["--option", "kind=folder"], "--option: got 'kind=folder', expected", id="the kind"),
+        pytest.param(["--option", "path=x"], "--option: got 'path=x', expected", id="the path"),
         pytest.param(["--frame", "9", "--picture", "x.png"], "expected a name from", id="no such frame"),
     ],
 )
@@ -85,7 +90,22 @@ def test_wrong_options_are_refused(tmp_path, monkeypatch, options, message):
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("camera=3", 3), ("camera=2,3", (2, 3)), ("sequence=08", "08"), ("truth=false", False), ("scene=a-1", "a-1")],
+    [
+        ("camera=3", 3),
+        ("camera=2,3", (2, 3)),
+        ("sequence=08", "08"),
+        ("truth=false", False),
+        ("scene=a-1", "a-1"),
+        ("max_offset_s=0.2", 0.2),
+        ("image_topics=/a,/b", ("/a", "/b")),
+        ('image_topics=["/a", "/b"]', ["/a", "/b"]),
+        ("image_topics=[]", []),
+        ('fields={"x": "px"}', {"x": "px"}),
+        ('scene="5"', "5"),
+        ('masks="a,b"', "a,b"),
+        ("scene=", ""),
+        ("scene=a=b", "a=b"),
+    ],
 )
 def test_options_become_values(text, value):
     from ldls.cli.source_options import parse_options
@@ -143,6 +163,19 @@ def test_the_topics_of_a_bag_are_listed(tmp_path):
     done = CliRunner().invoke(app, ["info", str(bag)])
     assert "/camera/camera_info" in done.output and "sensor_msgs/msg/Image" in done.output
     assert "no images, so that" not in done.output
+
+
+def test_a_bag_of_two_cameras_opens_with_their_topics(tmp_path):
+    pytest.importorskip("rosbags")
+    topics = ("/left/image_raw", "/right/image_raw")
+    infos = ("/left/camera_info", "/right/camera_info")
+    bag = ros_samples.Recording(image_topics=topics, info_topics=infos).write(tmp_path / "two.bag")
+    refused = run(bag)
+    assert refused.exit_code == 1 and "--option image_topics=/left/image_raw" in " ".join(refused.output.split())
+    one = run(bag, "--option", "image_topics=/left/image_raw").output
+    assert "left_image_raw: sees" in one and "right_image_raw: sees" not in one
+    both = run(bag, "--option", f"image_topics={','.join(topics)}", "--option", "max_offset_s=0.2").output
+    assert "left_image_raw: sees" in both and "right_image_raw: sees" in both
 
 
 def test_whether_there_are_poses_is_said_and_what_they_come_with(tmp_path):

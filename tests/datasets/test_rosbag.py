@@ -156,7 +156,15 @@ ROWS = [
     pytest.param({}, {"T_camera_lidar": {"/nope": np.eye(4)}}, ParameterError, "/nope is none of /camera/image_raw",
                  id="transform of no camera"),
     pytest.param({}, {"fields": {"X": "x"}}, ParameterError, "fields: got X, expected x, y, z", id="no such field"),
-    pytest.param({}, {"image_topics": "/camera/image_raw"}, InputError, "put it in brackets", id="topic, not a list"),
+    pytest.param({}, {"image_topics": 3}, ParameterError, "image_topics: got 3, expected text or a list of text",
+                 id="a number for topics"),
+    pytest.param({}, {"max_offset_s": "x"}, ParameterError, "max_offset_s: got 'x', expected a finite number",
+                 id="text for a number"),
+    pytest.param({}, {"fields": "x"}, InputError, "fields: expected a dict of text by text, got str",
+                 id="text for names of fields"),
+    pytest.param({}, {"world": True}, ParameterError, "world: got True, expected text", id="a flag for a frame"),
+    pytest.param({}, {"recover": "maybe"}, ParameterError, "recover: got 'maybe', expected True or False",
+                 id="text for a flag"),
 ]  # fmt: skip
 
 

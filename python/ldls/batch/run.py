@@ -94,7 +94,7 @@ def run(
         KeyboardInterrupt: It was interrupted; failures.jsonl has the frames that failed until then.
     """
     options = dict(options or {})
-    opened = open_source(source, truth=False, **options) if isinstance(source, str | PathLike) else source
+    opened = open_source(source, **{"truth": False, **options}) if isinstance(source, str | PathLike) else source
     runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
     chosen = tuple(zip(range(len(opened))[frames], opened.names[frames], strict=True))
     names = [name for _, name in chosen]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,7 +21,12 @@ DatasetOption = Annotated[
 ]
 SourceOption = Annotated[
     list[str] | None,
-    typer.Option("--option", metavar="NAME=VALUE", help="Of the kind: camera=3, scene=scene-0061; may be repeated."),
+    typer.Option(
+        "--option",
+        metavar="NAME=VALUE",
+        help="Of the kind: camera=3, scene=scene-0061, image_topics=/left,/right; may be repeated. Values are JSON, "
+        'lists with commas, or text; "5" in quotes is text.',
+    ),
 ]
 StoredMasksOption = Annotated[
     str | None,
@@ -34,26 +40,25 @@ StoredMasksOption = Annotated[
 
 
 def parse_options(words: Sequence[str]) -> dict[str, Any]:
-    """Options by name; numbers, lists of numbers such as 2,3, and true and false are taken as such.
+    """Options by name: values that are JSON are read as that, those with commas, as 2,3, as lists, others as text.
 
     Raises:
-        ParameterError: One is not NAME=VALUE.
+        ParameterError: One is not NAME=VALUE, or names what is no option of a kind.
     """
     options: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")
         if not name or not equals:
             raise ParameterError(f"--option: got {word!r}, expected NAME=VALUE")
+        if name in ("path", "kind"):
+            raise ParameterError(f"--option: got {word!r}, expected an option of the kind, which --dataset names")
         options[name] = _value(value)
     return options
 
 
-def _value(text: str) -> str | int | bool | tuple[int, ...]:
-    if text in ("true", "false"):
-        return text == "true"
-    parts = text.split(",")
-    if not all(part.isdecimal() for part in parts):
-        return text
-    # 08 names a sequence, 8 is a number
-    padded = len(parts) == 1 and len(text) > 1 and text.startswith("0")
-    return text if padded else int(text) if len(parts) == 1 else tuple(map(int, parts))
+def _value(text: str) -> Any:  # noqa: ANN401
+    try:
+        return json.loads(text)
+    except ValueError:
+        # 08, which names a sequence, is no number of JSON
+        return tuple(map(_value, text.split(","))) if "," in text else text

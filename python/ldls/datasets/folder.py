@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path, PurePath
 
 from ldls.camera import Camera
+from ldls.checks import checked
 from ldls.datasets.file_source import FileSource, image_from_file
 from ldls.datasets.folder_description import FILE, read_description, template
 from ldls.datasets.frame import CameraImage
@@ -42,6 +43,7 @@ class FolderSource(FileSource):
     kind = "folder"
     looks_for = FILE
 
+    @checked
     def __init__(self, path: str | PathLike[str], *, allow_outside: bool = False, truth: bool = True) -> None:
         """Read the description and look for the frames.
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
+from ldls.checks import checked
 from ldls.datasets.file_source import FileSource, choose, find_files, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
@@ -40,6 +41,7 @@ class KittiObjectSource(FileSource):
     kind = "kitti-object"
     looks_for = "velodyne/ and calib/, in the folder or in training/ or testing/ below it"
 
+    @checked
     def __init__(
         self,
         path: str | PathLike[str],

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ldls.camera import Camera
+from ldls.checks import checked
 from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
@@ -42,6 +43,7 @@ class KittiOdometrySource(FileSource):
     looks_for = "velodyne/ and calib.txt, in the folder, or in NN/ or sequences/NN/ below it"
     poses_from = "poses.txt and times.txt"
 
+    @checked
     def __init__(
         self,
         path: str | PathLike[str],

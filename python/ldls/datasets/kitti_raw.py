@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks import checked
 from ldls.cloud import Points
 from ldls.datasets.file_source import (
     FileSource,
@@ -64,6 +65,7 @@ class KittiRawSource(FileSource):
     looks_for = "velodyne_points/, in the folder or in one *_sync/ below it"
     poses_from = "oxts/ and the day's calib_imu_to_velo.txt"
 
+    @checked
     def __init__(
         self,
         path: str | PathLike[str],

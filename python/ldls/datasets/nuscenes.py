@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.checks import checked
 from ldls.cloud import Points
 from ldls.datasets import nuscenes_tables as tables
 from ldls.datasets.file_source import check_truth, choose, counts_of, image_from_file, warn_left_out
@@ -49,6 +50,7 @@ class NuScenesSource:
     kind = "nuscenes"
     looks_for = "v1.0-*/sample_data.json"
 
+    @checked
     def __init__(
         self,
         path: str | PathLike[str],

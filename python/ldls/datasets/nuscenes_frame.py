@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.checks import checked
 from ldls.cloud import MAX_COLUMNS, Points
 from ldls.datasets.file_source import image_from_file
 from ldls.datasets.frame import CameraImage, Frame
@@ -60,6 +61,7 @@ class NuScenesFrameSource:
     kind = "nuscenes-frame"
     looks_for = "frame.json"
 
+    @checked
     def __init__(self, path: str | PathLike[str], *, truth: bool = True) -> None:
         """Read frame.json.
 

@@ -25,26 +25,31 @@ class RosTopics:
     infos: tuple[str, ...]
 
 
-def choose_topics(bag: Bag, points: str | None, images: Sequence[str] | None, infos: Sequence[str] | None) -> RosTopics:
+def choose_topics(
+    bag: Bag, points: str | None, images: str | Sequence[str] | None, infos: str | Sequence[str] | None
+) -> RosTopics:
     """The topics given, and for those that are not given the only ones there are.
 
     Raises:
         InputError: A topic is not in the bag or of another type, or there is none or several to guess from; the
             message lists all there are.
     """
-    if isinstance(images, str) or isinstance(infos, str):
-        raise InputError("image_topics, info_topics: expected lists of topics, got a text; put it in brackets")
     chosen_points = _one(bag, "points_topic", points, (POINTS,))
     if images is None:
         images = (_one(bag, "image_topics", None, (IMAGE, COMPRESSED_IMAGE)),)
-    chosen_images = tuple(_one(bag, "image_topics", topic, (IMAGE, COMPRESSED_IMAGE)) for topic in images)
+    chosen_images = tuple(_one(bag, "image_topics", topic, (IMAGE, COMPRESSED_IMAGE)) for topic in _several(images))
     if infos is None:
         infos = [_info_beside(bag, topic) for topic in chosen_images]
+    infos = _several(infos)
     if len(infos) != len(chosen_images):
         raise InputError(f"info_topics: got {len(infos)}, expected {len(chosen_images)}, one an image topic")
     return RosTopics(
         chosen_points, chosen_images, tuple(_one(bag, "info_topics", topic, (CAMERA_INFO,)) for topic in infos)
     )
+
+
+def _several(topics: str | Sequence[str]) -> Sequence[str]:
+    return (topics,) if isinstance(topics, str) else topics
 
 
 def _info_beside(bag: Bag, image_topic: str) -> str:
@@ -67,8 +72,9 @@ def _one(bag: Bag, option: str, given: str | None, types: tuple[str, ...]) -> st
         raise InputError(f"{bag.path}: {option}: {given!r} is {kind}, expected {expected}; {_listed(bag)}")
     if len(fitting) == 1:
         return fitting[0]
+    mend = f"; choose by {option}, as --option {option}={fitting[0]}" if fitting else ""
     raise InputError(
-        f"{bag.path}: {option}: {len(fitting) or 'no'} topics of {expected}, so none is guessed; {_listed(bag)}"
+        f"{bag.path}: {option}: {len(fitting) or 'no'} topics of {expected}, so none is guessed{mend}; {_listed(bag)}"
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.camera.camera_info import MESSAGE_FIELDS
+from ldls.checks import checked
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.datasets.ros_odometry import Odometry, odometry_topics, read_odometry
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
@@ -75,13 +76,14 @@ class RosBag:
     kind = "rosbag"
     looks_for = "a .bag, .db3 or .mcap file, or a folder with the metadata.yaml of ROS 2"
 
+    @checked
     def __init__(
         self,
         path: str | PathLike[str],
         *,
         points_topic: str | None = None,
-        image_topics: Sequence[str] | None = None,
-        info_topics: Sequence[str] | None = None,
+        image_topics: str | Sequence[str] | None = None,
+        info_topics: str | Sequence[str] | None = None,
         max_offset_s: float = 0.05,
         T_camera_lidar: Extrinsic | Mapping[str, Extrinsic] | None = None,
         fields: Mapping[str, str] | None = None,
@@ -93,8 +95,8 @@ class RosBag:
         Args:
             path: A ROS 1 `.bag`, a ROS 2 folder with metadata.yaml, or a bare `.db3` or `.mcap`.
             points_topic: Topic of the clouds (PointCloud2); the only one there is by default.
-            image_topics: Topics of the images (Image or CompressedImage), one a camera; the only one there is by
-                default, and () for clouds alone. Names with "image_rect" are those of rectified images.
+            image_topics: Topic of the images (Image or CompressedImage), or several, one a camera; the only one there
+                is by default, and () for clouds alone. Names with "image_rect" are those of rectified images.
             info_topics: Topic of the CameraInfo of each image topic; the one beside it by default.
             max_offset_s: Longest time between the stamps of sweep and image, in seconds.
             T_camera_lidar: (4, 4) from lidar to camera coordinates, or a file of it, as `ldls.read_camera` takes them,
