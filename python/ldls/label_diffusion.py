@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
 from ldls.camera import Camera
+from ldls.camera.rigid import transformed
 from ldls.checks import checked
 from ldls.cloud import Points, as_points
 from ldls.errors import (
@@ -174,19 +175,36 @@ def nothing_in_view(result: Segmentation) -> str | None:
 
     The text has no numbers, so that those of many frames are few.
     """
-    report = result.report
-    usable = report.n_points - report.n_nonfinite - report.n_origin
-    if usable == 0 or not result.views or result.labels.max() > 0:
+    n_in_view = result.report.n_in_view
+    if not result.views or (result.labels > 0).any():
         return None
-    if report.n_in_view == 0 and report.n_behind == usable:
+    usable, behind = _usable_and_behind(result)
+    if usable == 0:
+        return None
+    if n_in_view == 0 and behind == usable:
         found, cause = "every point lies behind the camera", "is T_camera_lidar that of this lidar, or its inverse"
-    elif report.n_in_view == 0:
+    elif n_in_view == 0:
         found, cause = "no point falls inside the image", "are calibration and image size those of this camera"
     elif _expected_on_masks(result.views) > EXPECTED_ON_MASKS and not (result.direct_labels > 0).any():
         found, cause = "no point in view falls on a mask", "are the masks those of this frame"
     else:
         return None
     return f"points: {found}; nothing is labelled; {cause}, and are x, y, z in order and in metres?"
+
+
+def _usable_and_behind(result: Segmentation) -> tuple[int, int]:
+    """How many points of a cloud are not left out, and how many of these lie behind all of its cameras."""
+    report = result.report
+    if report.n_sweeps == 1:
+        return report.n_points - report.n_nonfinite - report.n_origin, report.n_behind
+    # the report has those of all sweeps together
+    finite = np.isfinite(result.points[:, :3]).all(axis=1)
+    # without any at the origin they may have been kept
+    missing = ~result.points[:, :3].any(axis=1) & (report.n_origin > 0)
+    usable = result.points[finite & ~missing]
+    cameras = [seen.view.camera for seen in result.views]
+    behind = [transformed(usable, each.T_camera_lidar)[:, 2] <= each.min_depth_m for each in cameras]
+    return len(usable), int(np.all(behind, axis=0).sum())
 
 
 def _expected_on_masks(views: Sequence[SeenView]) -> float:

@@ -11,6 +11,7 @@ from batch import runs
 from datasets import layouts
 from ldls import batch
 from ldls.errors import NothingInView, NoUsablePoints
+from ldls.label_diffusion import nothing_in_view
 
 CAMERA = ldls.Camera(projection=[[50, 0, 40], [0, 50, 30], [0, 0, 1]])
 AHEAD = np.random.default_rng(0).uniform([-1, -1, 8], [1, 1, 12], (100, 3)).astype(np.float32)
@@ -64,6 +65,42 @@ def test_points_that_are_all_nan_have_their_own_warning_alone():
     with pytest.warns(NoUsablePoints) as caught:
         ldls.segment(np.full((5, 3), np.nan), mask(), CAMERA)
     assert len(caught) == 1
+
+
+NAN, ORIGIN = np.full((7, 3), np.nan, np.float32), np.zeros((5, 3), np.float32)
+EMPTY = np.zeros((0, 3), np.float32)
+
+
+def causes(*clouds, keep_origin=False):
+    """Why nothing is labelled of each of some sweeps from one place, which are labelled together."""
+    views = [ldls.View(mask(slice(20)), CAMERA)]
+    sweeps = [ldls.Sweep(cloud, views, np.eye(4), 0.1 * at) for at, cloud in enumerate(clouds)]
+    return [nothing_in_view(result) for result in ldls.segment_sweeps(sweeps, keep_origin=keep_origin)]
+
+
+@pytest.mark.parametrize(
+    ("other", "keep_origin"),
+    [
+        pytest.param(EMPTY, False, id="no points"),
+        pytest.param(np.concatenate([-AHEAD, NAN, ORIGIN]), False, id="no returns"),
+        pytest.param(np.concatenate([-AHEAD, NAN, ORIGIN]), True, id="the origin"),
+        pytest.param(AHEAD + np.float32([100, 0, 0]), False, id="points beside the image"),
+    ],
+)
+def test_the_cause_of_a_sweep_is_that_of_its_own_points(other, keep_origin):
+    behind, _ = causes(-AHEAD, other, keep_origin=keep_origin)
+    assert "every point lies behind" in behind
+    beside, _ = causes(AHEAD + np.float32([100, 0, 0]), other, keep_origin=keep_origin)
+    assert "no point falls inside the image" in beside
+
+
+@pytest.mark.parametrize(
+    "nothing",
+    [pytest.param(EMPTY, id="no points"), pytest.param(NAN, id="NaN"), pytest.param(ORIGIN, id="no returns")],
+)
+def test_a_sweep_without_a_usable_point_among_others_has_no_cause(nothing):
+    for other in (AHEAD, -AHEAD, np.concatenate([-AHEAD, NAN, ORIGIN]), EMPTY):
+        assert causes(nothing, other)[0] is None
 
 
 @pytest.fixture

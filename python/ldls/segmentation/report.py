@@ -24,7 +24,8 @@ class Report:
             iterations was given.
         converged: Whether that change is at most 1e-5; False where the number of iterations was given.
         empty_masks: Labels of instances whose mask has no pixel.
-        n_sweeps: Sweeps that were labelled together; counts other than the first two are of all of them.
+        n_sweeps: Sweeps that were labelled together; all but `n_points`, `n_in_view` and `empty_masks` is of all of
+            them.
     """
 
     n_points: int

@@ -86,7 +86,8 @@ def segment_sweeps(
 
     Returns:
         A result a sweep, points in its own lidar frame. A label stands for the same object in all of them; `instances`
-        are the same but for their sources. Report and timings are those of all sweeps together.
+        are the same but for their sources. Of the report, `n_points`, `n_in_view` and `empty_masks` are of the sweep;
+        all else, and the timings, are of all sweeps together.
 
     Raises:
         InputError: There is no sweep, or one cannot be used; see its subclasses.
