@@ -231,7 +231,7 @@ CALLS = {
     "segment_sweeps": (
         ldls.segment_sweeps,
         {
-            "sweeps": [ldls.Sweep(W.points, [ldls.View(W.masks, W.camera)], np.eye(4), 0.1)] * 2,
+            "sweeps": [ldls.Sweep(W.points, [ldls.View(W.masks, W.camera)], np.eye(4), at) for at in (0.1, 0.2)],
             "params": ldls.Params(threads=1),
             "nonfinite": "drop",
             "keep_origin": False,

@@ -214,5 +214,18 @@ def test_misuse_is_named():
         ldls.segment_sweeps([])
     with pytest.raises(ldls.InputError, match="list of View, got int"):
         ldls.Sweep(np.zeros((1, 3)), [3], np.eye(4), 0.0)
+    with pytest.raises(ldls.ParameterError, match="stamp: got None, expected a finite number"):
+        ldls.Sweep(np.zeros((1, 3)), [], np.eye(4), None)
+    for stamp in (np.nan, np.inf, -np.inf):
+        with pytest.raises(ldls.ParameterError, match=f"stamp: got {stamp}, expected a finite number"):
+            ldls.Sweep(np.zeros((1, 3)), [], np.eye(4), stamp)
     with pytest.raises(ldls.CalibrationError, match="pose: R"):
         ldls.Sweep(np.zeros((1, 3)), [], 2 * np.eye(4), 0.0)
+
+
+def test_sweeps_in_another_order_than_their_stamps_are_refused():
+    first, second, third = sweeps_of(1)
+    with pytest.raises(ldls.InputError, match=r"sweeps: one of 0.1 s comes after one of 0.2 s; sort them"):
+        ldls.segment_sweeps([first, third, second])
+    with pytest.raises(ldls.InputError, match=r"sweeps: one of 0.0 s comes after one of 0.0 s; sort them"):
+        ldls.segment_sweeps([first, replace(second, stamp=0.0)])

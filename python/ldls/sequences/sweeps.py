@@ -8,6 +8,7 @@ still nearly all of them do, and of what moves enough from one sweep to the next
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from ldls.camera.rigid import as_transform, brought_together, inverse, rigid
 from ldls.checks import checked
 from ldls.cloud import Points, as_points
-from ldls.errors import InputError
+from ldls.errors import InputError, ParameterError
 from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
@@ -46,6 +47,7 @@ class Sweep:
 
     Raises:
         InputError: An argument is of another type.
+        ParameterError: The stamp is not finite.
         CalibrationError: The pose is no rigid transform.
     """
 
@@ -58,6 +60,8 @@ class Sweep:
         object.__setattr__(self, "points", as_points(self.points))
         object.__setattr__(self, "views", tuple(self.views))
         object.__setattr__(self, "pose", rigid("pose", as_transform("pose", self.pose)))
+        if not math.isfinite(self.stamp):
+            raise ParameterError(f"stamp: got {self.stamp}, expected a finite number")
         for view in self.views:
             if not isinstance(view, View):
                 raise InputError(f"views: expected a list of View, got {type(view).__name__} in it")
@@ -78,7 +82,7 @@ def segment_sweeps(
     the graph has S / 2 times the `neighbors` of the parameters, and at least these.
 
     Args:
-        sweeps: Some tenths of a second of a drive; five are a good number.
+        sweeps: Some tenths of a second of a drive, in the order of their stamps; five are a good number.
         params: Parameters of the method; the best known by default.
         nonfinite: As of `ldls.segment`.
         keep_origin: As of `ldls.segment`.
@@ -90,11 +94,13 @@ def segment_sweeps(
         all else, and the timings, are of all sweeps together.
 
     Raises:
-        InputError: There is no sweep, or one cannot be used; see its subclasses.
+        InputError: There is no sweep, one is not later than the one before it, or one cannot be used; see its
+            subclasses.
         LimitError: The sweeps together have more points than the graph can index.
     """
     if not sweeps:
         raise InputError("sweeps: got none, expected one or more")
+    check_order(sweeps)
     if nonfinite == "raise":
         for sweep in sweeps:
             check_finite(sweep.points)
@@ -125,3 +131,14 @@ def segment_sweeps(
         seen = tuple(replace(seen, view=view) for seen, view in given)
         results.append(replace(result, views=seen, report=replace(result.report, n_sweeps=len(sweeps))))
     return tuple(results)
+
+
+def check_order(sweeps: Sequence[Sweep], after: float = -math.inf) -> None:
+    """Refuse sweeps that are not each later than the one before, and the first than a stamp in seconds.
+
+    Raises:
+        InputError: One is not later.
+    """
+    for before, stamp in pairwise([after, *(sweep.stamp for sweep in sweeps)]):
+        if not stamp > before:
+            raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")

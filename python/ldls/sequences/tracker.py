@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.comparison import compared
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
-from ldls.sequences.sweeps import Sweep
+from ldls.sequences.sweeps import Sweep, check_order
 from ldls.sequences.track import MEMORY_S, Floats, Footprint, Sighting, Track
 
 LONGEST_GAP_S = 10.0
@@ -82,9 +81,7 @@ class Tracker:
         """
         if len(sweeps) != len(results) or not sweeps:
             raise InputError(f"results: got {len(results)} for {len(sweeps)} sweeps, expected one a sweep")
-        for before, stamp in pairwise([self._stamp, *(sweep.stamp for sweep in sweeps)]):
-            if not stamp > before:
-                raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
+        check_order(sweeps, self._stamp)
         if len({len(result.instances) for result in results}) > 1:
             raise InputError("results: their instances differ, expected those of one call of segment_sweeps")
         self._stamp = sweeps[-1].stamp
