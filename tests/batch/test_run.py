@@ -16,7 +16,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import ldls
-from batch import runs
+from batch import drives, runs
 from datasets import layouts, ros_samples
 from ldls import batch
 from ldls.batch import lock
@@ -273,6 +273,32 @@ def test_a_run_of_other_settings_is_refused(few, tmp_path, options, named):
         run(few, tmp_path / "out", **options)
     assert named in str(caught.value)
     assert runs.contents(tmp_path / "out") == before
+
+
+def test_a_run_that_did_no_frame_binds_nobody(few, tmp_path):
+    assert len(run(few, tmp_path / "out", settings={"categories": ("zebrra",)}).failures) == 12
+    assert run(few, tmp_path / "out").n_done == 12
+    run(few, tmp_path / "new")
+    assert runs.contents(tmp_path / "out") == runs.contents(tmp_path / "new")
+
+
+@pytest.mark.parametrize("ending", [b'{"frame":"000000","files":{"000000.npz"', b"a diary\n"], ids=["cut off", "foreign"])
+def test_a_run_that_may_have_done_frames_is_kept(few, tmp_path, ending):
+    run(few, tmp_path / "out", settings={"categories": ("zebrra",)})
+    journal = tmp_path / "out/journal.jsonl"
+    journal.write_bytes(journal.read_bytes() + ending)
+    before = runs.contents(tmp_path / "out")
+    with pytest.raises(BatchError, match="holds a run of other settings"):
+        run(few, tmp_path / "out")
+    assert runs.contents(tmp_path / "out") == before
+
+
+def test_poses_that_sweeps_told_belong_to_their_source(few, tmp_path):
+    run(few, tmp_path / "out", settings={"categories": ("zebrra",)})
+    (tmp_path / "out/poses.txt").write_text(drives.tum_poses(12))
+    other = layouts.many_frames(tmp_path / "other", 12)
+    with pytest.raises(BatchError, match=r"source\.path was"):
+        run(other, tmp_path / "out")
 
 
 def test_a_run_of_another_source_is_refused(few, tmp_path):

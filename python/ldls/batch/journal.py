@@ -1,7 +1,8 @@
 """The journal of a run: a line a frame, appended when the files of the frame are safe on the disk.
 
 The first line holds the settings that labels depend on; a run goes on only with the same ones, but may add frames, and
-formats of their files. Frames are appended in the order in which they are finished, in groups, so that the disk need
+formats of their files. A journal in which no frame was ever done binds nobody: a run of other settings begins it anew.
+Frames are appended in the order in which they are finished, in groups, so that the disk need
 not be waited for after each; the last line of a frame counts, and one that a crash cut off is dropped. When all is done
 the lines are put in the order of the frames: every run of the same settings, formats and frames ends with the same
 bytes, whatever was done first.
@@ -29,6 +30,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any
 
+from ldls.batch.poses import FOUND
 from ldls.errors import BatchError, CorruptFileError
 from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
 from ldls.segmentation.object_rows import COLUMNS
@@ -49,7 +51,7 @@ class Journal:
         """Begin a journal, or go on with the one there is.
 
         Raises:
-            BatchError: The one there is belongs to a run of other settings.
+            BatchError: The one there is has frames that a run of other settings did.
             CorruptFileError: It is no journal.
             UnsafePathError: It is a link.
         """
@@ -143,7 +145,8 @@ class Journal:
                     break
                 record = self._parsed(line, number)
                 if number == 1:
-                    self._check(record)
+                    if self._is_replaced(record, file):
+                        break
                 else:
                     frame = record["frame"]
                     self._places[frame] = whole
@@ -169,13 +172,21 @@ class Journal:
             "to do all frames again"
         )
 
-    def _check(self, header: Record) -> None:
+    def _is_replaced(self, header: Record, rest: Iterable[bytes]) -> bool:
+        """Return True for the journal of a run of other settings that did no frame, as the `rest` of its lines tells.
+
+        Raises:
+            BatchError: The run of other settings did some.
+        """
         differences = list(_differences(header, self._header))
-        if differences:
+        # poses that the sweeps told are true of their source alone
+        binds = (self._folder / FOUND).is_file() and header.get("source") != self._header["source"]
+        if differences and (binds or not all(map(_is_failure, rest))):
             raise BatchError(
                 f"{self._folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go "
                 "on with it (frames and formats may be added), or choose another folder"
             )
+        return bool(differences)
 
 
 @dataclass(frozen=True)
@@ -197,6 +208,15 @@ class KeptRecords:
             return None
         with self.path.open("rb") as file:
             return _record_at(file, place)
+
+
+def _is_failure(line: bytes) -> bool:
+    """Return True for the whole line of a frame that failed; one that was cut off may be of frames that were done."""
+    try:
+        record = json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return line.endswith(b"\n") and _is_of_frame(record) and "error" in record
 
 
 def _is_of_frame(record: object) -> bool:

@@ -82,7 +82,8 @@ def run(
         What came of it; frames that failed are in its `failures`.
 
     Raises:
-        BatchError: Another run is at work in `out`, or `out` holds a run of other settings, source or version.
+        BatchError: Another run is at work in `out`, or `out` holds frames done by one of other settings, source or
+            version.
         CorruptFileError: The journal in `out` is none.
         ParameterError: A map is asked for, and no tracks.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
