@@ -1,6 +1,7 @@
 """`ldls view`, and --rerun of other commands, from the outside."""
 
 import csv
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -124,6 +125,21 @@ def test_results_of_a_run_are_shown_and_nothing_is_segmented(drive, monkeypatch)
     row = Recorded("a.rrd").each("world/points", "Points3D:class_ids")[1].values
     with np.load(f"results/{name}.npz") as stored:
         np.testing.assert_array_equal(row["Points3D:class_ids"].to_numpy(), stored["categories"])
+
+
+@pytest.mark.parametrize("target", [["--picture", "seen.png"], ["--rerun", "seen.rrd"]], ids=["picture", "recording"])
+def test_results_of_another_drive_are_refused(drive, tmp_path, target):
+    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--formats", "npz", "--frames", "0:2"]
+    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    first, second = ldls.datasets.open_source(drive).names[:2]
+    shutil.copy(f"out/{second}.npz", f"out/{first}.npz")
+    expected, got = (len(ldls.datasets.open_source(drive)[index].points) for index in (0, 1))
+    message = f"out/{first}.npz: expected {expected:,} points, those of frame {first} of {drive}, got {got:,}; give"
+    alone = run(drive, "--results", "out", "--frames", "0", *target)
+    assert alone.exit_code == 1 and message in " ".join(alone.stderr.split()), alone.output
+    assert not list(tmp_path.glob("seen*"))
+    both = run(drive, "--results", "out", "--frames", "0:2", *target)
+    assert both.exit_code == 2 and f"{first} failed" in both.output and "1 of 3 frames" in both.output, both.output
 
 
 def test_objects_of_a_drive_keep_their_numbers(drive):

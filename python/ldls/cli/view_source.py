@@ -154,8 +154,19 @@ def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segm
 
 
 def _stored(source: Source, results: Path, index: int) -> tuple[Frame, Segmentation]:
+    """A frame and its stored result.
+
+    Raises:
+        InputError: The result is of another cloud.
+    """
     from ldls.io import read_result
     from ldls.viewing.formats import file_name
 
     path = results / file_name(source.names[index], "npz")
-    return source[index], read_result(path)
+    frame, result = source[index], read_result(path)
+    if len(result.labels) != len(frame.points):
+        raise InputError(
+            f"--results: {path}: expected {len(frame.points):,} points, those of frame {frame.name} of {source.path}, "
+            f"got {len(result.labels):,}; give the results of this source"
+        )
+    return frame, result
