@@ -131,6 +131,14 @@ def test_frames_and_formats(few, tmp_path, text, expected):
     assert made == {f"{name}.{ending}" for name in expected for ending in ("label", "ply")}
 
 
+@pytest.mark.parametrize("text", ["12:", "5:2", "100:200:5"])
+def test_frames_that_the_source_has_not(few, tmp_path, text):
+    outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--frames", text)
+    assert outcome.exit_code == 1
+    assert f"frames: got {text}, {few} has 12 frames, counted from 0" in " ".join(outcome.output.split())
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("text", ["1:2:0", "-3:", "a:b", "1:2:3:4", ""])
 def test_frames_that_are_no_slice(text):
     with pytest.raises(ParameterError, match="START:STOP:STEP"):
@@ -282,7 +290,9 @@ def test_a_run_that_did_no_frame_binds_nobody(few, tmp_path):
     assert runs.contents(tmp_path / "out") == runs.contents(tmp_path / "new")
 
 
-@pytest.mark.parametrize("ending", [b'{"frame":"000000","files":{"000000.npz"', b"a diary\n"], ids=["cut off", "foreign"])
+@pytest.mark.parametrize(
+    "ending", [b'{"frame":"000000","files":{"000000.npz"', b"a diary\n"], ids=["cut off", "foreign"]
+)
 def test_a_run_that_may_have_done_frames_is_kept(few, tmp_path, ending):
     run(few, tmp_path / "out", settings={"categories": ("zebrra",)})
     journal = tmp_path / "out/journal.jsonl"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import PureWindowsPath
 
 from ldls.batch.window import Frames
+from ldls.datasets import Source
 from ldls.errors import ParameterError, UnsafePathError
 from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.viewing.formats import file_name
@@ -31,6 +32,20 @@ def parse_frames(text: str | None) -> slice:
     if not re.fullmatch(r"\d*:\d*(:[1-9]\d*)?", text):
         raise ParameterError(f"frames: got {text!r}, expected START:STOP:STEP such as 100:500:5, from 0")
     return slice(*(int(part) if part else None for part in text.split(":")))
+
+
+def chosen_of(source: Source, frames: slice) -> Frames:
+    """Number in the source and name of each of its `frames`.
+
+    Raises:
+        ParameterError: It has none of them.
+    """
+    chosen = tuple(zip(range(len(source))[frames], source.names[frames], strict=True))
+    if not chosen:
+        parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
+        asked = ":".join("" if part is None else str(part) for part in parts)
+        raise ParameterError(f"frames: got {asked}, {source.path} has {len(source):,} frames, counted from 0")
+    return chosen
 
 
 def windows_of(chosen: Frames, stamps: Sequence[float | None], sweeps: int) -> list[Frames]:

@@ -17,7 +17,7 @@ from ldls.batch.engines import Engine, EngineOptions, open_engine
 from ldls.batch.frame_work import Earlier, FrameWork
 from ldls.batch.journal import Journal, Record
 from ldls.batch.lock import only_run
-from ldls.batch.plan import check_names, windows_of
+from ldls.batch.plan import check_names, chosen_of, windows_of
 from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import RunBag
 from ldls.batch.run_tracks import RunTracks
@@ -85,7 +85,7 @@ def run(
         BatchError: Another run is at work in `out`, or `out` holds frames done by one of other settings, source or
             version.
         CorruptFileError: The journal in `out` is none.
-        ParameterError: A map is asked for, and no tracks.
+        ParameterError: The source has none of the `frames`, or a map is asked for, and no tracks.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
         PoseError: Sweeps are to be joined or objects tracked, and frames have no stamps or poses.
@@ -97,7 +97,7 @@ def run(
     options = dict(options or {})
     opened = open_source(source, **{"truth": False, **options}) if isinstance(source, str | PathLike) else source
     runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
-    chosen = tuple(zip(range(len(opened))[frames], opened.names[frames], strict=True))
+    chosen = chosen_of(opened, frames)
     names = [name for _, name in chosen]
     check_names(names, settings.frame_formats)
     write_objects = None if objects is None else objects_writer(objects)

@@ -13,7 +13,7 @@ from ldls.cli.options import refuse
 from ldls.cli.progress import progress
 from ldls.cli.recording_options import every_of
 from ldls.cli.source_options import parse_options
-from ldls.errors import InputError, LdlsError, ParameterError
+from ldls.errors import InputError, LdlsError
 
 if TYPE_CHECKING:
     from ldls.batch.frame_work import FrameWork
@@ -35,15 +35,12 @@ def chosen_frames(
         LdlsError: It is no source.
         ParameterError: It has no such frames.
     """
-    from ldls.batch.plan import parse_frames
+    from ldls.batch.plan import chosen_of, parse_frames
     from ldls.datasets import open_source
 
     source = open_source(path, kind=dataset, **parse_options(options))
     chosen = slice(MOST_FRAMES) if frames is None else parse_frames(frames)
-    indices = list(range(len(source)))[chosen]
-    if not indices:
-        raise ParameterError(f"--frames: got {frames}, {path} has {len(source):,} frames, counted from 0")
-    return source, indices
+    return source, [index for index, _ in chosen_of(source, chosen)]
 
 
 def labelled(
