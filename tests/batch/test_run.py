@@ -318,6 +318,12 @@ def test_a_run_of_another_source_is_refused(few, tmp_path):
         batch.run(other, tmp_path / "out", replace(STORED, masks=str(few / "masks")))
 
 
+def test_a_command_may_be_spelt_from_another_folder(few, tmp_path, monkeypatch):
+    run(few, tmp_path / "out")
+    monkeypatch.chdir(few / "velodyne")
+    assert batch.run("..", tmp_path / "out", replace(STORED, masks="../masks")).n_earlier == 12
+
+
 def test_a_run_of_another_version_is_refused(few, tmp_path):
     run(few, tmp_path / "out")
     journal = tmp_path / "out/journal.jsonl"

@@ -91,7 +91,7 @@ class RunSettings:
         del settings["params"]["threads"]
         settings["same_object"] = self.share_of_same
         for name, path in (("masks", self.masks), ("poses", self.poses)):
-            settings[name] = None if path is None else str(Path(path).absolute())
+            settings[name] = None if path is None else str(Path(path).resolve())
         settings["version"] = _ldls.__version__
         recorded: dict[str, Any] = json.loads(json.dumps(settings))
         return recorded
