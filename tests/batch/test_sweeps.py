@@ -267,6 +267,18 @@ def test_a_frame_without_a_pose_fails_alone(drive, tmp_path):
     assert windows(tmp_path / "out") == ["012", "012", "012", "34", "34"]
 
 
+def test_a_frame_with_a_point_too_far_away_fails_alone(simulated, tmp_path):
+    drive = shutil.copytree(simulated.parent, tmp_path / simulated.parent.name) / simulated.name
+    path = sorted(drive.glob("velodyne_points/data/*.bin"))[1]
+    points = np.fromfile(path, "<f4")
+    points[4 * 7 + 1] = 1e30
+    points.tofile(path)
+    summary = run(drive, tmp_path / "out", masks=str(drive / "masks_02"))
+    (failure,) = summary.failures
+    assert failure.frame == path.stem and "points: row 7 has a coordinate of 1e+30 m" in failure.message
+    assert summary.n_done == len(open_source(drive)) - 1
+
+
 def test_poses_that_were_changed_are_noticed(drive, tmp_path):
     run(drive, tmp_path / "out")
     (drive / "poses.txt").write_text(drives.kitti_poses(N_FRAMES, step=1.1))

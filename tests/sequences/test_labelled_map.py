@@ -165,7 +165,8 @@ def test_voxels_have_a_size(voxel_m):
     ("change", "error", "message"),
     [
         pytest.param({"pose": moved(1e6)}, ldls.LimitError, "one is 1e+06 m from where the grid begins", id="far"),
-        pytest.param({"points": [[1e300, 0, 0]]}, ldls.LimitError, "1e+300 m from where the grid begins", id="huge"),
+        pytest.param({"points": [[9e6, 0, 0]]}, ldls.LimitError, "9e+06 m from where the grid begins", id="far point"),
+        pytest.param({"points": [[1e300, 0, 0]]}, ldls.InputError, "row 0 has a coordinate of 1e+300 m", id="huge"),
         pytest.param({"labels": [0, 0]}, ldls.ShapeError, "result: has 2 points, the sweep 1; give", id="other points"),
         pytest.param({"labels": [1], "objects": [(3, 0)]}, ldls.InputError,
                      "result: instance 1 (thing) has points and no track", id="no track"),

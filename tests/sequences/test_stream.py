@@ -1,6 +1,7 @@
 """Streams of sweeps of a drive."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -65,6 +66,20 @@ def test_after_a_second_without_a_sweep_the_next_is_labelled_alone(frames):
         return stream.segment(frame.points, frame.images[0].masks, pose=frame.pose, stamp=stamp).report.n_sweeps
 
     assert [n_sweeps(one, 0.0), n_sweeps(two, 1.0), n_sweeps(three, 2.1)] == [1, 2, 1]
+
+
+def test_a_pose_that_jumps_is_refused_and_forgotten(frames):
+    one, two, _, _, _ = frames
+    stream = ldls.LabelDiffusion(one.images[0].camera, PARAMS)
+    away = two.pose.copy()
+    away[0, 3] += 500
+    for frame, pose, n_sweeps in ((one, one.pose, 1), (two, away, None), (two, two.pose, 2)):
+        call = partial(stream.segment, frame.points, frame.images[0].masks, pose=pose, stamp=frame.stamp)
+        if n_sweeps is None:
+            with pytest.raises(ldls.PoseError, match=r"the lidar moves 50\d.* expected at most 100 m/s"):
+                call()
+        else:
+            assert call().report.n_sweeps == n_sweeps
 
 
 def test_a_frame_without_pose_is_none_of_the_drive(frames):

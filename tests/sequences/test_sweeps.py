@@ -1,5 +1,6 @@
 """Several sweeps in one graph: against plain double precision, and what each sweep gets back."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -221,6 +222,10 @@ def test_misuse_is_named():
             ldls.Sweep(np.zeros((1, 3)), [], np.eye(4), stamp)
     with pytest.raises(ldls.CalibrationError, match="pose: R"):
         ldls.Sweep(np.zeros((1, 3)), [], 2 * np.eye(4), 0.0)
+    with pytest.raises(ldls.InputError, match=re.escape("points: row 1 has a coordinate of -1e+30 m, expected |x|")):
+        ldls.Sweep([[np.inf, 0, 0], [0, -1e30, np.nan]], [], np.eye(4), 0.0)
+    # columns of other things may have any value
+    ldls.Sweep([[0, 0, 0, 1e9], [np.nan, 0, 0, 0], [np.inf, 0, 0, 0]], [], np.eye(4), 0.0)
 
 
 def test_sweeps_in_another_order_than_their_stamps_are_refused():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
@@ -15,9 +16,9 @@ from ldls.label_diffusion import SAME_OBJECT, segment_views
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Segmentation
-from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, segment_sweeps
+from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, check_order, segment_sweeps
 from ldls.sequences.tracker import Tracker
-from ldls.sequences.trajectory import LONGEST_GAP_S
+from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory
 from ldls.view import View
 
 BEFORE = 2
@@ -91,6 +92,7 @@ class LabelDiffusion:
 
         Raises:
             InputError: An argument cannot be used; see its subclasses. A sweep that fails is not remembered.
+            PoseError: The pose is farther from that of the sweep before than 100 m/s allow.
             LimitError: The cloud has more points than the graph can index.
             ImportError: `ldls[eval]` is not installed, which drives need.
         """
@@ -105,6 +107,9 @@ class LabelDiffusion:
         sweep = Sweep(as_points(points).copy(), views, pose, stamp)  # type: ignore[arg-type]
         goes_on = self._recent and sweep.stamp - self._recent[-1].stamp <= LONGEST_GAP_S
         recent = (*(self._recent if goes_on else ()), sweep)[-1 - self.before :]
+        check_order(recent)
+        # refuses a pose that jumps
+        Trajectory(np.array([each.stamp for each in recent]), np.array([each.pose for each in recent]))
         results = segment_sweeps(
             recent,
             params=self.params,

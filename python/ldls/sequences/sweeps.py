@@ -29,6 +29,8 @@ from ldls.view import View
 SAME_OBJECT = 0.1
 """Share of common points from which on instances of two images are one object: less than of one moment, for it may
 have moved."""
+FARTHEST_M = 1e7
+"""Largest coordinate of a cloud, as in the core, which would name the row among those of all sweeps."""
 SHARE_OF_NEIGHBORS = 0.5
 """Neighbours that a sweep adds, as a share of those of one alone: of the nearest many are of the same line at other
 times, and only farther ones join lines."""
@@ -46,7 +48,7 @@ class Sweep:
         stamp: Time of the sweep in seconds.
 
     Raises:
-        InputError: An argument is of another type.
+        InputError: An argument is of another type, or a point is farther away than distances can be told.
         ParameterError: The stamp is not finite.
         CalibrationError: The pose is no rigid transform.
     """
@@ -58,6 +60,7 @@ class Sweep:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", as_points(self.points))
+        _check_coordinates(self.points)
         object.__setattr__(self, "views", tuple(self.views))
         object.__setattr__(self, "pose", rigid("pose", as_transform("pose", self.pose)))
         if not math.isfinite(self.stamp):
@@ -142,3 +145,16 @@ def check_order(sweeps: Sequence[Sweep], after: float = -math.inf) -> None:
     for before, stamp in pairwise([after, *(sweep.stamp for sweep in sweeps)]):
         if not stamp > before:
             raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
+
+
+def _check_coordinates(points: Points) -> None:
+    if not points.size or max(-points.min(), points.max()) <= FARTHEST_M:
+        return
+    xyz = points[:, :3]
+    far = np.isfinite(xyz) & (np.abs(xyz) > FARTHEST_M)
+    if far.any():
+        row, column = np.argwhere(far)[0].tolist()
+        raise InputError(
+            f"points: row {row} has a coordinate of {xyz[row, column]:g} m, expected |x|, |y|, |z| <= "
+            f"{FARTHEST_M:g} m; pass metres, or NaN where there is no return"
+        )
