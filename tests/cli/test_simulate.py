@@ -75,3 +75,8 @@ def test_a_drive_is_a_bag_with_masks_beside_it(tmp_path, layout, name):
     assert (tmp_path / "out" / name).is_file()
     assert [p.name for p in (tmp_path / "out/masks").iterdir()] == ["1700000000000000000.json"]
     assert run(tmp_path / "out", "--count", 1, "--layout", layout).exit_code != 0
+    kept = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    other = {"rosbag1": "mcap", "mcap": "rosbag1"}[layout]
+    refused = run(tmp_path / "out", "--count", 1, "--layout", other, "--seed", 1)
+    assert refused.exit_code == 1 and "exists already, with masks and annotations" in " ".join(refused.output.split())
+    assert kept == {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}

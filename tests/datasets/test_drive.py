@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import ldls
+from batch import runs
 from ldls.datasets import open_source
 from ldls.datasets.inspection import check_stamps, inspect
 from ldls.evaluation import ClassSet, evaluate
 from ldls.labeling import Labeling
-from ldls.simulation import Drive, SensorErrors, drive_folder, drive_frame, write_drive
+from ldls.simulation import Drive, SegmenterErrors, SensorErrors, drive_folder, drive_frame, write_drive
 from ldls.simulation.drives import drive_poses
 
 DRIVE = Drive(n_frames=3, seed=0, lidar="hdl-32e")
@@ -40,6 +41,33 @@ def test_the_source_gives_back_what_was_simulated(drive_path):
     np.testing.assert_allclose(frame.pose, simulated.pose, atol=1e-6)
     assert frame.pose[0, 3] == pytest.approx(0.2 * DRIVE.speed_m_s)
     assert not check_stamps(source.names, source.stamps) and not inspect(source, 2).findings
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        pytest.param({"lidar": "vlp-16"}, 'drive.json: .* expected \'"lidar": "vlp-16"\'', id="another lidar"),
+        pytest.param({"segmenter": SegmenterErrors.none()}, '"mask_cells": 0', id="other masks"),
+        pytest.param({"n_frames": 2}, "timestamps.txt: line 3: .* expected no more lines", id="fewer frames"),
+        pytest.param({"n_frames": 100}, 'expected \'"speed_m_s": 4.0', id="so many frames that it is slower"),
+    ],
+)
+def test_another_drive_does_not_go_on_where_one_lies(drive_path, changed, named):
+    before = runs.contents(drive_path.parent)
+    with pytest.raises(ldls.ParameterError, match=f"holds another drive, or more frames: .*{named}"):
+        next(write_drive(drive_path.parents[1], replace(DRIVE, **changed)))
+    assert runs.contents(drive_path.parent) == before
+
+
+def test_a_drive_goes_on_with_more_frames_that_leave_the_first_as_they_are(tmp_path):
+    short = replace(TURNS, n_frames=2)
+    assert None not in list(write_drive(tmp_path, short))
+    before = runs.contents(tmp_path)
+    longer = list(write_drive(tmp_path, replace(TURNS, n_frames=3)))
+    assert longer.count(None) == 2 and len(longer) == 3
+    after = runs.contents(tmp_path)
+    assert all(after[name].startswith(content) for name, content in before.items())
+    assert len(open_source(drive_folder(tmp_path, short))) == 3
 
 
 def test_a_drive_scores_as_its_frames_do_singly(drive_path):

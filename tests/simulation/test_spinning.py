@@ -182,7 +182,7 @@ def test_a_drive_in_the_raw_layout_has_begin_and_end_of_its_turns(tmp_path):
     assert list(at - begin) == list(end - at) == [np.timedelta64(50_000_000, "ns")] * 2
     np.testing.assert_array_equal(open_source(path)[1].points[:, :3], drive_frame(drive, 1).points[:, :3])
     assert list(write_drive(tmp_path, drive)) == [None, None]
-    with pytest.raises(ldls.ParameterError, match="spinning: .* that take 0.1 s"):
+    with pytest.raises(ldls.ParameterError, match='"spinning": true\', expected \'"spinning": false'):
         list(write_drive(tmp_path, replace(drive, spinning=False)))
 
 
@@ -195,7 +195,7 @@ def test_sweeps_of_one_instant_have_no_turns(tmp_path):
     path = drive_folder(tmp_path, drive)
     assert not list((path / "velodyne_points").glob("timestamps_*"))
     assert drive_frame(drive, 0).times is None
-    with pytest.raises(ldls.ParameterError, match="spinning: .* of one instant"):
+    with pytest.raises(ldls.ParameterError, match='"spinning": false\', expected \'"spinning": true'):
         list(write_drive(tmp_path, replace(drive, spinning=True)))
 
 

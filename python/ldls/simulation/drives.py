@@ -104,10 +104,8 @@ def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
     """
     if not 0 <= number < drive.n_frames:
         raise ParameterError(f"number: got {number}, expected 0 to {drive.n_frames - 1}")
-    plan = make_plan(drive.seed, kind=drive.kind)
+    plan = drive_plan(drive)
     poses = _poses(drive, plan.ground, _sweep_seconds(drive))
-    plan.remove(_in_the_way(poses, plan))
-    plan.clear(poses[:, :2, 3], CLEAR_M)
     taken, seed = number * PERIOD_S, 1000 * drive.seed + number
     swept = taken + drive.sensors.delay_s
     world, pose = build(plan), poses[number]
@@ -129,6 +127,19 @@ def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
         segmenter=drive.segmenter,
         motion=motion,
     )
+
+
+def drive_plan(drive: Drive) -> Plan:
+    """What stands and moves in a drive, without what would come too near to the rig; a longer one may have less.
+
+    Raises:
+        ParameterError: There is no such kind of scene.
+    """
+    plan = make_plan(drive.seed, kind=drive.kind)
+    poses = _poses(drive, plan.ground, _sweep_seconds(drive))
+    plan.remove(_in_the_way(poses, plan))
+    plan.clear(poses[:, :2, 3], CLEAR_M)
+    return plan
 
 
 def drive_poses(drive: Drive) -> NDArray[np.float64]:

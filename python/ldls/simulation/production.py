@@ -113,8 +113,7 @@ def make_frames(
         ParameterError: `processes` is below 1.
         ImportError: `ldls[sim]` is not installed.
     """
-    if processes < 1:
-        raise ParameterError(f"processes: got {processes}, expected 1 or more")
+    check_processes(processes)
     missing = [order for order in orders if not order.is_whole(folder)]
     yield from [None] * (len(orders) - len(missing))
     if processes == 1 or len(missing) < 2:
@@ -127,6 +126,16 @@ def make_frames(
                 yield future.result()
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def check_processes(processes: int) -> None:
+    """Refuse to work with none.
+
+    Raises:
+        ParameterError: `processes` is below 1.
+    """
+    if processes < 1:
+        raise ParameterError(f"processes: got {processes}, expected 1 or more")
 
 
 def suite_orders(part: str = "validation") -> list[FrameOrder]:

@@ -2,6 +2,7 @@
 
 OUT/DATE/calib_cam_to_cam.txt, calib_velo_to_cam.txt           calibration as given; P_rect_00, 01 and 03 repeat 02
 OUT/DATE/calib_imu_to_velo.txt                                 the IMU is in the place of the lidar
+OUT/DATE/DATE_drive_NNNN_sync/drive.json                       what the drive is made of; no other goes on with it
 OUT/DATE/DATE_drive_NNNN_sync/oxts/timestamps.txt              times of the poses: those of the sweeps
 OUT/DATE/DATE_drive_NNNN_sync/oxts/data/*.txt                  true poses, as latitude, longitude, altitude and angles
 OUT/DATE/DATE_drive_NNNN_sync/velodyne_points/timestamps.txt   times of the sweeps
@@ -17,8 +18,10 @@ NNNN is the seed; a day is that of the seed too, for its calibration is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import zip_longest
 from os import PathLike
 from pathlib import Path
 
@@ -26,10 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import ParameterError
+from ldls.io.files import read_lines
 from ldls.io.poses.kitti_raw import EARTH_RADIUS_M
-from ldls.simulation.drives import PERIOD_S, Drive, drive_frame, drive_poses
+from ldls.simulation.drives import PERIOD_S, Drive, drive_frame, drive_plan, drive_poses
 from ldls.simulation.kitti_layout import row_of, write_lines, write_masks, write_picture, write_points, write_truth
-from ldls.simulation.production import FrameSummary, make_frames
+from ldls.simulation.production import FrameSummary, check_processes, make_frames
 from ldls.simulation.simulated_frame import SimulatedFrame
 
 FIRST_DAY = np.datetime64("2026-01-01")
@@ -49,25 +53,23 @@ def drive_folder(folder: str | PathLike[str], drive: Drive) -> Path:
 def write_drive(folder: str | PathLike[str], drive: Drive, *, processes: int = 1) -> Iterator[FrameSummary | None]:
     """Write the frames of a drive that are not there yet; yields each as it is done, None for one that was there.
 
-    With more than one process, call it from a script's main part only, as Python starts processes anew.
+    A drive may go on with more frames where the first ones stay as they are. With more than one process, call it from a
+    script's main part only, as Python starts processes anew.
 
     Raises:
-        ParameterError: `processes` is below 1, or the folder has frames of this drive that take their time where it
-            does not spin, or the other way round.
+        ParameterError: `processes` is below 1, or the folder has another drive of this seed, or more frames of it.
         ImportError: `ldls[sim]` is not installed.
     """
+    check_processes(processes)
     path = drive_folder(folder, drive)
     orders = [DriveFrameOrder(drive, number) for number in range(drive.n_frames)]
-    _check_turns(folder, path / "velodyne_points", orders, spinning=drive.spinning)
-    _write_calibration(path.parent, drive)
+    shared = {path / "drive.json": _made_of(drive)} | _calibration(path.parent, drive) | _stamps(path, drive)
     for number, pose in enumerate(drive_poses(drive)):
-        write_lines(path / "oxts/data" / f"{number:010d}.txt", [_measured(drive, pose)])
-    delay_s, half_s = drive.sensors.delay_s, PERIOD_S / 2
-    stamps = {"velodyne_points/timestamps": delay_s, "oxts/timestamps": delay_s, "image_02/timestamps": 0.0}
-    if drive.spinning:
-        stamps |= {f"velodyne_points/{BEGIN}": delay_s - half_s, f"velodyne_points/{END}": delay_s + half_s}
-    for name, later_s in stamps.items():
-        write_lines(path / f"{name}.txt", [_stamp(drive, k, later_s) for k in range(drive.n_frames)])
+        shared[path / "oxts/data" / f"{number:010d}.txt"] = [_measured(drive, pose)]
+    _check_there(path, shared)
+    for file, lines in shared.items():
+        if lines:
+            write_lines(file, lines)
     yield from make_frames(folder, orders, processes=processes)
 
 
@@ -103,19 +105,39 @@ class DriveFrameOrder:
         return frame
 
 
-def _check_turns(
-    folder: str | PathLike[str], sweeps: Path, orders: Sequence[DriveFrameOrder], *, spinning: bool
-) -> None:
-    """Refuse to go on with frames of the other kind; begin and end of turns tell."""
-    kept = any(order.is_whole(folder) for order in orders)
-    if kept and (sweeps / f"{BEGIN}.txt").exists() != spinning:
-        there = "sweeps of one instant" if spinning else "sweeps that take 0.1 s"
-        raise ParameterError(
-            f"spinning: got {spinning}, and {sweeps.parent} has {there}; delete it, or write to another folder"
-        )
-    if not spinning:
-        for name in (BEGIN, END):
-            (sweeps / f"{name}.txt").unlink(missing_ok=True)
+def _check_there(path: Path, shared: Mapping[Path, Sequence[str]]) -> None:
+    """Refuse to go on with another drive: each shared file that is there is as it would be written, or its beginning.
+
+    Raises:
+        ParameterError: One is not.
+    """
+    for file, expected in shared.items():
+        found = read_lines(file) if file.is_file() else []
+        for number, (got, line) in enumerate(zip_longest(found, expected[: len(found)]), start=1):
+            if got != line:
+                wanted = "no more lines" if line is None else repr(line.strip(" ,"))
+                raise ParameterError(
+                    f"{path}: holds another drive, or more frames: {file.name}: line {number}: got "
+                    f"{got.strip(' ,')!r}, expected {wanted}; write to another folder, or remove it"
+                )
+
+
+def _made_of(drive: Drive) -> list[str]:
+    """What all frames of a drive depend on; more frames may make it slower, and clear more things out of its way."""
+    settings = asdict(drive) | {"speed_m_s": drive.speed_m_s, "n_things": len(drive_plan(drive).placed)}
+    del settings["n_frames"]
+    return json.dumps(settings, indent=1).splitlines()
+
+
+def _stamps(path: Path, drive: Drive) -> dict[Path, list[str]]:
+    """The files of times, empty ones for begin and end of turns where the lidar does not spin."""
+    delay_s, half_s = drive.sensors.delay_s, PERIOD_S / 2
+    later = {"velodyne_points/timestamps": delay_s, "oxts/timestamps": delay_s, "image_02/timestamps": 0.0}
+    turns = {f"velodyne_points/{BEGIN}": delay_s - half_s, f"velodyne_points/{END}": delay_s + half_s}
+    stamps = {name: [_stamp(drive, k, s) for k in range(drive.n_frames)] for name, s in (later | turns).items()}
+    if not drive.spinning:
+        stamps |= {name: [] for name in turns}
+    return {path / f"{name}.txt": lines for name, lines in stamps.items()}
 
 
 def _measured(drive: Drive, pose: NDArray[np.float64]) -> str:
@@ -137,7 +159,8 @@ def _stamp(drive: Drive, number: int, later_s: float) -> str:
     return str(moment).replace("T", " ")
 
 
-def _write_calibration(day: Path, drive: Drive) -> None:
+def _calibration(day: Path, drive: Drive) -> dict[Path, list[str]]:
+    """The files of the calibration as given."""
     mounted = drive.rig().cameras[0]
     transform = drive.sensors.drift(drive.seed) @ mounted.T_camera_lidar()
     cameras = [MADE]
@@ -147,7 +170,9 @@ def _write_calibration(day: Path, drive: Drive) -> None:
             f"R_rect_{k:02d}: {row_of(np.eye(3))}",
             f"P_rect_{k:02d}: {row_of(mounted.model.projection())}",
         ]
-    write_lines(day / "calib_cam_to_cam.txt", cameras)
     lidar = [MADE, f"R: {row_of(transform[:3, :3])}", f"T: {row_of(transform[:3, 3])}"]
-    write_lines(day / "calib_velo_to_cam.txt", lidar)
-    write_lines(day / "calib_imu_to_velo.txt", [MADE, f"R: {row_of(np.eye(3))}", f"T: {row_of(np.zeros(3))}"])
+    return {
+        day / "calib_cam_to_cam.txt": cameras,
+        day / "calib_velo_to_cam.txt": lidar,
+        day / "calib_imu_to_velo.txt": [MADE, f"R: {row_of(np.eye(3))}", f"T: {row_of(np.zeros(3))}"],
+    }

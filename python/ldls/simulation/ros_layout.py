@@ -76,12 +76,17 @@ def write_robot_drive(
 
     Raises:
         ParameterError: There is no such kind, or `frames` is below 1.
-        FileExistsError: The bag is there already.
+        FileExistsError: The bag is there already, or one of another kind, whose masks and annotations would be lost.
         ImportError: `ldls[sim,ros]` is not installed.
     """
     folder = Path(folder)
-    path = folder / ("drive.bag" if kind == "rosbag1" else "drive")
+    ros1, ros2 = folder / "drive.bag", folder / "drive"
+    path, other = (ros1, ros2) if kind == "rosbag1" else (ros2, ros1)
     bag = BagWriter(path, kind)
+    if other.exists():
+        raise FileExistsError(
+            f"{other}: exists already, with masks and annotations; remove it or choose another folder"
+        )
     folder.mkdir(parents=True, exist_ok=True)
     with bag:
         image_topic = f"{IMAGE_TOPIC}/compressed" if compressed else IMAGE_TOPIC
