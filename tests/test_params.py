@@ -31,6 +31,7 @@ def test_the_papers_parameters_add_nothing_to_its_method():
         ("sigma", 10**400),
         ("sigma", True),
         ("pixel_weight", 0.0),
+        ("pixel_weight", 1e-44),
         ("pixel_weight", float("inf")),
         ("window", 4),
         ("window", 0),

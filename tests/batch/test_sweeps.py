@@ -328,9 +328,16 @@ def test_odometry_stands_for_poses_and_is_kept(simulated, tmp_path):
     assert (tmp_path / "out/poses.txt").stat().st_mtime_ns == before
 
 
+def test_a_file_of_poses_needs_no_first_sweep(drive, tmp_path):
+    (tmp_path / "given.txt").write_text(drives.kitti_poses(N_FRAMES))
+    (drive / "velodyne/000000.bin").write_bytes(b"x")
+    summary = run(drive, tmp_path / "out", poses=str(tmp_path / "given.txt"))
+    assert summary.n_done == N_FRAMES - 1 and [failure.frame for failure in summary.failures] == ["000000"]
+
+
 def test_a_file_of_poses_of_another_drive_is_refused(drive, tmp_path):
     (tmp_path / "given.txt").write_text(drives.kitti_poses(3))
-    with pytest.raises(PoseError, match=r"given\.txt: stamps: there are 8 for 3 poses"):
+    with pytest.raises(PoseError, match=r"given\.txt: has 3 poses for 8 stamps, expected a line for each"):
         run(drive, tmp_path / "out", poses=str(tmp_path / "given.txt"))
     (tmp_path / "given.txt").write_text("1 2 3\n")
     with pytest.raises((InputError, ValueError), match=r"given\.txt"):

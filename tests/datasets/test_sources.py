@@ -236,7 +236,7 @@ def test_poses_of_nuscenes_are_those_of_the_lidar_on_the_car(tmp_path):
         pytest.param("kitti-odometry", lambda d: layouts.write_text(d / "poses.txt", "1 0 0 0\n" * 3),
                      ldls.CorruptFileError, "poses.txt: line 1: expected at least 12", id="half a pose"),
         pytest.param("kitti-odometry", lambda d: layouts.write_text(d / "poses.txt", layouts.row(np.eye(4)[:3]) + "\n"),
-                     ldls.PoseError, "poses.txt: stamps: there are 3 for 1 poses", id="fewer poses than times"),
+                     ldls.PoseError, "poses.txt: has 1 poses for 3 stamps", id="fewer poses than times"),
         pytest.param("kitti-odometry", lambda d: layouts.write_text(d / "poses.txt", "".join(
                          layouts.row(pose[:3]) + "\n" for pose in way(3, step_m=11))),
                      ldls.PoseError, "poses.txt: poses: from 0.000000 to 0.100000 s the lidar moves 11 m", id="a jump"),

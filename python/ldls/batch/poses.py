@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -127,14 +129,9 @@ class Poses:
 
     def _has_poses(self, chosen: Frames) -> bool:
         """False if the first frame that can be read and has a stamp has no pose."""
-        for index, _ in chosen:
-            if self.stamps[index] is not None:
-                try:
-                    return self._source[index].pose is not None
-                except (LdlsError, OSError):
-                    # it fails alone, when it is its turn
-                    continue
-        return True
+        stamped = [index for index, _ in chosen if self.stamps[index] is not None]
+        frame = next(_readable(self._source, stamped), None)
+        return frame is None or frame.pose is not None
 
 
 def _stamps(source: Source, settings: RunSettings) -> tuple[float | None, ...]:
@@ -155,6 +152,14 @@ def _trajectory(path: Path, source: Source, times: tuple[float | None, ...]) -> 
             f"{path}: KITTI's poses have no times, and {len(source) - len(stamps)} of {len(source)} frames of "
             f"{source.path} have none either; give a file in TUM's format, or add times"
         )
-    camera = source[0].images[0].camera
+    # where none can be read, the first says why
+    frame = next(_readable(source, range(len(source))), None) or source[0]
     with within(path):
-        return read_poses(path, stamps=stamps, T_camera_lidar=camera.T_camera_lidar)
+        return read_poses(path, stamps=stamps, T_camera_lidar=frame.images[0].camera.T_camera_lidar)
+
+
+def _readable(source: Source, indices: Iterable[int]) -> Iterator[Frame]:
+    """The frames that can be read; others fail alone, when it is their turn."""
+    for index in indices:
+        with suppress(LdlsError, OSError):
+            yield source[index]

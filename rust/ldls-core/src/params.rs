@@ -119,9 +119,10 @@ impl Params {
         )?;
         check(
             "pixel_weight",
-            positive(self.pixel_weight) && self.pixel_weight <= 1e6,
-            self.pixel_weight.to_string(),
-            "a positive number up to 1e6",
+            // of less, single precision loses what is left some edges away
+            (1e-20..=1e6).contains(&self.pixel_weight),
+            format!("{:e}", self.pixel_weight),
+            "a number from 1e-20 to 1e6",
         )?;
         check(
             "window",

@@ -75,7 +75,7 @@ def test_what_kittis_poses_lack_is_asked_for(tmp_path):
         ldls.read_poses(path, T_camera_lidar=np.eye(4))
     with pytest.raises(ldls.PoseError, match="got no T_camera_lidar"):
         ldls.read_poses(path, stamps=STAMPS)
-    with pytest.raises(ldls.PoseError, match="poses.txt: stamps: there are 3 for 4 poses"):
+    with pytest.raises(ldls.PoseError, match="poses.txt: has 4 poses for 3 stamps"):
         ldls.read_poses(path, stamps=STAMPS[:3], T_camera_lidar=np.eye(4))
     with pytest.raises(ldls.CalibrationError, match="T_camera_lidar: R\\^T R deviates"):
         ldls.read_poses(path, stamps=STAMPS, T_camera_lidar=2 * np.eye(4))

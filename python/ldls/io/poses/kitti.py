@@ -40,5 +40,9 @@ def read(path: Path, *, stamps: ArrayLike | None = None, T_camera_lidar: Extrins
         poses[:, :3] = rows.reshape(-1, 3, 4)
         for number, pose in zip(lines, poses, strict=True):
             rigid(f"line {number}", pose, CorruptFileError)
+    if np.size(stamps) != len(rows):
+        raise PoseError(
+            f"{path}: has {len(rows)} poses for {np.size(stamps)} stamps, expected a line for each sweep of the drive"
+        )
     with within(path), np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
         return Trajectory(np.asarray(stamps), inverse(from_lidar) @ poses @ from_lidar)
