@@ -490,6 +490,11 @@ def test_misuse_is_named():
     tracker = ldls.Tracker()
     with pytest.raises(ldls.InputError, match="got 0 for 1 sweeps"):
         tracker.track([sweep], [])
+    later = sweep_at(0.6, [((6, 0), True)], category=2)
+    with pytest.raises(ldls.InputError, match="their instances differ, expected those of one call"):
+        tracker.track([sweep, later], [*results, *ldls.segment_sweeps([later], params=PARAMS)])
+    with pytest.raises(ldls.ShapeError, match="result: has 125 points, the sweep 250; give its own"):
+        tracker.track([sweep_at(0.5, [((6, 0), True), ((6, 2), True)])], results)
     tracker.track([sweep], results)
     with pytest.raises(ldls.InputError, match=r"one of 0\.5 s comes after one of 0\.5 s"):
         tracker.track([sweep], results)

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, transformed
 from ldls.checks import checked
-from ldls.errors import InputError, LimitError, ParameterError, ShapeError
+from ldls.errors import InputError, LimitError, ParameterError
 from ldls.segmentation import Segmentation
 from ldls.sequences.grid import cell_keys
-from ldls.sequences.sweeps import Sweep
+from ldls.sequences.sweeps import Sweep, check_points
 
 MOVED_M = 0.4
 MOVED_SHARE = 0.5
@@ -142,8 +142,7 @@ class LabelledMap:
             LimitError: A point is too far from the first sweep to be numbered, or the map has too many voxels. The map
                 stays as it was.
         """
-        if len(result.labels) != len(sweep.points):
-            raise ShapeError(f"result: has {len(result.labels)} points, the sweep {len(sweep.points)}; give its own")
+        check_points(sweep, result)
         rows = np.flatnonzero((result.labels >= 0) & np.isfinite(sweep.points[:, :3]).all(axis=1))
         labels = result.labels[rows]
         _check_tracked(result, labels)

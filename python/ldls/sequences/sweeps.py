@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ldls.camera.rigid import as_transform, brought_together, inverse, rigid
 from ldls.checks import checked
 from ldls.cloud import Points, as_points
-from ldls.errors import InputError, ParameterError
+from ldls.errors import InputError, ParameterError, ShapeError
 from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
@@ -145,6 +145,16 @@ def check_order(sweeps: Sequence[Sweep], after: float = -math.inf) -> None:
     for before, stamp in pairwise([after, *(sweep.stamp for sweep in sweeps)]):
         if not stamp > before:
             raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
+
+
+def check_points(sweep: Sweep, result: Segmentation) -> None:
+    """Refuse a result of another sweep, by its number of points.
+
+    Raises:
+        ShapeError: It has more or fewer.
+    """
+    if len(result.labels) != len(sweep.points):
+        raise ShapeError(f"result: has {len(result.labels)} points, the sweep {len(sweep.points)}; give its own")
 
 
 def _check_coordinates(points: Points) -> None:

@@ -10,7 +10,7 @@ whose very place it is. Other moments say more of points that images overlook, o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from ldls.segmentation import Instance, Segmentation
 from ldls.sequences.comparison import compared
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
-from ldls.sequences.sweeps import Sweep, check_order
+from ldls.sequences.sweeps import Sweep, check_order, check_points
 from ldls.sequences.track import MEMORY_S, Floats, Footprint, Sighting, Track
 
 LONGEST_GAP_S = 10.0
@@ -78,12 +78,15 @@ class Tracker:
         Raises:
             InputError: There is no sweep, or not one result a sweep; a sweep is not later than the one before it, or
                 results are not of one call of `segment_sweeps`.
+            ShapeError: A result has more or fewer points than its sweep.
         """
         if len(sweeps) != len(results) or not sweeps:
             raise InputError(f"results: got {len(results)} for {len(sweeps)} sweeps, expected one a sweep")
         check_order(sweeps, self._stamp)
-        if len({len(result.instances) for result in results}) > 1:
+        if len({tuple(_named(result)) for result in results}) > 1:
             raise InputError("results: their instances differ, expected those of one call of segment_sweeps")
+        for sweep, result in zip(sweeps, results, strict=True):
+            check_points(sweep, result)
         self._stamp = sweeps[-1].stamp
         instances = {instance.label: instance for instance in results[0].instances}
         seen = [_sightings(sweep, result) for sweep, result in zip(sweeps, results, strict=True)]
@@ -232,6 +235,11 @@ class Tracker:
         self._count += 1
         self._tracks.append(Track(self._count, instance))
         return self._tracks[-1]
+
+
+def _named(result: Segmentation) -> Iterator[tuple[int, int, str, float]]:
+    """What all sweeps of a call say alike of each instance."""
+    return ((each.label, each.category, each.name, each.score) for each in result.instances)
 
 
 def _relabelled(result: Segmentation, label_of: Mapping[int, int]) -> Segmentation:
