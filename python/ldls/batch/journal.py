@@ -2,10 +2,10 @@
 
 The first line holds the settings that labels depend on; a run goes on only with the same ones, but may add frames, and
 formats of their files. A journal in which no frame was ever done binds nobody: a run of other settings begins it anew.
-Frames are appended in the order in which they are finished, in groups, so that the disk need
-not be waited for after each; the last line of a frame counts, and one that a crash cut off is dropped. When all is done
-the lines are put in the order of the frames: every run of the same settings, formats and frames ends with the same
-bytes, whatever was done first.
+Frames are appended in the order in which they are finished, in groups, so that the disk need not be waited for after
+each; the last line of a frame counts, and one that a crash cut off is dropped. When all is done the lines are put in
+the order of the frames: every run of the same settings, formats and frames ends with the same bytes, whatever was done
+first.
 
 The line of a frame has its name, `frame`, and
 
@@ -30,7 +30,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any
 
-from ldls.batch.poses import FOUND
+from ldls.batch.poses import FOUND_POSES
 from ldls.errors import BatchError, CorruptFileError
 from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
 from ldls.segmentation.object_rows import COLUMNS
@@ -180,7 +180,7 @@ class Journal:
         """
         differences = list(_differences(header, self._header))
         # poses that the sweeps told are true of their source alone
-        binds = (self._folder / FOUND).is_file() and header.get("source") != self._header["source"]
+        binds = (self._folder / FOUND_POSES).is_file() and header.get("source") != self._header["source"]
         if differences and (binds or not all(map(_is_failure, rest))):
             raise BatchError(
                 f"{self._folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go "

@@ -24,7 +24,7 @@ from ldls.sequences import Trajectory
 
 ODOMETRY = "kiss-icp"
 """What stands in the place of a file where the sweeps themselves are to say how the lidar moved."""
-FOUND = "poses.txt"
+FOUND_POSES = "poses.txt"
 """File in the folder of the run that these poses are kept in, in TUM's format."""
 
 
@@ -37,7 +37,7 @@ def with_odometry(source: Source, settings: RunSettings, folder: Path) -> RunSet
     """
     if settings.poses != ODOMETRY:
         return settings
-    path = folder / FOUND
+    path = folder / FOUND_POSES
     if not path.is_file():
         trajectory = odometry_of(source)
         folder.mkdir(parents=True, exist_ok=True)

@@ -140,6 +140,8 @@ mod tests {
         assert_eq!((found.label(), found.lead()), (0, 0.0));
         assert_eq!(leader(&[(3, 0.0), (5, 0.0)]).label(), 0, "nothing came");
         let below = 0.5 * (1.0 - 1e-12);
+        let found = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
+        assert_eq!((found.label(), found.lead()), (1, 0.0));
         let found = leader(&[(1, below), (0, 0.25), (2, 0.5)]);
         assert_eq!((found.label(), found.lead()), (2, 0.5 - below));
     }
