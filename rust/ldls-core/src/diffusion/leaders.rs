@@ -76,8 +76,6 @@ pub(super) fn leaders(
 pub(super) struct Leader {
     /// The labels whose values are [`EQUAL`] to the largest, and these values.
     equal: Vec<(u32, f64)>,
-    /// The largest value that is not.
-    next: f64,
 }
 
 impl Leader {
@@ -88,14 +86,8 @@ impl Leader {
         }
         let largest = self.value().max(value);
         push(&mut self.equal, (label, value))?;
-        let next = &mut self.next;
-        self.equal.retain(|(_, value)| {
-            let is_equal = *value >= largest * (1.0 - EQUAL);
-            if !is_equal {
-                *next = value.max(*next);
-            }
-            is_equal
-        });
+        self.equal
+            .retain(|(_, value)| *value >= largest * (1.0 - EQUAL));
         Ok(())
     }
 
@@ -109,14 +101,6 @@ impl Leader {
         let labels = self.equal.iter().map(|(label, _)| *label);
         labels.min().unwrap_or(0)
     }
-
-    /// How far it is ahead of the next: not at all of equal ones.
-    pub(super) fn lead(&self) -> f64 {
-        match self.equal[..] {
-            [(_, value)] => value - self.next,
-            _ => 0.0,
-        }
-    }
 }
 
 #[cfg(test)]
@@ -125,25 +109,22 @@ mod tests {
     use crate::test_support::chain;
     use proptest::prelude::*;
 
-    fn leader(values: &[(u32, f64)]) -> Leader {
+    fn leading(values: &[(u32, f64)]) -> u32 {
         let mut leader = Leader::default();
         for &(label, value) in values {
             leader.offer(label, value).unwrap();
         }
-        leader
+        leader.label()
     }
 
     #[test]
     fn of_values_that_rounding_tells_apart_the_lowest_label_leads() {
         let below = 0.5 * (1.0 - f64::EPSILON);
-        let found = leader(&[(3, 0.5), (0, below), (7, 0.25)]);
-        assert_eq!((found.label(), found.lead()), (0, 0.0));
-        assert_eq!(leader(&[(3, 0.0), (5, 0.0)]).label(), 0, "nothing came");
+        assert_eq!(leading(&[(3, 0.5), (0, below), (7, 0.25)]), 0);
+        assert_eq!(leading(&[(3, 0.0), (5, 0.0)]), 0, "nothing came");
         let below = 0.5 * (1.0 - 1e-12);
-        let found = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
-        assert_eq!((found.label(), found.lead()), (1, 0.0));
-        let found = leader(&[(1, below), (0, 0.25), (2, 0.5)]);
-        assert_eq!((found.label(), found.lead()), (2, 0.5 - below));
+        assert_eq!(leading(&[(1, 0.5), (0, below), (2, 0.5)]), 1);
+        assert_eq!(leading(&[(1, below), (0, 0.25), (2, 0.5)]), 2);
     }
 
     proptest! {
@@ -160,9 +141,9 @@ mod tests {
             let first = values.iter().find(|(_, value)| *value >= largest * (1.0 - EQUAL));
             let mut shuffled = values.clone();
             shuffled.sort_by_key(|(label, _)| (u64::from(*label) + 1).wrapping_mul(seed | 1));
-            let [one, other] = [&values, &shuffled].map(|values| leader(values));
-            prop_assert_eq!(Some(one.label()), first.map(|(label, _)| *label));
-            prop_assert_eq!((one.label(), one.lead()), (other.label(), other.lead()));
+            let [one, other] = [&values, &shuffled].map(|values| leading(values));
+            prop_assert_eq!(Some(one), first.map(|(label, _)| *label));
+            prop_assert_eq!(one, other);
         }
     }
 

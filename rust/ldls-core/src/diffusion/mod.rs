@@ -84,7 +84,7 @@ pub fn diffuse(
         (a, b, &schedule),
         &mut winners,
         (&Errors { a, probed }, convergence.error),
-        (iterations, &trusted),
+        (iterations, trusted.first()),
         exact,
         cancel,
     )?;

@@ -1,14 +1,12 @@
 //! The points at which single precision cannot decide between labels.
 //!
-//! At most of many seeds alone show the winner, as where several masks show all that anything flows from. What seeds leave open is
-//! decided in double precision, with a series that leaves out next to nothing. Where that is little, one that leaves out little comes
-//! first, and tells most of it apart.
+//! At most of many seeds alone show the winner, as where several masks show all that anything flows from. What seeds leave open, and a
+//! few at once, is decided in double precision, with a series that leaves out next to nothing.
 
 use super::errors::Errors;
 use super::lanes::WIDTH_F32;
 use super::leaders::leaders;
 use super::pass::Pass;
-use super::passes;
 use super::schedule::Schedule;
 use super::series::Series;
 use super::spread::{TOGETHER, behind};
@@ -18,25 +16,20 @@ use crate::masks::PixelLabels;
 use crate::{Cancel, Result};
 use std::collections::BTreeMap;
 
-/// What the last series leaves out, as a share of the largest value.
+/// What the series leaves out, as a share of the largest value.
 const TOLERANCE: f64 = 1e-13;
-/// What the first one does.
-const FIRST_TOLERANCE: f64 = passes::TOLERANCE / 100.0;
-/// Points up to which they are a few. More are those of masks that lie over one another, most of whose labels are equal, and differ
-/// so little elsewhere that the first one would leave them open.
-const FEW: usize = 1 << 10;
-/// By how much a label must be ahead for the first one to be believed, as a share of the error in single precision; what it leaves
-/// out may be all that tells equal ones apart.
-const LEAD: f64 = 0.05;
+/// Points up to which they are a few: what flows to these is diffused in double precision in the time that it takes to look at all
+/// seeds. More are those of masks that lie over one another, most of whose labels are equal.
+const FEW: usize = 1 << 8;
 
 /// Puts right the best of `winners` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
-/// points. The `schedule` is that of `a`, `largest` the largest error, and `trusted` are the series that served in single precision or
-/// would have, the longest first. Other arguments as in [`super::diffuse`].
+/// points. The `schedule` is that of `a`, `largest` the largest error, and `series` one that can be trusted on every graph, for nobody
+/// watches what it leaves out here. Other arguments as in [`super::diffuse`].
 pub(super) fn decide(
     (a, b, schedule): (&PointGraph, &PixelLabels, &Schedule),
     winners: &mut Winners,
     (errors, largest): (&Errors, f64),
-    (iterations, trusted): (Option<usize>, &[Series]),
+    (iterations, series): (Option<usize>, Option<&Series>),
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
     cancel: &Cancel,
 ) -> Result<usize> {
@@ -44,36 +37,21 @@ pub(super) fn decide(
     let mut ties = winners.near_ties(largest, error)?;
     let best = &mut winners.best;
     let contested = ties.values().map(Vec::len).sum();
-    let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
-    settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
-    let open: usize = ties.values().map(Vec::len).sum();
-    let first = (open <= FEW).then_some((trusted.last(), FIRST_TOLERANCE, LEAD));
-    // nobody watches what the last one leaves out, so it is on the interval that can be trusted on every graph
-    let last = (trusted.first(), TOLERANCE, 0.0);
-    for (alike, tolerance, share) in first.into_iter().chain([last]) {
-        if ties.is_empty() {
-            break;
-        }
-        let candidates = candidates(&ties);
-        let series = alike.and_then(|alike| alike.within(tolerance, iterations));
-        let products = (series.as_ref(), iterations);
-        let points: Vec<u32> = ties.values().flatten().copied().collect();
-        let leaders = leaders(a, &points, &candidates, products, &exact, cancel)?;
-        let mut leaders = leaders.into_iter();
-        // all of them are asked about in this order
-        let mut is_open = |point: &u32| {
-            let Some(leader) = leaders.next() else {
-                return false;
-            };
-            let is_open = leader.lead() < share * error(*point);
-            if !is_open {
-                best[*point as usize].label = leader.label();
-            }
-            is_open
-        };
-        let sets = ties.values_mut();
-        sets.for_each(|points| points.retain(&mut is_open));
-        ties.retain(|_, points| !points.is_empty());
+    // endlessly many products take a look at all of the graph for one point as for all
+    if contested > FEW || iterations.is_none() {
+        let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
+        settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
+    }
+    if ties.is_empty() {
+        return Ok(contested);
+    }
+    let candidates = candidates(&ties);
+    let points: Vec<u32> = ties.into_values().flatten().collect();
+    let series = series.and_then(|series| series.within(TOLERANCE, iterations));
+    let products = (series.as_ref(), iterations);
+    let leaders = leaders(a, &points, &candidates, products, &exact, cancel)?;
+    for (point, leader) in points.iter().zip(leaders) {
+        best[*point as usize].label = leader.label();
     }
     Ok(contested)
 }
@@ -115,8 +93,12 @@ mod tests {
     use super::*;
     use crate::test_support::chain;
 
-    /// Labels of a chain, and how many points were looked at in double precision.
-    fn decided(weights: &[f64], seeds: &[&[(u32, f64)]]) -> (Vec<u32>, usize) {
+    /// Labels of a chain after so many products, and how many points were looked at in double precision.
+    fn decided_after(
+        iterations: Option<usize>,
+        weights: &[f64],
+        seeds: &[&[(u32, f64)]],
+    ) -> (Vec<u32>, usize) {
         let asked = std::cell::Cell::new(0);
         let exact = |among: Option<&[u32]>| {
             let (a, b) = chain(weights, seeds);
@@ -126,8 +108,16 @@ mod tests {
             }))
         };
         let (a, b) = chain(weights, seeds);
-        let found = diffuse(&a, &b, 8, Some(20), exact, Cancel::never()).unwrap();
+        let found = diffuse(&a, &b, 8, iterations, exact, Cancel::never()).unwrap();
         (found.labels, asked.get())
+    }
+
+    /// The same after endlessly many, where seeds come before the look, which labels after twenty are equal to.
+    fn decided(weights: &[f64], seeds: &[&[(u32, f64)]]) -> (Vec<u32>, usize) {
+        let found = decided_after(None, weights, seeds);
+        let (few, asked) = decided_after(Some(20), weights, seeds);
+        assert_eq!((&few, asked), (&found.0, weights.len()));
+        found
     }
 
     #[test]
@@ -153,11 +143,11 @@ mod tests {
 
     #[test]
     fn of_many_points_those_near_a_seed_of_one_label_have_it_and_all_others_the_lowest() {
-        let (n, one) = (2 * FEW, FEW);
+        let (n, one) = (2000, 1000);
         let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
         let mut seeds = vec![twins; n];
         seeds[one] = &[(2, 0.25)];
-        let (labels, _) = decided(&vec![0.2; n], &seeds);
+        let (labels, _) = decided_after(Some(20), &vec![0.2; n], &seeds);
         // eighteen edges away label 1 lacks two parts in 1e13, nineteen away less than rounding leaves of equal ones
         let expected = |point| {
             if (one - 18..=one).contains(&point) {
@@ -182,7 +172,7 @@ mod tests {
         let decided = |ahead: f64| {
             let own = [(1, 0.25), (2, 0.25 * (1.0 - 2e-5))];
             let next = [(2, 0.25 * (2e-5 + ahead) * 0.9 / 0.2)];
-            let (labels, asked) = decided(&[0.2; 3], &[&own, &next]);
+            let (labels, asked) = decided_after(Some(20), &[0.2; 3], &[&own, &next]);
             (labels[0], asked)
         };
         assert_eq!(decided(1e-5), (2, 0));
