@@ -223,6 +223,25 @@ def test_files_in_the_wrong_place_are_named(demo, tmp_path, words, message):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        pytest.param(["--converge", "--iterations", "3"], "--iterations: with --converge", id="steps to the end"),
+        pytest.param(["--diffusion", "2"], "--diffusion: a recording shows it", id="diffusion without a recording"),
+        pytest.param(["--image-id", "5"], "--image-id: which image of --masks", id="the image of a segmenter's masks"),
+    ],
+)
+def test_options_that_would_change_nothing_are_refused(demo, tmp_path, words, message):
+    files = arguments(demo[0], tmp_path / "out")
+    if "--image-id" in words:
+        at = files.index("--masks")
+        files[at : at + 2] = ["--segmenter", "boxes:boxes.txt"]
+    outcome = run(app, [*files, *words])
+    assert outcome.exit_code == 1
+    assert message in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("command", [["view"], ["explain", "5"]], ids=["view", "explain"])
 def test_labels_without_points_are_refused_with_what_is_needed(demo, command):
     outcome = run(app, [*command, str(demo[0] / "demo.label")])

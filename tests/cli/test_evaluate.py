@@ -280,6 +280,12 @@ def test_options_reach_the_scores(frames):
     assert [row["FN"] for row in rows if row["class"] == "Pedestrian"] == [0, 0]
 
 
+def test_images_without_the_cameras_that_took_them_are_refused(frames):
+    outcome = evaluate(frames, "--image", frames)
+    assert outcome.exit_code == 1
+    assert "--image: its images say what a camera of --calib sees" in outcome.stderr
+
+
 def test_range_comes_of_the_points(frames):
     for name in "12":
         np.save(frames / f"{name}.npy", np.array([[1, 0, 0], [30, 0, 0], [1, 1, 0], [2, 0, 0]], np.float32))

@@ -179,6 +179,8 @@ def test_frames_that_fail_are_named_and_passed_over(tmp_path):
         pytest.param(["frame.npz", "--image", "nothing.png"], "nothing.png", id="no such image"),
         pytest.param(["kitti", "--image", "image.png"], "kitti is a source", id="an image of a source"),
         pytest.param(["kitti", "--min-score", "0.5"], "choose among", id="scores without masks"),
+        pytest.param(["kitti", "--results", "kitti", "--min-score", "0"], "--min-score", id="scores of labels"),
+        pytest.param(["frame.npz", "--picture", "a.png", "--diffusion", "2"], "--rerun", id="diffusion of a picture"),
         pytest.param(["kitti", "--frames", "7:9"], "has 3 frames", id="no such frames"),
         pytest.param(["kitti", "--masks", "m", "--results", "kitti"], "one of them", id="labels from two places"),
         pytest.param(["kitti", "--results", "kitti"], "--formats npz", id="results of another format"),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import ScoredOption, words
+from ldls.cli.options import ScoredOption, refuse, words
 from ldls.cli.progress import progress
 from ldls.cli.reliability_files import draw_reliability
 from ldls.errors import ParameterError
@@ -121,6 +121,8 @@ def evaluate(
     from ldls.evaluation.methods import BOUND
     from ldls.io.labels.label_formats import pair_files
 
+    if calib is None:
+        refuse({"image": image}, "its images say what a camera of --calib sees, and there is none")
     scored = ClassSet.kitti(
         words(categories),
         merge_sitting=merge_sitting,

@@ -20,6 +20,7 @@ from ldls.cli.frame_files import (
     camera_of,
 )
 from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import refuse
 from ldls.errors import InputError
 
 
@@ -102,7 +103,16 @@ def explain(
     from ldls.label_diffusion import segment
 
     if result is not None:
-        _refuse_files(points, calib, masks, image_id, extrinsic)
+        of_sweep = {
+            "points": points,
+            "calib": calib,
+            "masks": masks,
+            "image-id": image_id,
+            "extrinsic": extrinsic,
+            "fisheye": fisheye,
+            "rectified": rectified,
+        }
+        refuse(of_sweep, "given beside RESULT, which has points, camera and masks")
         segmentation, view = read_result(result), camera
     else:
         if points is None or calib is None or masks is None:
@@ -123,18 +133,3 @@ def explain(
             # a program that reads the sentences gets each as one line
             one_line = isinstance(part, str) and not screen.is_terminal
             screen.print(part, highlight=False, markup=False, soft_wrap=one_line)
-
-
-def _refuse_files(
-    points: Path | None, calib: Path | None, masks: Path | None, image_id: int | None, extrinsic: Path | None
-) -> None:
-    options = {
-        "--points": points,
-        "--calib": calib,
-        "--masks": masks,
-        "--image-id": image_id,
-        "--extrinsic": extrinsic,
-    }
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise InputError(f"{given[0]}: given beside RESULT, which has points, camera and masks; leave one of them out")

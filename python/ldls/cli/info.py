@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.options import refuse
 from ldls.cli.progress import progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption, parse_options
 from ldls.errors import ParameterError
@@ -57,6 +58,8 @@ def info(
     """
     from ldls.datasets.inspection import check_stamps, inspect, sample
 
+    if picture is None:
+        refuse({"frame": frame}, "the frame to draw, and there is no --picture")
     frames = opened(source, dataset, parse_options(option or []))
     indices = list(range(len(frames))) if every else sample(len(frames), LOOKED_AT)
     facts = [inspect(frames, at) for at in progress(indices, len(indices), "looking at frames")]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console
-from ldls.cli.options import words
+from ldls.cli.options import refuse, words
 from ldls.errors import InputError
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def masks_of(
 
     Raises:
         InputError: Neither or both are given, or a segmenter and no image.
+        ParameterError: A segmenter is given, and which image of a file it is.
         MaskError: The masks are of an image of another size.
     """
     if (masks is None) == (segmenter is None):
@@ -59,6 +60,7 @@ def masks_of(
         return wanted(stored, min_score=min_score, categories=categories)
     from ldls.segmenters import open_segmenter
 
+    refuse({"image-id": image_id}, "which image of --masks it is, and --segmenter makes masks of --image")
     assert segmenter is not None
     opened = open_segmenter(segmenter, min_score=min_score)
     if image is None:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
+from ldls.cli.options import refuse
 from ldls.params import Params
 
 R = TypeVar("R")
@@ -65,8 +66,10 @@ def _params_of(*, paper: bool, converge: bool, **given: Any) -> Params:  # noqa:
     """The parameters that the options give.
 
     Raises:
-        ParameterError: One is out of range.
+        ParameterError: One is out of range, or says other than --converge.
     """
+    if converge:
+        refuse({"iterations": given["iterations"]}, "with --converge it takes as many as it takes")
     base = Params.paper() if paper else Params()
     values = {field.name: getattr(base, field.name) for field in fields(Params)}
     values |= {name: value for name, value in given.items() if value is not None}

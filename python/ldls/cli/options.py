@@ -77,5 +77,5 @@ def refuse(options: Mapping[str, object], why: str) -> None:
         ParameterError: One was.
     """
     for name, value in options.items():
-        if value:
+        if value is not None:
             raise ParameterError(f"--{name}: {why}; leave it out")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ldls.cli.options import refuse
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -44,17 +46,20 @@ def every_of(diffusion: int | None, n_frames: int) -> int | None:
     return diffusion or None
 
 
-def check_recording(target: str | None) -> None:
+def check_recording(target: str | None, diffusion: int | None = None) -> None:
     """Refuse a target that cannot be recorded to, before any work is done.
 
     Raises:
-        ParameterError: It is neither a file that ends in .rrd nor "spawn".
+        ParameterError: It is neither a file that ends in .rrd nor "spawn", or there is none and the diffusion is to be
+            recorded.
         ImportError: The extra `viz` is not installed.
     """
-    if target is not None:
-        from ldls.viewing.recording.session import check_target
+    if target is None:
+        refuse({"diffusion": diffusion}, "a recording shows it, and there is no --rerun")
+        return
+    from ldls.viewing.recording.session import check_target
 
-        check_target(target)
+    check_target(target)
 
 
 def record(

@@ -99,7 +99,7 @@ def segment(
     from ldls.viewing.files import check_picture, save_pictures
     from ldls.viewing.formats import check_formats, write_formats
 
-    check_recording(rerun)
+    check_recording(rerun, diffusion)
     wanted = words(formats)
     check_formats(wanted)
     if picture is not None:

@@ -90,7 +90,7 @@ def view(
 
     name = path.resolve().stem
     target = rerun if picture is not None else rerun or default_target(name)
-    check_recording(target)
+    check_recording(target, diffusion)
     if picture is not None:
         from ldls.io.files import check_folder
         from ldls.viewing.files import check_picture
