@@ -156,6 +156,23 @@ def test_objects_of_a_drive_keep_their_numbers(drive):
     assert len(set.intersection(*map(set, shown))) > 3
 
 
+def test_a_sweep_of_several_is_recorded_without_its_diffusion(drive, capfd):
+    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1"]
+    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    first = f"out/{ldls.datasets.open_source(drive).names[0]}.npz"
+    for words in ([first], [drive, "--results", "out", "--frames", "0:1"]):
+        done = run(*words, "--rerun", "one.rrd")
+        assert done.exit_code == 0, done.output
+        assert done.output.count("without its diffusion: its graph has 3 sweeps") == 1
+        found = Recorded("one.rrd")
+        assert "world/points" in found.entities and "diffusion/points" not in found.entities
+        none = run(*words, "--rerun", "one.rrd", "--diffusion", 0)
+        assert none.exit_code == 0 and "without its diffusion" not in none.output
+        wished = run(*words, "--rerun", "none.rrd", "--diffusion", 5)
+        assert wished.exit_code == 1 and "error: --diffusion: cannot be shown, its graph has 3 sweeps" in wished.stderr
+        assert not Path("none.rrd").exists() and "Dropping data" not in capfd.readouterr().err
+
+
 def test_frames_that_fail_are_named_and_passed_over(tmp_path):
     source = layouts.kitti_object(tmp_path / "kitti")
     (source / "velodyne/000001.bin").write_bytes(b"123")

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ldls.cli.messages import console
 from ldls.cli.options import refuse
+from ldls.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,20 +32,30 @@ DiffusionOption = Annotated[
         min=0,
         metavar="K",
         help="Record how labels spread, a picture every K products; 0 for none.",
-        show_default="1 of one frame, none of several",
+        show_default="1 of one frame, none of several or of a run with --sweeps",
     ),
 ]
 ONLY_CAMERA = "camera 0"
 """Name in recordings of the camera of a frame that does not name it."""
 
 
-def every_of(diffusion: int | None, n_frames: int) -> int | None:
-    """Products from one picture of the diffusion to the next, None for no pictures."""
+def every_of(diffusion: int | None, result: Segmentation, *, alone: bool) -> int | None:
+    """Products from one picture of a result's diffusion to the next, None for no pictures.
+
+    Raises:
+        InputError: Pictures are asked for, and the result was labelled together with other sweeps.
+    """
     from ldls.viewing.recording.diffusion import EVERY
 
-    if diffusion is None:
-        return EVERY if n_frames == 1 else None
-    return diffusion or None
+    if diffusion == 0 or (diffusion is None and not alone):
+        return None
+    if result.report.n_sweeps == 1:
+        return diffusion or EVERY
+    why = f"its graph has {result.report.n_sweeps} sweeps, of which the result holds one"
+    if diffusion is not None:
+        raise InputError(f"--diffusion: cannot be shown, {why}; leave it out, or label the sweep without --sweeps")
+    console().print(f"recorded without its diffusion: {why}", highlight=False, soft_wrap=True)
+    return None
 
 
 def check_recording(target: str | None, diffusion: int | None = None) -> None:
@@ -74,7 +86,7 @@ def record(
     from ldls.viewing.recording import open_recording
 
     with open_recording(target, name=name) as recording:
-        recording.add(result, images=images, name=name, diffusion=every_of(diffusion, 1), alone=True)
+        recording.add(result, images=images, name=name, diffusion=every_of(diffusion, result, alone=True), alone=True)
     return where_recorded(target)
 
 

@@ -104,7 +104,7 @@ def show_frames(
     from ldls.viewing import save_pictures
     from ldls.viewing.recording import open_recording
 
-    every = every_of(diffusion, len(indices))
+    alone = len(indices) == 1
     failures: list[tuple[str, Exception]] = []
     with nullcontext() if target is None else open_recording(target, name=name) as recording:
         for index in progress(indices, len(indices), "drawing" if recording is None else "recording"):
@@ -126,8 +126,8 @@ def show_frames(
                         truth=frame.truth,
                         name=frame.name,
                         stamp=frame.stamp,
-                        diffusion=every,
-                        alone=len(indices) == 1,
+                        diffusion=every_of(diffusion, result, alone=alone),
+                        alone=alone,
                     )
             except (LdlsError, OSError) as error:
                 failures.append((source.names[index], error))

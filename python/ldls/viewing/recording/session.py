@@ -64,11 +64,15 @@ def open_recording(target: str | PathLike[str], *, name: str = "") -> Iterator[R
         else:
             # Rerun's own writer waits for ever once a disk is full
             encoded = stream.binary_stream()
-            with whole_file(target) as file:
-                recording = Recording(stream, contexts="held")
-                yield recording
-                recording.log_held_contexts()
-                file.write(encoded.read())
+            try:
+                with whole_file(target) as file:
+                    recording = Recording(stream, contexts="held")
+                    yield recording
+                    recording.log_held_contexts()
+                    file.write(encoded.read())
+            finally:
+                # of what is left of a recording that failed, Rerun would warn
+                encoded.read()
     finally:
         stream.disconnect()
 
