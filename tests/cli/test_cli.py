@@ -55,6 +55,23 @@ def test_segment_on_the_files_of_the_demo_gives_the_same(demo, tmp_path):
         assert (tmp_path / f"seen{kind}.png").read_bytes() == (folder / f"demo{kind}.png").read_bytes()
 
 
+@pytest.mark.parametrize("name", ["truck [parked]", "truck [/parked]", "truck [red]:car:"])
+def test_names_and_paths_are_printed_as_they_are(demo, tmp_path, name):
+    masks = ldls.read_masks(demo[0] / "input/masks.npz")
+    named = ldls.InstanceMasks.from_array(masks.to_array(), categories=[1] * len(masks), names={1: name})
+    ldls.save(named, tmp_path / "masks.npz")
+    out = tmp_path / name
+    out.mkdir(parents=True)
+    outcome = run(app, arguments(demo[0], out, masks=tmp_path / "masks.npz", formats="npz"))
+    assert outcome.exit_code == 0, outcome.output
+    assert f" {name} " in outcome.output and f"wrote {out / 'points.npz'}" in outcome.output
+    point = np.flatnonzero(ldls.read_result(out / "points.npz").labels > 0)[0]
+    explained = run(app, ["explain", str(point), str(out / "points.npz")])
+    assert explained.exit_code == 0 and f" {name} " in explained.output and "\\[" not in explained.output
+    shown = run(app, ["masks", "show", str(tmp_path / "masks.npz")])
+    assert shown.exit_code == 0 and f" {name} " in shown.output
+
+
 @pytest.mark.parametrize("ending", ["csv", "json"])
 def test_segment_writes_a_table_of_the_objects(demo, tmp_path, ending):
     outcome = run(app, arguments(demo[0], tmp_path / "out", objects=tmp_path / f"out/objects.{ending}"))

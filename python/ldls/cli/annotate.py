@@ -59,8 +59,8 @@ def annotate(
     screen = console()
     screen.print(summary(n_objects, n_points))
     if clean:
-        screen.print(f"{n_ground:,} points of ground under objects left them", highlight=False)
-    screen.print(f"wrote {len(labels)} files to {out}", highlight=False, soft_wrap=True)
+        screen.print(f"{n_ground:,} points of ground under objects left them")
+    screen.print(f"wrote {len(labels)} files to {out}", soft_wrap=True)
 
 
 def label_paths(training: Path) -> list[Path]:

@@ -59,11 +59,11 @@ def demo(
     screen.print(object_table(result.objects))
     screen.print(timing_table(result.timings))
     screen.print(accuracy_table(result, frame.truth.instances))
-    screen.print("wrote " + " ".join(map(str, written)), highlight=False, soft_wrap=True)
-    screen.print(f"the same from files: {command}", highlight=False, soft_wrap=True)
+    screen.print("wrote " + " ".join(map(str, written)), soft_wrap=True)
+    screen.print(f"the same from files: {command}", soft_wrap=True)
     if rerun is not None:
         said = record(result, rerun, name="demo", images={ONLY_CAMERA: rgb})
-        screen.print(said, highlight=False, soft_wrap=True)
+        screen.print(said, soft_wrap=True)
 
 
 def accuracy_table(result: Segmentation, truth: NDArray[np.int32]) -> Table:

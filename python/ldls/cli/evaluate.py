@@ -139,7 +139,7 @@ def evaluate(
             path, true_path, prediction_format=format, truth_format=true_format, missing=missing.value
         )
         if lacking:
-            console().print(f"{method}: left out for want of their pair: {_frames(len(lacking))}", highlight=False)
+            console().print(f"{method}: left out for want of their pair: {_frames(len(lacking))}")
     if track and any(frame.truth.format == BOXES for own in files.values() for frame in own):
         raise ParameterError(
             f"--track: TRUTH is {BOXES}, which numbers the objects of each frame anew; expected a format whose numbers "
@@ -217,7 +217,7 @@ def _show(by_method: dict[str, Evaluation], left_out_by: set[str], out: Path | N
     _say_what_counted(by_method, left_out_by)
     if out:
         written = [f"{', '.join(shown)} and frames as .md, .csv and .json", *(path.name for path in figures)]
-        screen.print(f"wrote {', '.join(written)} to {out}", highlight=False, soft_wrap=True)
+        screen.print(f"wrote {', '.join(written)} to {out}", soft_wrap=True)
 
 
 def _say_what_counted(by_method: dict[str, Evaluation], left_out_by: set[str]) -> None:
@@ -230,12 +230,12 @@ def _say_what_counted(by_method: dict[str, Evaluation], left_out_by: set[str]) -
         why = f"no method is scored on those out of view by {', '.join(sorted(left_out_by))}"
     screen = console()
     if len({*said.values()}) == 1:
-        screen.print(f"{next(iter(said.values()))}; {why}", highlight=False, soft_wrap=True)
+        screen.print(f"{next(iter(said.values()))}; {why}", soft_wrap=True)
         return
     for method, counts in said.items():
-        screen.print(f"{method}: {counts}", highlight=False)
-    screen.print(why, highlight=False, soft_wrap=True)
-    screen.print("the methods label different points: their scores do not compare", highlight=False)
+        screen.print(f"{method}: {counts}")
+    screen.print(why, soft_wrap=True)
+    screen.print("the methods label different points: their scores do not compare")
 
 
 def _frames(number: int) -> str:

@@ -132,4 +132,4 @@ def explain(
         if part:
             # a program that reads the sentences gets each as one line
             one_line = isinstance(part, str) and not screen.is_terminal
-            screen.print(part, highlight=False, markup=False, soft_wrap=one_line)
+            screen.print(part, soft_wrap=one_line)

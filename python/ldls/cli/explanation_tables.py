@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from rich.markup import escape
 from rich.table import Table
 
 from ldls.explaining import Components, Explanation, Likelihood, Neighbor, Sight
@@ -43,11 +42,11 @@ def sight_table(explanation: Explanation) -> Table:
     table.add_column("pixels of its window")
     for sight in explanation.sights:
         table.add_row(
-            escape(sight.camera),
+            sight.camera,
             "-" if sight.depth_m is None else f"{sight.depth_m:.2f} m",
             "-" if sight.pixel is None else "{:.1f}, {:.1f}".format(*sight.pixel),
-            escape(_nearest_pixel(explanation, sight)),
-            escape(_window(explanation, sight)),
+            _nearest_pixel(explanation, sight),
+            _window(explanation, sight),
         )
     return table
 
@@ -75,7 +74,7 @@ def likelihood_table(explanation: Explanation) -> Table:
     listed = [each for each in explanation.likelihoods if _is_listed(explanation, each)]
     for each in listed:
         table.add_row(
-            escape(named(explanation, each.label)),
+            named(explanation, each.label),
             f"{each.value:.6f}",
             percent(each.share),
             _standing(explanation, each),
@@ -103,7 +102,7 @@ def edge_table(explanation: Explanation) -> Table:
             f"{each.distance_m:.3f} m",
             f"{each.weight:.4f}",
             percent(each.share),
-            escape(_object(explanation, each)) + (", weakened: leaves the ground" if each.leaves_ground else ""),
+            _object(explanation, each) + (", weakened: leaves the ground" if each.leaves_ground else ""),
         )
     table.add_row(f"its {pixels} pixels", "", "", percent(explanation.edges.pixels), _labels_of_pixels(explanation))
     return table
@@ -111,7 +110,7 @@ def edge_table(explanation: Explanation) -> Table:
 
 def component_table(explanation: Explanation, components: Components) -> Table:
     """The components of the points that diffusion gave one label, the largest and that of the point."""
-    table = Table(title=escape(f"components of {named(explanation, components.label)}"))
+    table = Table(title=f"components of {named(explanation, components.label)}")
     parts = components.removal and components.part_gap > 0
     table.add_column("points", justify="right")
     if parts:

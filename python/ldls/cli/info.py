@@ -71,13 +71,13 @@ def info(
         if table is not None:
             screen.print(table)
     if not frames.camera_names:
-        screen.print(NO_IMAGES, highlight=False, soft_wrap=True)
+        screen.print(NO_IMAGES, soft_wrap=True)
     screen.print(
         finding_table(findings) if findings else f"looked at {len(facts)} of {len(frames)} frames, found nothing wrong"
     )
     if picture is not None:
         write_picture(chosen_frame(frames, frame), picture)
-        screen.print(f"wrote {picture}", highlight=False, soft_wrap=True)
+        screen.print(f"wrote {picture}", soft_wrap=True)
     if any(finding.broken for finding in findings):
         raise typer.Exit(1)
 
@@ -100,7 +100,6 @@ def opened(path: Path, dataset: str | None, options: dict[str, Any]) -> Source:
 
 def topic_table(source: Source) -> Table | None:
     """Name, type and number of messages of each topic of a bag; None of other sources."""
-    from rich.markup import escape
     from rich.table import Table
 
     from ldls.datasets.rosbag import RosBag
@@ -111,7 +110,7 @@ def topic_table(source: Source) -> Table | None:
     for heading in ("topic", "type", "messages"):
         table.add_column(heading, justify="right" if heading == "messages" else "left", overflow="fold")
     for topic in source.all_topics:
-        table.add_row(escape(topic.name), escape(topic.type), f"{topic.count:,}")
+        table.add_row(topic.name, topic.type, f"{topic.count:,}")
     return table
 
 
@@ -124,35 +123,33 @@ def stamps_of(source: Source) -> tuple[float | None, ...]:
 
 def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[float | None]) -> Table:
     """Kind, frames, time, poses, masks, points and truth."""
-    from rich.markup import escape
     from rich.table import Table
 
     from ldls.datasets.file_source import counts_of
     from ldls.datasets.inspection import classes_of
     from ldls.datasets.stored_masks import own_masks
 
-    table = Table(title=escape(str(source.path)), show_header=False)
+    table = Table(title=str(source.path), show_header=False)
     table.add_row("kind", source.kind)
-    table.add_row("frames", escape(f"{len(source):,} ({_range(source.names[0], source.names[-1])})"))
+    table.add_row("frames", f"{len(source):,} ({_range(source.names[0], source.names[-1])})")
     left_out = getattr(source, "left_out", {}).values()
     if left_out:
         table.add_row("left out", f"{len(left_out):,} ({counts_of(left_out)})")
     table.add_row("time", _time(stamps))
-    table.add_row("poses", escape(_poses(source, facts)))
+    table.add_row("poses", _poses(source, facts))
     counts = [each.n_points for each in facts if each.n_points] or [0]
     masks = ", ".join(f"{camera}: {place}" for camera, place in own_masks(source).items())
-    table.add_row("masks", escape(masks) or "none of its own")
+    table.add_row("masks", masks or "none of its own")
     table.add_row("points a frame", _range(f"{min(counts):,}", f"{max(counts):,}"))
     classes = classes_of(facts)
     labelled = sum(each.truth is not None for each in facts)
     named = ", ".join(f"{name} {count:,}" for name, count in classes.items())
-    table.add_row("truth", escape(f"points in {labelled} of {len(facts)} frames: {named}") if labelled else "none")
+    table.add_row("truth", f"points in {labelled} of {len(facts)} frames: {named}" if labelled else "none")
     return table
 
 
 def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
     """A row for each camera of the first frame that was read; None where none was."""
-    from rich.markup import escape
     from rich.table import Table
 
     from ldls.datasets.inspection import field_of_view_deg
@@ -170,7 +167,7 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
         offsets = [each.offsets_s[image.name] for each in facts if image.name in each.offsets_s]
         height, width = image.camera.image_size or (0, 0)
         table.add_row(
-            escape(image.name),
+            image.name,
             f"{height} x {width}",
             image.camera.distortion.model,
             f"{across:.0f} x {down:.0f}",
@@ -182,7 +179,6 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
 
 def finding_table(findings: Sequence[Finding]) -> Table:
     """The findings, the broken first."""
-    from rich.markup import escape
     from rich.table import Table
 
     broken = sum(finding.broken for finding in findings)
@@ -191,7 +187,7 @@ def finding_table(findings: Sequence[Finding]) -> Table:
         table.add_column(heading, overflow="fold")
     in_order = sorted(findings, key=lambda finding: not finding.broken)
     for finding in in_order[:SHOWN]:
-        table.add_row("broken" if finding.broken else "look", escape(finding.frame), escape(finding.what))
+        table.add_row("broken" if finding.broken else "look", finding.frame, finding.what)
     if len(findings) > SHOWN:
         table.add_row("", "", f"and {len(findings) - SHOWN:,} more")
     return table

@@ -36,7 +36,7 @@ def init(
     screen = console()
 
     def say(text: str) -> None:
-        screen.print(text, highlight=False, markup=False, soft_wrap=True)
+        screen.print(text, soft_wrap=True)
 
     path = folder / FILE
     if path.exists():

@@ -81,9 +81,7 @@ def say_own_masks(source: Source, masks: str | None, segmenter: str | None) -> b
     if masks is not None or segmenter is not None or not places:
         return False
     named = ", ".join(f"{camera}: {place}" for camera, place in places.items())
-    console().print(
-        f"masks are those that {source.path} names ({named})", highlight=False, markup=False, soft_wrap=True
-    )
+    console().print(f"masks are those that {source.path} names ({named})", soft_wrap=True)
     return True
 
 

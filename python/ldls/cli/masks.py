@@ -141,7 +141,7 @@ def convert(
     if resolve is not None:
         kept = kept.resolve_overlaps(resolve.value)
     save(kept, out, **(VARIANTS[variant] if variant else {}))
-    console().print(f"wrote {len(kept)} of {len(read)} masks to {out}", highlight=False, soft_wrap=True)
+    console().print(f"wrote {len(kept)} of {len(read)} masks to {out}", soft_wrap=True)
 
 
 @app.command(cls=Command)
@@ -167,7 +167,7 @@ def make(
     made = masks_of(pixels, masks=None, segmenter=segmenter, min_score=min_score, categories=categories)
     save(made, out)
     _show(made, pixels, picture)
-    console().print(f"wrote {out}", highlight=False, soft_wrap=True)
+    console().print(f"wrote {out}", soft_wrap=True)
 
 
 @app.command(cls=Command)
@@ -199,7 +199,7 @@ def _show(masks: InstanceMasks, pixels: np.ndarray | None, picture: Path | None)
     console().print(mask_table(masks))
     if picture is not None:
         save_picture(picture, masks_overlay(masks, pixels))
-        console().print(f"wrote {picture}", highlight=False, soft_wrap=True)
+        console().print(f"wrote {picture}", soft_wrap=True)
 
 
 def mask_table(masks: InstanceMasks) -> Table:

@@ -115,6 +115,11 @@ def timing_table(timings: Mapping[str, float]) -> Table:
 
 
 def console() -> Console:
-    """Return the console for tables: as wide as the terminal, and wide enough where there is none; silent if quiet."""
-    terminal = Console(quiet=is_quiet(), emoji=False)
-    return terminal if terminal.is_terminal else Console(width=100, quiet=is_quiet(), emoji=False)
+    """Return the console for tables: as wide as the terminal, and wide enough where there is none; silent if quiet.
+
+    It prints text as it is: names and paths may hold square brackets and colons, which mean something to Rich.
+    """
+    screen = Console(quiet=is_quiet(), markup=False, highlight=False, emoji=False)
+    if not screen.is_terminal:
+        screen.width = 100
+    return screen

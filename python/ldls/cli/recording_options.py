@@ -54,7 +54,7 @@ def every_of(diffusion: int | None, result: Segmentation, *, alone: bool) -> int
     why = f"its graph has {result.report.n_sweeps} sweeps, of which the result holds one"
     if diffusion is not None:
         raise InputError(f"--diffusion: cannot be shown, {why}; leave it out, or label the sweep without --sweeps")
-    console().print(f"recorded without its diffusion: {why}", highlight=False, soft_wrap=True)
+    console().print(f"recorded without its diffusion: {why}", soft_wrap=True)
     return None
 
 

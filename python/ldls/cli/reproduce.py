@@ -78,8 +78,8 @@ def reproduce(
         table.write(out, stem)
         screen.print(table.rich())
     figures = _draw(experiment, out) + draw_reliability(experiment.methods, out)
-    screen.print(f"{len(frames)} frames; wrote {', '.join(tables)} as .md, .csv and .json", highlight=False)
-    screen.print(f"and {', '.join(path.name for path in figures)} to {out}", highlight=False, soft_wrap=True)
+    screen.print(f"{len(frames)} frames; wrote {', '.join(tables)} as .md, .csv and .json")
+    screen.print(f"and {', '.join(path.name for path in figures)} to {out}", soft_wrap=True)
 
 
 def _folder(folder: Path | None, suite: SuitePart | None) -> Path:

@@ -160,11 +160,11 @@ def run(
             raise typer.Exit(STOPPED) from None
     show(summary, out)
     if objects is not None:
-        console().print(f"objects in {objects}", highlight=False, soft_wrap=True)
+        console().print(f"objects in {objects}", soft_wrap=True)
     if track:
-        console().print(f"tracks in {out / 'tracks'} and {out / 'tracks.csv'}", highlight=False, soft_wrap=True)
+        console().print(f"tracks in {out / 'tracks'} and {out / 'tracks.csv'}", soft_wrap=True)
     if map_file is not None:
-        console().print(f"map in {map_file}", highlight=False, soft_wrap=True)
+        console().print(f"map in {map_file}", soft_wrap=True)
     if summary.failures:
         raise typer.Exit(FRAMES_FAILED)
 
@@ -191,7 +191,7 @@ def show(summary: Summary, out: Path) -> None:
         counts.append(f"{summary.n_nothing_in_view:,} with nothing in view")
     if summary.seconds:
         counts.append(f"{summary.frames_per_second:.1f} frames a second")
-    screen.print(f"{', '.join(counts)}; results in {out}", highlight=False, soft_wrap=True)
+    screen.print(f"{', '.join(counts)}; results in {out}", soft_wrap=True)
 
 
 def object_counts(summary: Summary) -> Table:

@@ -131,11 +131,11 @@ def segment(
     screen.print(object_table(result.objects))
     screen.print(timing_table(result.timings))
     report = result.report
-    screen.print(f"{report.n_in_view:,} of {report.n_points:,} points in view", highlight=False)
+    screen.print(f"{report.n_in_view:,} of {report.n_points:,} points in view")
     if report.n_nonfinite:
-        screen.print(f"{report.n_nonfinite:,} points are not finite and were left out", highlight=False)
-    screen.print("wrote " + " ".join(map(str, written)), highlight=False, soft_wrap=True)
+        screen.print(f"{report.n_nonfinite:,} points are not finite and were left out")
+    screen.print("wrote " + " ".join(map(str, written)), soft_wrap=True)
     if rerun is not None:
         pictures = None if pixels is None else {ONLY_CAMERA: pixels}
         said = record(result, rerun, name=name, images=pictures, diffusion=diffusion)
-        screen.print(said, highlight=False, soft_wrap=True)
+        screen.print(said, soft_wrap=True)

@@ -206,9 +206,9 @@ def _follow(frames: Iterator[FrameSummary | None], total: int, where: Path) -> N
     if made:
         screen.print(summary_table(made))
     kept = len(summaries) - len(made)
-    screen.print(f"wrote {len(made)} frames to {where}", highlight=False, soft_wrap=True)
+    screen.print(f"wrote {len(made)} frames to {where}", soft_wrap=True)
     if kept:
-        screen.print(f"kept {kept} that were there; delete them to make them anew", highlight=False)
+        screen.print(f"kept {kept} that were there; delete them to make them anew")
 
 
 def _write_bag(
@@ -219,4 +219,4 @@ def _write_bag(
     screen = console()
     with screen.status("simulating"):
         path = write_robot_drive(out, layout.value, frames=frames, seed=seed, segmenter=segmenter, spinning=spinning)
-    screen.print(f"wrote {frames} sweeps to {path}, masks and annotations beside it", highlight=False, soft_wrap=True)
+    screen.print(f"wrote {frames} sweeps to {path}, masks and annotations beside it", soft_wrap=True)

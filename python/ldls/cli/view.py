@@ -113,13 +113,13 @@ def view(
             source, indices, label=label, picture=picture, target=target, name=name, diffusion=diffusion
         )
         for failure in failures:
-            console().print(failure, highlight=False, soft_wrap=True)
+            console().print(failure, soft_wrap=True)
         message = f"{len(indices) - len(failures):,} of {len(source):,} frames"
         if picture is not None:
             message += f"; wrote {picture.stem}-FRAME{picture.suffix} and others to {picture.parent}"
         if target is not None:
             message += f"; {where_recorded(target)}"
-    console().print(message, highlight=False, soft_wrap=True)
+    console().print(message, soft_wrap=True)
     if failures:
         raise typer.Exit(FRAMES_FAILED)
 
