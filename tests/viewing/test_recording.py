@@ -253,6 +253,18 @@ def test_a_distorted_lens_stands_as_a_pinhole_and_its_points_are_exact(tmp_path,
     np.testing.assert_allclose(uv, result.pixels + 0.5, rtol=1e-6)
 
 
+@pytest.mark.parametrize("stamp", [1.7e12, 1.7e18, -1.7e18, np.nan, np.inf])
+def test_stamps_that_are_no_seconds_are_refused(tmp_path, result, stamp):
+    with open_recording(tmp_path / "a.rrd") as made:
+        made.add(result, stamp=0.0)
+        with pytest.raises(ldls.ParameterError, match="^stamp: got .*, expected seconds"):
+            made.add(result, stamp=stamp)
+        assert made.n_frames == 1
+        made.add(result, stamp=9e9)
+    rows = Recorded(tmp_path / "a.rrd").each("world/points", "Points3D:positions")
+    assert [row.times["frame"] for row in rows] == [0, 1]
+
+
 @pytest.mark.parametrize(
     ("stamps", "line", "expected"),
     [

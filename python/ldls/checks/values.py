@@ -6,7 +6,7 @@ import operator
 import sys
 from typing import TYPE_CHECKING, Any, Literal
 
-from ldls.errors import DtypeError, InputError, LimitError, ParameterError, ShapeError
+from ldls.errors import DtypeError, InputError, LdlsError, LimitError, ParameterError, ShapeError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 MAX_ROWS = 2**31 - 1
 """Most rows of an array: points and labels are numbered by 32 bits with sign."""
+LATEST_S = 9.2e9
+"""Stamps are below it: in 2261, nanoseconds since 1970 run out of 64 bits. Milliseconds passed it in April 1970."""
 LONGEST = 80
 """Characters of a value that a message shows."""
 
@@ -29,6 +31,17 @@ def whole_number(
     if not is_whole(value) or not low <= operator.index(value) <= high:  # type: ignore[arg-type]
         raise error(f"{name}: got {shown(value)}, expected a whole number from {low} to {high}")
     return operator.index(value)  # type: ignore[arg-type]
+
+
+def as_seconds(name: str, stamp: float, error: type[LdlsError] = ParameterError) -> float:
+    """`stamp`, in seconds since 1970 or since the start of a drive.
+
+    Raises:
+        ParameterError: It is none, or of another unit; or another `error`.
+    """
+    if not abs(stamp) < LATEST_S:
+        raise error(f"{name}: got {stamp}, expected seconds below {LATEST_S:g}; not milliseconds, not nanoseconds")
+    return stamp
 
 
 def as_image_size(name: str, value: object, error: type[InputError] = ParameterError) -> tuple[int, int]:

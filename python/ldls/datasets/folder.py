@@ -12,6 +12,7 @@ from pathlib import Path, PurePath
 
 from ldls.camera import Camera
 from ldls.checks import checked
+from ldls.checks.values import as_seconds
 from ldls.datasets.file_source import FileSource, image_from_file
 from ldls.datasets.folder_description import FILE, read_description, template
 from ldls.datasets.frame import CameraImage
@@ -170,6 +171,6 @@ def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:
         seconds = float("".join(words))
     except ValueError:
         seconds = math.nan
-    if not name or not math.isfinite(seconds):
+    if not name or math.isnan(seconds):
         raise CorruptFileError(f"{path}, line {number}: expected 'frame seconds', got {line[:80]!r}")
-    return name.strip(), seconds
+    return name.strip(), as_seconds(f"{path}, line {number}: stamp", seconds, CorruptFileError)

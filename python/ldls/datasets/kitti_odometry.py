@@ -6,7 +6,6 @@ and labels/NNNNNN.label where there are any.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -16,6 +15,7 @@ import numpy as np
 
 from ldls.camera import Camera
 from ldls.checks import checked
+from ldls.checks.values import as_seconds
 from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.kitti_common import camera_numbers
@@ -116,7 +116,7 @@ def _sequence(path: Path, wanted: str | int | None) -> Path:
 
 
 def _read_stamps(path: Path, names: Sequence[str]) -> tuple[float | None, ...]:
-    return read_stamps(path / TIMES, names, _seconds, example="0.103736")
+    return read_stamps(path / TIMES, names, _seconds, example="0.103736, in seconds")
 
 
 def _poses_file(path: Path) -> Path | None:
@@ -136,7 +136,4 @@ def _trajectory(path: Path, poses: Path | None, camera: Camera) -> Trajectory | 
 
 
 def _seconds(line: str) -> float:
-    seconds = float(line)
-    if not math.isfinite(seconds):
-        raise ValueError("not a time")
-    return seconds
+    return as_seconds("stamp", float(line))

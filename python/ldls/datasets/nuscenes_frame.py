@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.checks import checked
+from ldls.checks.values import as_seconds
 from ldls.cloud import MAX_COLUMNS, Points
 from ldls.datasets.file_source import image_from_file
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.errors import within
+from ldls.errors import CorruptFileError, within
 from ldls.io import read_points
 from ldls.io.files import below, open_file, parsing
 from ldls.io.images import read_image_size
@@ -83,7 +84,8 @@ class NuScenesFrameSource:
             self._columns = _n_columns(frame["lidar"]["columns"])
             self._boxes: list[dict[str, Any]] = frame["boxes_3d"]
             self._images = tuple(self._image(name, each) for name, each in frame["cameras"].items())
-            self.stamps: tuple[float | None, ...] = (float(frame["timestamp"]),)
+            stamp = as_seconds("timestamp", float(frame["timestamp"]), CorruptFileError)
+            self.stamps: tuple[float | None, ...] = (stamp,)
         self.names: tuple[str, ...] = (self._points.name.split(".")[0],)
         self.camera_names = tuple(image.name for image in self._images)
 

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import as_transform, brought_together, inverse, rigid
 from ldls.checks import checked
+from ldls.checks.values import as_seconds
 from ldls.cloud import Points, as_points
-from ldls.errors import InputError, ParameterError, ShapeError
+from ldls.errors import InputError, ShapeError
 from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
@@ -49,7 +50,7 @@ class Sweep:
 
     Raises:
         InputError: An argument is of another type, or a point is farther away than distances can be told.
-        ParameterError: The stamp is not finite.
+        ParameterError: The stamp is not in seconds.
         CalibrationError: The pose is no rigid transform.
     """
 
@@ -63,8 +64,7 @@ class Sweep:
         _check_coordinates(self.points)
         object.__setattr__(self, "views", tuple(self.views))
         object.__setattr__(self, "pose", rigid("pose", as_transform("pose", self.pose)))
-        if not math.isfinite(self.stamp):
-            raise ParameterError(f"stamp: got {self.stamp}, expected a finite number")
+        as_seconds("stamp", self.stamp)
         for view in self.views:
             if not isinstance(view, View):
                 raise InputError(f"views: expected a list of View, got {type(view).__name__} in it")

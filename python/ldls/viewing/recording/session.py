@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks.values import as_seconds
 from ldls.datasets import Frame
 from ldls.errors import ParameterError
 from ldls.io.files import whole_file
@@ -146,6 +147,7 @@ class Recording:
             alone: True for the only frame: "iteration" is then the timeline that shows first, and all is on it.
 
         Raises:
+            ParameterError: The stamp is not in seconds.
             LdlsError: See `log_result` and `log_diffusion`.
         """
         contents = Contents(
@@ -258,6 +260,8 @@ class Recording:
         self.n_frames += 1
 
     def _set_times(self, stamp: float | None) -> None:
+        if stamp is not None:
+            as_seconds("stamp", stamp)
         self.stream.set_time("frame", sequence=self.n_frames)
         if stamp is not None:
             # a timeline is of dates or of durations, whichever its first stamp is
