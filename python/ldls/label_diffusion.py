@@ -28,7 +28,7 @@ from ldls.errors import (
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Instance, Report, Segmentation
-from ldls.view import SeenView, View, camera_names
+from ldls.view import SeenView, View, camera_names, check_names
 
 COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
@@ -102,6 +102,7 @@ def segment_views(
     same_object: float,
 ) -> Segmentation:
     """What `segment` does with its arguments as views; warnings name the line that called its caller."""
+    check_names(views)
     cloud = as_points(points)
     if nonfinite == "raise":
         check_finite(cloud)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.checks import checked
-from ldls.errors import MaskError
+from ldls.errors import InputError, MaskError
 from ldls.masks import InstanceMasks
 
 
@@ -22,7 +23,8 @@ class View:
     Attributes:
         masks: Instance masks of the image.
         camera: The camera.
-        name: What to call it, as "CAM_FRONT"; "camera 0", "camera 1" and so on without one.
+        name: What to call it, as "CAM_FRONT", other than the views beside it; "camera 0", "camera 1" and so on without
+            one.
 
     Raises:
         InputError: One is of another type.
@@ -59,4 +61,19 @@ class SeenView:
 
 def camera_names(views: Sequence[SeenView]) -> tuple[str, ...]:
     """Name of each view: its own, or "camera 0", "camera 1" and so on where it has none."""
-    return tuple(seen.view.name or f"camera {number}" for number, seen in enumerate(views))
+    return _names([seen.view for seen in views])
+
+
+def check_names(views: Sequence[View]) -> None:
+    """Refuse views of one name, which pictures, recordings and files could not tell apart.
+
+    Raises:
+        InputError: Two have the same.
+    """
+    name, count = next(iter(Counter(_names(views)).most_common(1)), ("", 0))
+    if count > 1:
+        raise InputError(f"views: {count} have the name {name!r}, expected one each; give others by View(..., name=)")
+
+
+def _names(views: Sequence[View]) -> tuple[str, ...]:
+    return tuple(view.name or f"camera {number}" for number, view in enumerate(views))

@@ -174,6 +174,28 @@ def test_other_arguments_are_refused_by_name(small_scene):
         ldls.segment(points, masks, sized)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "name"),
+    [
+        pytest.param("left", "left", "left", id="twice"),
+        pytest.param("camera 1", "", "camera 1", id="the name of one without a name"),
+    ],
+)
+def test_two_views_of_one_name_are_refused(small_scene, first, second, name):
+    points, masks, camera = small_scene
+    views = [ldls.View(masks, camera, first), ldls.View(masks, camera, second)]
+    pose = {"pose": np.eye(4), "stamp": 0.0}
+    for label in (
+        lambda: ldls.segment(points, views),
+        lambda: ldls.LabelDiffusion().segment(points, views),
+        lambda: ldls.LabelDiffusion().segment(points, views, **pose),
+        lambda: ldls.segment_sweeps([ldls.Sweep(points, views, **pose)]),
+    ):
+        with pytest.raises(ldls.InputError, match=f"^views: 2 have the name '{name}', expected one each"):
+            label()
+    assert len(ldls.segment(points, views[::-1] if first != second else views[:1]).labels) == len(points)
+
+
 def test_points_without_coordinates_are_left_out_and_counted(small_scene):
     points, masks, camera = small_scene
     clean = ldls.segment(points, masks, camera)

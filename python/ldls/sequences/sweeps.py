@@ -25,7 +25,7 @@ from ldls.errors import InputError, ShapeError
 from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
-from ldls.view import View
+from ldls.view import View, check_names
 
 SAME_OBJECT = 0.1
 """Share of common points from which on instances of two images are one object: less than of one moment, for it may
@@ -68,6 +68,7 @@ class Sweep:
         for view in self.views:
             if not isinstance(view, View):
                 raise InputError(f"views: expected a list of View, got {type(view).__name__} in it")
+        check_names(self.views)
 
 
 @checked
