@@ -31,7 +31,7 @@ def view(
         list[str] | None,
         typer.Option(
             metavar="[CAMERA=]FILE",
-            help="Image of a RESULT; of several cameras one each, in their order or by name.",
+            help="Image of a RESULT; of several cameras one each, by name or in the order of those not named.",
             show_default=False,
         ),
     ] = None,
@@ -145,7 +145,7 @@ def view_result(
 
 
 def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
-    """Images by camera: FILE for the cameras in their order, CAMERA=FILE for one by name.
+    """Images by camera: CAMERA=FILE for one by name, FILE for the others in their order.
 
     Raises:
         InputError: There are more images than cameras, or one camera has two.
@@ -153,13 +153,17 @@ def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArr
     from ldls.io import read_image
 
     paths: dict[str, str] = {}
-    for number, text in enumerate(texts):
+    unnamed = []
+    for text in texts:
         camera, equals, file = text.partition("=")
         if not equals or camera not in cameras:
-            if number >= len(cameras):
-                raise InputError(f"--image: got {len(texts)} images, the result has cameras {', '.join(cameras)}")
-            camera, file = cameras[number], text
-        if camera in paths:
+            unnamed.append(text)
+        elif camera in paths:
             raise InputError(f"--image: camera {camera} has {paths[camera]} and {file}; give one")
-        paths[camera] = file
+        else:
+            paths[camera] = file
+    others = [camera for camera in cameras if camera not in paths]
+    if len(unnamed) > len(others):
+        raise InputError(f"--image: got {len(texts)} images, the result has cameras {', '.join(cameras) or 'none'}")
+    paths |= zip(others, unnamed, strict=False)
     return {camera: read_image(file) for camera, file in paths.items()}
