@@ -159,6 +159,19 @@ def test_only_objects_with_points_are_named(small_scene, drawn) -> None:
     assert [tag.text for tag in drawn] == ["person 2", "car 3"]
 
 
+def test_names_with_line_breaks_are_drawn_on_one_line(small_scene) -> None:
+    points, masks, camera = small_scene
+
+    def pictures(name):
+        named = ldls.InstanceMasks.from_array(masks.to_array(), categories=[1, 1], names={1: name})
+        views = [ldls.View(named, camera, f"{name} {side}") for side in ("left", "right")]
+        result = ldls.segment(points, views)
+        drawn = (overlay(result), birds_eye_view(result), comparison(result), masks_overlay(named))
+        return [picture.tobytes() for picture in drawn]
+
+    assert pictures("big\n\ttruck") == pictures("big truck") != pictures("truck")
+
+
 def test_objects_that_an_image_overlooks_are_named_at_their_points(small_scene, drawn) -> None:
     points, masks, camera = small_scene
     result = ldls.segment(points, masks, camera)

@@ -99,7 +99,7 @@ def grid(
     draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=FONT_PX)
     for i, (left, top) in enumerate(corners):
         if captions:
-            draw.text((left + FONT_PX // 2, top - CAPTION_PX // 2), captions[i], INK, font, anchor="lm")
+            draw.text((left + FONT_PX // 2, top - CAPTION_PX // 2), one_line(captions[i]), INK, font, anchor="lm")
         whole.paste(pictures[i], (left, top))
     return whole
 
@@ -121,6 +121,11 @@ def places_in_grid(
 def half(width_px: int) -> int:
     """Width of each of two pictures side by side."""
     return (width_px - GAP_PX) // 2
+
+
+def one_line(text: str) -> str:
+    """`text` on one line, as texts that are drawn at a place are; names may have line breaks."""
+    return " ".join(text.split())
 
 
 def _reach(radius_px: float) -> int:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from ldls.palette import Colour
+from ldls.viewing.drawing import one_line
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
@@ -40,6 +41,7 @@ def draw_tags(
     number of its heights that a tag goes aside rather than lie there. Tags stay clear of the boxes `taken`.
     """
     draw = ImageDraw.Draw(picture)
+    tags = [tag._replace(text=one_line(tag.text)) for tag in tags]
     font = ImageFont.load_default(size=12 * pen_px)
     places = place_tags(
         [tag.box for tag in tags],
