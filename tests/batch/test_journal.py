@@ -49,7 +49,7 @@ def test_a_line_that_is_no_record_is_refused_with_its_number(finished, content, 
     lines[number - 1] = content
     journal.write_bytes(b"\n".join(lines) + b"\n")
     before = runs.contents(journal.parent)
-    with pytest.raises(CorruptFileError, match=rf"journal\.jsonl: line {number}: not a journal .* remove the file"):
+    with pytest.raises(CorruptFileError, match=rf"journal\.jsonl: line {number}: not a journal .* empty this one"):
         again()
     assert runs.contents(journal.parent) == before
 

@@ -10,7 +10,7 @@ from ldls import batch
 from ldls.batch.journal import JOURNAL_NAME
 from ldls.batch.lock import HOLDER_NAME, LOCK_NAME
 from ldls.batch.summary import FAILURES_NAME
-from ldls.errors import FileFormatError, UnsafePathError
+from ldls.errors import BatchError, FileFormatError, UnsafePathError
 from ldls.io import files
 
 PRECIOUS = b"the only copy\n"
@@ -58,6 +58,10 @@ def test_a_link_that_comes_between_look_and_opening_is_refused(folder, name, mon
 def test_a_link_in_the_place_of_a_file_is_replaced(few, folder, name):
     out, precious, run = folder
     (few / "masks/000005.json").unlink()
+    run()
+    journal = out / JOURNAL_NAME
+    journal.write_bytes(journal.read_bytes().splitlines(keepends=True)[0])
+    (out / name).unlink(missing_ok=True)
     link(out / name, precious)
     assert len(run().failures) == 1
     assert not (out / name).is_symlink()
@@ -73,6 +77,15 @@ def test_links_with_the_names_of_temporary_files_are_neither_written_to_nor_kept
         link(out / f".{token:04}{files.UNFINISHED}", precious)
     assert run().n_done == 12
     assert not list(out.glob(f"*{files.UNFINISHED}"))
+
+
+@pytest.mark.parametrize("target", ["precious", "none"], ids=["to a file", "to nothing"])
+def test_a_link_in_the_place_of_a_result_is_refused_where_no_run_has_begun(folder, target):
+    out, precious, run = folder
+    link(out / "000003.label", precious.with_name(target))
+    with pytest.raises(BatchError, match=r"holds 000003\.label, which no run here wrote"):
+        run()
+    assert [path.name for path in out.iterdir()] == ["000003.label"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes have names here")

@@ -2,6 +2,8 @@
 
 The first line holds the settings that labels depend on; a run goes on only with the same ones, but may add frames, and
 formats of their files. A journal in which no frame was ever done binds nobody: a run of other settings begins it anew.
+The formats that were begun are there as `written_formats`, before any file is: what lies in their places afterwards is
+the run's own, recorded or not, and a format in whose places others' files lie is not begun.
 Frames are appended in the order in which they are finished, in groups, so that the disk need not be waited for after
 each; the last line of a frame counts, and one that a crash cut off is dropped. When all is done the lines are put in
 the order of the frames: every run of the same settings, formats and frames ends with the same bytes, whatever was done
@@ -24,7 +26,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
@@ -34,6 +37,7 @@ from ldls.batch.poses import FOUND_POSES
 from ldls.errors import BatchError, CorruptFileError
 from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
 from ldls.segmentation.object_rows import COLUMNS
+from ldls.viewing.formats import ENDINGS
 
 JOURNAL_NAME = "journal.jsonl"
 LONGEST_LINE_BYTES = 1 << 24
@@ -44,11 +48,11 @@ class Journal:
     """The journal of a folder. Only where each line stands is kept in memory, for runs may have very many frames.
 
     Attributes:
-        endings: What comes after the name of the frame in the names of the files that earlier runs wrote.
+        formats: The formats that runs in the folder have begun, this one included.
     """
 
-    def __init__(self, folder: Path, header: Record) -> None:
-        """Begin a journal, or go on with the one there is.
+    def __init__(self, folder: Path, header: Record, formats: Collection[str] = ()) -> None:
+        """Begin a journal, or go on with the one there is, and note the `formats` that a run begins.
 
         Raises:
             BatchError: The one there is has frames that a run of other settings did.
@@ -57,20 +61,30 @@ class Journal:
         """
         self._folder = folder
         self._path = folder / JOURNAL_NAME
-        self._header = header
+        self._settings = header
         self._places: dict[str, int] = {}
-        self.endings: set[str] = set()
+        begun = formats_begun(folder) or ()
+        self.formats = tuple(word for word in ENDINGS if word in formats or word in begun)
         self._file = open_to_append(self._path)
         try:
             self._end = self._read()
             # a line that was cut off makes room for whole ones
             self._file.truncate(self._end)
             if self._end == 0:
-                self._append([header])
+                self._append([self._header])
                 sync_folder(folder)
+            elif len(self.formats) > len(begun):
+                self.finish(self.frames)
+                self._file = open_to_append(self._path)
+                self._end = self._path.stat().st_size
         except BaseException:
             self._file.close()
             raise
+
+    @property
+    def _header(self) -> Record:
+        # the settings come first, so that a line cut off in the formats is known as ours
+        return {**self._settings, "written_formats": self.formats}
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -110,7 +124,7 @@ class Journal:
         self._file.close()
 
     def finish(self, order: Sequence[str]) -> None:
-        """Put the lines in the `order` of the frames of the source; nothing is appended any more."""
+        """Put the lines in the `order` of the frames of the source, and let go of the file."""
         self.close()
         places: dict[str, int] = {}
         # those that the source has no more come last
@@ -150,7 +164,6 @@ class Journal:
                 else:
                     frame = record["frame"]
                     self._places[frame] = whole
-                    self.endings.update(name.removeprefix(frame) for name in record.get("files", ()))
                 whole += len(line)
         return whole
 
@@ -168,7 +181,7 @@ class Journal:
                 return record
             found = f"expected a record of {'settings' if number == 1 else 'a frame'}, got {line[:60]!r}"
         raise CorruptFileError(
-            f"{self._path}: line {number}: not a journal of ldls ({found}); choose another folder, or remove the file "
+            f"{self._path}: line {number}: not a journal of ldls ({found}); choose another folder, or empty this one "
             "to do all frames again"
         )
 
@@ -178,7 +191,7 @@ class Journal:
         Raises:
             BatchError: The run of other settings did some.
         """
-        differences = list(_differences(header, self._header))
+        differences = list(_differences({**header, "written_formats": self.formats}, self._header))
         # poses that the sweeps told are true of their source alone
         binds = (self._folder / FOUND_POSES).is_file() and header.get("source") != self._header["source"]
         if differences and (binds or not all(map(_is_failure, rest))):
@@ -208,6 +221,18 @@ class KeptRecords:
             return None
         with self.path.open("rb") as file:
             return _record_at(file, place)
+
+
+def formats_begun(folder: Path) -> tuple[str, ...] | None:
+    """The formats that runs in `folder` have begun, none without a journal; None where its first line does not say."""
+    path = folder / JOURNAL_NAME
+    if not path.is_file():
+        return ()
+    with path.open("rb") as file, suppress(ValueError, RecursionError):
+        match json.loads(file.readline(LONGEST_LINE_BYTES)):
+            case {"written_formats": [*words]}:
+                return tuple(word for word in ENDINGS if word in words)
+    return None
 
 
 def _is_failure(line: bytes) -> bool:

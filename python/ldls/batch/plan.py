@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from collections.abc import Sequence
-from pathlib import PureWindowsPath
+from pathlib import Path, PureWindowsPath
 
 from ldls.batch.window import Frames
 from ldls.datasets import Source
-from ldls.errors import ParameterError, UnsafePathError
+from ldls.errors import BatchError, ParameterError, UnsafePathError, some
 from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.viewing.formats import file_name
 
@@ -87,13 +88,44 @@ def check_names(names: Sequence[str], formats: Sequence[str]) -> None:
                 f"frame {name!r}: expected a plain file name without separators, '..', drive or control characters"
             )
         for word in formats:
-            # some file systems take upper and lower case, or an accent and its letter written in two ways, for one
-            file = unicodedata.normalize("NFC", file_name(name, word).casefold())
+            file = _folded(file_name(name, word))
             if file in seen:
                 raise UnsafePathError(
                     f"frames {seen[file]!r} and {name!r}: would be written to one file; rename one of them"
                 )
             seen[file] = name
+
+
+def check_places(folder: Path, names: Sequence[str], formats: Sequence[str], begun: Sequence[str]) -> None:
+    """Refuse to begin files where others are: an output is never an input.
+
+    Args:
+        folder: Folder of the results.
+        names: Names of all frames of the source, for any of them may be added to a run.
+        formats: The formats of the run.
+        begun: Those that runs there have begun before, whose places are theirs.
+
+    Raises:
+        BatchError: There is a file, or a link, in the place of one.
+    """
+    added = [word for word in formats if word not in begun]
+    if not added or not folder.is_dir():
+        return
+    there = {_folded(path.name) for path in folder.iterdir()}
+    there -= {_folded(file_name(name, word)) for name in names for word in begun}
+    files = (file_name(name, word) for name in names for word in added)
+    # the file system has the last word on which names are one
+    others = [file for file in files if _folded(file) in there and os.path.lexists(folder / file)]
+    if others:
+        raise BatchError(
+            f"{folder}: holds {some(others)}, which no run here wrote and the run would write over; an output is never "
+            "written over an input, so give another --out"
+        )
+
+
+def _folded(file: str) -> str:
+    """What two names have in common that are one to some file systems, by their case or how an accent is written."""
+    return unicodedata.normalize("NFC", file.casefold())
 
 
 def _is_plain(name: str) -> bool:

@@ -15,9 +15,9 @@ from typing import Any
 import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
 from ldls.batch.frame_work import Earlier, FrameWork
-from ldls.batch.journal import Journal, Record
+from ldls.batch.journal import Journal, Record, formats_begun
 from ldls.batch.lock import only_run
-from ldls.batch.plan import check_names, chosen_of, windows_of
+from ldls.batch.plan import check_names, check_places, chosen_of, windows_of
 from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import RunBag
 from ldls.batch.run_tracks import RunTracks
@@ -26,9 +26,10 @@ from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, o
 from ldls.batch.window import Frames, Outcome
 from ldls.datasets import Source, open_source
 from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, ParameterError, some
-from ldls.io.files import check_folder, sweep
+from ldls.io.files import check_folder, check_outputs, sweep
 from ldls.io.objects import objects_writer
-from ldls.viewing.formats import BAG, RESULT, file_name, written_formats
+from ldls.segmenters.registry import segmenter_file
+from ldls.viewing.formats import BAG, RESULT, file_name
 
 GROUP_S = 0.5
 """Frames finished within this time share a wait for the disk."""
@@ -83,9 +84,10 @@ def run(
 
     Raises:
         BatchError: Another run is at work in `out`, or `out` holds frames done by one of other settings, source or
-            version.
+            version, or files that no run wrote in the places of results, as inputs.
         CorruptFileError: The journal in `out` is none.
         ParameterError: The source has none of the `frames`, or a map is asked for, and no tracks.
+        InputError: `objects` or `map_file` is an input.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
         PoseError: Sweeps are to be joined or objects tracked, and frames have no stamps or poses.
@@ -102,6 +104,12 @@ def run(
     check_names(names, settings.frame_formats)
     write_objects = None if objects is None else objects_writer(objects)
     folder = Path(out)
+    begun = formats_begun(folder)
+    # a journal that was cut off, or is none, is judged when it is opened
+    if begun is not None:
+        check_places(folder, opened.names, settings.frame_formats, begun)
+    of_all = {"objects": objects, "map": map_file}
+    check_outputs({name: [Path(path)] for name, path in of_all.items() if path is not None}, _inputs(opened, settings))
     tracks = _tracks(settings, folder, names, map_file)
     with_tracks = None if tracks is None else tracks.folder
     bag = RunBag(opened, folder, with_tracks) if BAG in settings.formats else None
@@ -121,9 +129,9 @@ def run(
             "settings": settings.record() | work.digests,
             "source": source_record(opened.kind, str(Path(opened.path).resolve()), options),
         }
-        journal = Journal(folder, header)
+        journal = Journal(folder, header, settings.frame_formats)
         try:
-            check_names(sorted({*names, *journal.frames}), written_formats(journal.endings, settings.frame_formats))
+            check_names(sorted({*names, *journal.frames}), journal.formats)
             # what an earlier run did must still be there, and of the same input
             pending = _pending(windows, work, journal)
             to_do = [name for window in pending for _, name in window]
@@ -175,6 +183,13 @@ def run(
         seconds=dict(seconds),
         elapsed=elapsed,
     )
+
+
+def _inputs(source: Source, settings: RunSettings) -> Iterator[str | Path | None]:
+    """Files that a run reads, and the folder of its masks."""
+    yield from (settings.masks, settings.poses, segmenter_file(settings.segmenter))
+    for index in range(len(source)):
+        yield from source.files(index)
 
 
 def _tracks(

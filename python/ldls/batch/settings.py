@@ -13,6 +13,7 @@ from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
+from ldls.segmenters.registry import segmenter_file
 from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS
 from ldls.viewing.formats import BAG, RESULT, check_formats
 
@@ -79,8 +80,7 @@ class RunSettings:
 
     def segmenter_file(self, frame: str, camera: str) -> Path | None:
         """The file that the segmenter of an image is made of, as a model or boxes; None where there is none."""
-        path = Path(fill(self.segmenter or "", frame, camera).partition(":")[2])
-        return path if path.is_file() else None
+        return segmenter_file(fill(self.segmenter or "", frame, camera))
 
     def record(self) -> dict[str, Any]:
         """What labels depend on, as a journal stores it."""

@@ -41,9 +41,11 @@ def annotate(
     """
     from ldls.cli.label_pairs import FrameFolders
     from ldls.evaluation.annotation import annotate as annotate_cloud
+    from ldls.io.files import check_outputs
     from ldls.io.labels import read_kitti_objects, write_annotations
 
     labels = label_paths(training)
+    check_outputs({"OUT": [out / path.name for path in labels]}, labels)
     folders = FrameFolders(points=training / "velodyne", calib=training / "calib", images=training / "image_2")
     out.mkdir(parents=True, exist_ok=True)
     n_objects: Counter[str] = Counter()

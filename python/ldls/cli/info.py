@@ -57,10 +57,13 @@ def info(
     Example: ldls info 2011_09_26/2011_09_26_drive_0001_sync --picture check.png
     """
     from ldls.datasets.inspection import check_stamps, inspect, sample
+    from ldls.io.files import check_outputs
 
     if picture is None:
         refuse({"frame": frame}, "the frame to draw, and there is no --picture")
     frames = opened(source, dataset, parse_options(option or []))
+    if picture is not None:
+        check_outputs({"--picture": [picture]}, (file for at in range(len(frames)) for file in frames.files(at)))
     indices = list(range(len(frames))) if every else sample(len(frames), LOOKED_AT)
     facts = [inspect(frames, at) for at in progress(indices, len(indices), "looking at frames")]
     stamps = stamps_of(frames)

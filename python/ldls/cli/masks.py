@@ -125,7 +125,9 @@ def convert(
     Example: ldls masks convert masks/000571.json masks/000571.png --resolve score --min-score 0.7
     """
     from ldls.io import read_masks, save
+    from ldls.io.files import check_outputs
 
+    check_outputs({"OUT": [out]}, [masks])
     read = read_masks(
         masks,
         image_id=image_id,
@@ -162,7 +164,11 @@ def make(
     Example: ldls masks make image_2/000571.png masks/000571.json --segmenter onnx:yolo11n-seg.onnx
     """
     from ldls.io import read_image, save
+    from ldls.io.files import check_outputs
+    from ldls.segmenters.registry import segmenter_file
 
+    pictures = [] if picture is None else [picture]
+    check_outputs({"OUT": [out], "--picture": pictures}, [image, segmenter_file(segmenter)])
     pixels = read_image(image)
     made = masks_of(pixels, masks=None, segmenter=segmenter, min_score=min_score, categories=categories)
     save(made, out)
@@ -187,7 +193,9 @@ def show(
     Example: ldls masks show masks/000571.json --image image_2/000571.png --picture masks.png
     """
     from ldls.io import read_image
+    from ldls.io.files import check_outputs
 
+    check_outputs({"--picture": [] if picture is None else [picture]}, [masks, image])
     pixels = None if image is None else read_image(image)
     shown = masks_of(pixels, masks=masks, segmenter=None, image_id=image_id, min_score=min_score, categories=categories)
     _show(shown, pixels, picture)

@@ -94,10 +94,12 @@ def segment(
     --out results
     """
     from ldls.io import read_image, read_points, save
+    from ldls.io.files import check_outputs
     from ldls.io.objects import FrameObjects, objects_writer
     from ldls.label_diffusion import segment as label_points
-    from ldls.viewing.files import check_picture, save_pictures
-    from ldls.viewing.formats import check_formats, write_formats
+    from ldls.segmenters.registry import segmenter_file
+    from ldls.viewing.files import check_picture, picture_files, save_pictures
+    from ldls.viewing.formats import check_formats, file_name, write_formats
 
     check_recording(rerun, diffusion)
     wanted = words(formats)
@@ -105,6 +107,14 @@ def segment(
     if picture is not None:
         check_picture(picture)
     write_objects = None if objects is None else objects_writer(objects)
+    name = points.stem.removesuffix(".pcd")
+    outputs = {
+        "--out": [out / file_name(name, word) for word in wanted],
+        "--save-masks": [] if save_masks is None else [save_masks],
+        "--objects": [] if objects is None else [objects],
+        "--picture": [] if picture is None else picture_files(picture),
+    }
+    check_outputs(outputs, [points, calib, extrinsic, masks, segmenter_file(segmenter), image])
     pixels = None if image is None else read_image(image)
     seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
     chosen = masks_of(
@@ -119,7 +129,6 @@ def segment(
     if save_masks is not None:
         save(chosen, save_masks)
     result = label_points(read_points(points), chosen, seen_by, params=replace(params, threads=cores))
-    name = points.stem.removesuffix(".pcd")
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, name, wanted, [pixels])
     if write_objects is not None and objects is not None:

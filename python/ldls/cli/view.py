@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -15,10 +15,6 @@ from ldls.cli.recording_options import DiffusionOption, check_recording, default
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
 from ldls.cli.view_source import MOST_FRAMES, chosen_frames, labelled, show_frames
 from ldls.errors import InputError
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 
 @speaks_plainly
@@ -128,11 +124,15 @@ def view_result(
     path: Path, images: Sequence[str], target: str | None, *, name: str, diffusion: int | None, picture: Path | None
 ) -> str:
     """Show a stored result; the message for the user."""
-    from ldls.io import read_result
+    from ldls.io import read_image, read_result
+    from ldls.io.files import check_outputs
     from ldls.view import camera_names
+    from ldls.viewing.files import picture_files
 
     result = read_result(path)
-    pictures = read_images(images, camera_names(result.views))
+    files = image_files(images, camera_names(result.views))
+    check_outputs({"--picture": [] if picture is None else picture_files(picture)}, files.values())
+    pictures = {camera: read_image(file) for camera, file in files.items()}
     messages = []
     if picture is not None:
         from ldls.viewing import save_pictures
@@ -144,14 +144,12 @@ def view_result(
     return "\n".join(messages)
 
 
-def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
-    """Images by camera: CAMERA=FILE for one by name, FILE for the others in their order.
+def image_files(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, str]:
+    """Files of images by camera: CAMERA=FILE for one by name, FILE for the others in their order.
 
     Raises:
         InputError: There are more images than cameras, or one camera has two.
     """
-    from ldls.io import read_image
-
     paths: dict[str, str] = {}
     unnamed = []
     for text in texts:
@@ -166,4 +164,4 @@ def read_images(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, NDArr
     if len(unnamed) > len(others):
         raise InputError(f"--image: got {len(texts)} images, the result has cameras {', '.join(cameras) or 'none'}")
     paths |= zip(others, unnamed, strict=False)
-    return {camera: read_image(file) for camera, file in paths.items()}
+    return paths

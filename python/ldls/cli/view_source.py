@@ -100,11 +100,16 @@ def show_frames(
     Raises:
         LdlsError: None can be; the error is that of the first.
     """
+    from ldls.io.files import check_outputs
     from ldls.view import camera_names
     from ldls.viewing import save_pictures
+    from ldls.viewing.files import picture_files
     from ldls.viewing.recording import open_recording
 
     alone = len(indices) == 1
+    places = {} if picture is None else {index: _named(picture, source.names[index]) for index in indices}
+    pictures = [file for place in places.values() for file in picture_files(place)]
+    check_outputs({"--picture": pictures}, (file for index in indices for file in source.files(index)))
     failures: list[tuple[str, Exception]] = []
     with nullcontext() if target is None else open_recording(target, name=name) as recording:
         for index in progress(indices, len(indices), "drawing" if recording is None else "recording"):
@@ -117,8 +122,7 @@ def show_frames(
                     continue
                 images = {image.name: image.read() for image in frame.images}
                 if picture is not None:
-                    path = picture.with_name(f"{picture.stem}-{frame.name}{picture.suffix}")
-                    save_pictures(path, result, [images.get(camera) for camera in camera_names(result.views)])
+                    save_pictures(places[index], result, [images.get(camera) for camera in camera_names(result.views)])
                 if recording is not None:
                     recording.add(
                         result,
@@ -134,6 +138,11 @@ def show_frames(
         if len(failures) == len(indices):
             raise failures[0][1]
     return [f"{frame} failed: {error}" for frame, error in failures]
+
+
+def _named(picture: Path, frame: str) -> Path:
+    """Where the picture of a frame goes."""
+    return picture.with_name(f"{picture.stem}-{frame}{picture.suffix}")
 
 
 def _segmented(source: Source, work: FrameWork, index: int) -> tuple[Frame, Segmentation]:

@@ -8,7 +8,7 @@ import io
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -17,6 +17,7 @@ from typing import IO
 from ldls.errors import (
     CorruptFileError,
     FileFormatError,
+    InputError,
     LdlsError,
     LimitError,
     TruncatedFileError,
@@ -191,6 +192,33 @@ def check_folder(path: str | PathLike[str]) -> None:
     folder = Path(path).parent
     if not folder.is_dir():
         raise FileNotFoundError(errno.ENOENT, "no such folder to write to; make it first", str(folder))
+
+
+def check_outputs(outputs: Mapping[str, Iterable[Path]], inputs: Iterable[str | PathLike[str] | None]) -> None:
+    """Refuse, before any work, to write over what is read: an output is never an input.
+
+    Links, relative paths and letters of another case name the file that they lead to.
+
+    Args:
+        outputs: The files that will be written, by the option that names them; they need not be there.
+        inputs: The files that are read; of a folder, those in it. None is passed over.
+
+    Raises:
+        InputError: One of `outputs` is one of `inputs`.
+    """
+    there = {_identity(path): (option, path) for option, paths in outputs.items() for path in paths if path.exists()}
+    # nearly always nothing is there, and the inputs, which may be many, are not looked at
+    given = (Path(path) for path in inputs if path is not None) if there else ()
+    for path in (path for each in given for path in (each.iterdir() if each.is_dir() else [each]) if path.exists()):
+        if _identity(path) in there:
+            option, output = there[_identity(path)]
+            raise InputError(f"{option}: would write over {output}, which is an input ({path}); give another {option}")
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """What tells a file from all others of the system."""
+    status = path.stat()
+    return status.st_dev, status.st_ino
 
 
 @contextmanager

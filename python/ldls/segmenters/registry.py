@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from difflib import get_close_matches
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from ldls.errors import ParameterError
@@ -32,6 +33,12 @@ EXAMPLES = {
     "grabcut": "grabcut:label_2/000001.txt",
 }
 WITHOUT_ARGUMENT = frozenset({"torchvision"})
+
+
+def segmenter_file(spec: str | None) -> Path | None:
+    """The file that `spec` names, as a model or boxes; None where there is none."""
+    path = Path((spec or "").partition(":")[2])
+    return path if path.is_file() else None
 
 
 def open_segmenter(spec: str, *, min_score: float | None = None, **options: Any) -> Segmenter:  # noqa: ANN401

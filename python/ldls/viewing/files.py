@@ -32,8 +32,7 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
         InputError: There are more or fewer images than cameras, or one has not the size of the masks.
     """
     check_picture(path)
-    path = Path(path)
-    birds_eye, compared = (path.with_name(f"{path.stem}-{what}{path.suffix}") for what in ("birds-eye", "comparison"))
+    path, birds_eye, compared = picture_files(path)
     # the one that takes longest first
     drawn: dict[Path, Callable[[], Image.Image]] = {
         compared: lambda: comparison(result, images),
@@ -43,6 +42,12 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
     with ThreadPoolExecutor(2) as threads:
         list(threads.map(lambda file: save_picture(file, drawn[file]()), drawn))
     return [path, birds_eye, compared]
+
+
+def picture_files(path: str | PathLike[str]) -> list[Path]:
+    """The files that `save_pictures` writes: the overlay at `path`, the bird's-eye view and the comparison."""
+    path = Path(path)
+    return [path, *(path.with_name(f"{path.stem}-{what}{path.suffix}") for what in ("birds-eye", "comparison"))]
 
 
 def check_picture(path: str | PathLike[str]) -> None:

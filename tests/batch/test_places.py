@@ -1,0 +1,100 @@
+"""A run writes over no file that no run in its folder wrote: it may be an input."""
+
+import json
+import shutil
+
+import pytest
+
+from batch import runs
+from ldls import batch
+from ldls.errors import BatchError, InputError
+from ldls.io import read_masks, save
+
+REASON = "which no run here wrote and the run would write over; an output is never written over an input"
+
+
+def run(source, out, *formats, masks=None, **options):
+    settings = batch.RunSettings(masks=str(masks or source / "masks"), formats=formats)
+    return batch.run(source, out, settings, **options)
+
+
+def as_npz(source):
+    for path in sorted((source / "masks").glob("*.json")):
+        save(read_masks(path), path.with_suffix(".npz"))
+        path.unlink()
+    return source / "masks"
+
+
+@pytest.mark.parametrize(
+    ("place", "word", "file"),
+    [
+        pytest.param(lambda source: source / "image_2", "png", r"000000\.png, .* and 4 more", id="images"),
+        pytest.param(as_npz, "npz", r"000000\.npz, .* and 4 more", id="masks"),
+        pytest.param(lambda source: source / "label_2", "kitti-boxes", r"000000\.txt, .* and 4 more", id="boxes"),
+    ],
+)
+def test_files_of_others_are_refused_before_anything_is_done(few, place, word, file):
+    out = place(few)
+    before = runs.contents(few)
+    with pytest.raises(BatchError, match=rf"{out.name}: holds {file}, {REASON}, so give another --out"):
+        run(few, out, word)
+    assert runs.contents(few) == before
+
+
+def test_a_format_whose_places_are_taken_is_refused_when_it_is_added(few):
+    images = runs.contents(few / "image_2")
+    run(few, few / "image_2", "npz")
+    with pytest.raises(BatchError, match=r"holds 000000\.png, "):
+        run(few, few / "image_2", "npz", "png")
+    assert runs.contents(few / "image_2").items() >= images.items()
+    assert run(few, few / "image_2", "npz", "label").n_done == 12
+
+
+def test_a_frame_that_is_not_asked_for_yet_keeps_its_place(few, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/000007.npz").write_bytes(b"mine")
+    with pytest.raises(BatchError, match=r"holds 000007\.npz, "):
+        run(few, tmp_path / "out", "npz", frames=slice(0, 3))
+    assert run(few, tmp_path / "out", "label").n_done == 12
+
+
+def test_what_a_run_could_not_record_is_its_own(few, tmp_path):
+    out = tmp_path / "out"
+    run(few, out, "npz", "label")
+    header, *lines = (out / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    # as a killed run leaves it: files of all frames, and no record, or those of some
+    for kept in ([], lines[:5]):
+        (out / "journal.jsonl").write_bytes(b"".join([header, *kept]))
+        assert run(few, out, "npz", "label").n_earlier == len(kept)
+    (out / "journal.jsonl").write_bytes(header)
+    assert batch.run(few, out, batch.RunSettings(masks=str(few / "masks"), sweeps=0, min_score=0.5)).n_done == 12
+
+
+def test_formats_that_were_begun_are_in_the_journal_in_one_order(few, tmp_path):
+    for formats in (("label",), ("npz", "label"), ("npz",)):
+        run(few, tmp_path / "out", *formats)
+    header = json.loads((tmp_path / "out/journal.jsonl").read_text().splitlines()[0])
+    assert header["written_formats"] == ["npz", "label"]
+
+
+def test_names_are_one_where_they_are_to_the_file_system(few, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "000001.NPZ").write_bytes(b"mine")
+    if (out / "000001.npz").exists():
+        with pytest.raises(BatchError, match=r"holds 000001\.npz, "):
+            run(few, out, "npz")
+    else:
+        assert run(few, out, "npz").n_done == 12
+    assert (out / "000001.NPZ").read_bytes() == b"mine"
+
+
+def test_tables_of_a_run_are_none_of_its_inputs(few, tmp_path):
+    with pytest.raises(InputError, match=r"objects: would write over .*000002\.json, which is an input"):
+        run(few, tmp_path / "out", "npz", objects=few / "masks/000002.json")
+    shutil.copy(few / "velodyne/000002.bin", few / "map.ply")
+    (few / "velodyne/000002.bin").unlink()
+    (few / "velodyne/000002.bin").symlink_to(few / "map.ply")
+    with pytest.raises(InputError, match=r"map: would write over .*map\.ply, which is an input"):
+        run(few, tmp_path / "out", "npz", map_file=few / "map.ply")
+    assert not (tmp_path / "out").exists()

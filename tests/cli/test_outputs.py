@@ -1,0 +1,80 @@
+"""An output is never an input: what would write over one is refused before anything is done."""
+
+import shutil
+
+import pytest
+from typer.testing import CliRunner
+
+from batch import runs
+from datasets import layouts
+from ldls.cli import app
+
+run = CliRunner().invoke
+
+
+@pytest.fixture
+def folder(demo, tmp_path, monkeypatch):
+    """The files of a frame, some with the names of results, a result, and a link to the image; none may change."""
+    shutil.copytree(demo[0] / "input", tmp_path, dirs_exist_ok=True)
+    shutil.copy(demo[0] / "demo.ply", tmp_path / "points.ply")
+    shutil.copy(demo[0] / "demo.npz", tmp_path / "result.npz")
+    shutil.copy(tmp_path / "image.png", tmp_path / "points.png")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "link.png").symlink_to("image.png")
+    monkeypatch.chdir(tmp_path)
+    before = runs.contents(tmp_path)
+    yield tmp_path
+    assert runs.contents(tmp_path) == before
+
+
+SEGMENT = "segment --points points.bin --calib calib.txt --masks masks.npz"
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "output"),
+    [
+        pytest.param(f"{SEGMENT} --image points.png --out .", "--out", "points.png", id="the image"),
+        pytest.param(
+            "segment --points points.ply --calib calib.txt --masks masks.npz --out out/..", "--out", "points.ply",
+            id="the sweep",
+        ),
+        pytest.param(f"{SEGMENT} --image image.png --picture image.png --out out", "--picture", "image.png", id="drew"),
+        pytest.param(f"{SEGMENT} --image image.png --picture link.png --out out", "--picture", "link.png", id="to it"),
+        pytest.param(f"{SEGMENT} --image link.png --picture image.png --out out", "--picture", "image.png", id="link"),
+        pytest.param(f"{SEGMENT} --save-masks masks.npz --out out", "--save-masks", "masks.npz", id="masks saved"),
+        pytest.param("masks make image.png image.png --segmenter boxes:none.txt", "OUT", "image.png", id="masks made"),
+        pytest.param("masks convert masks.npz ./masks.npz", "OUT", "masks.npz", id="masks converted"),
+        pytest.param("masks show masks.npz --image image.png --picture image.png", "--picture", "image.png", id="show"),
+        pytest.param("view result.npz --image image.png --picture image.png", "--picture", "image.png", id="result"),
+    ],
+)  # fmt: skip
+def test_a_command_writes_over_no_input(folder, command, option, output):
+    outcome = run(app, command.split(), env={"COLUMNS": "500"})
+    assert outcome.exit_code == 1
+    expected = rf"error: {option}: would write over {output}, which is an input ("
+    assert outcome.stderr.replace("out/../", "").startswith(expected), outcome.stderr
+    assert outcome.stderr.endswith(f"; give another {option}\n")
+
+
+@pytest.mark.parametrize("command", ["view", "info"])
+def test_pictures_of_a_source_are_none_of_its_files(tmp_path, command):
+    source = layouts.many_frames(tmp_path / "source", 2)
+    picture = source / "image_2/000000.png"
+    if command == "view":
+        for part, ending in (("image_2", "png"), ("velodyne", "bin"), ("calib", "txt")):
+            (source / f"{part}/000001.{ending}").rename(source / f"{part}/a-0.{ending}")
+            (source / f"{part}/000000.{ending}").rename(source / f"{part}/0.{ending}")
+        picture = source / "image_2/a.png"
+    before = runs.contents(source)
+    outcome = run(app, [command, str(source), "--picture", str(picture)], env={"COLUMNS": "500"})
+    assert outcome.exit_code == 1
+    assert "error: --picture: would write over" in outcome.stderr
+    assert runs.contents(source) == before
+
+
+def test_annotations_are_written_over_no_boxes(tmp_path):
+    source = layouts.many_frames(tmp_path / "source", 2)
+    layouts.write_text(source / "label_2/000000.txt", "Car 0 0 0 1 1 2 2 1 1 1 0 0 5 0\n")
+    outcome = run(app, ["annotate", str(source), str(source / "label_2")], env={"COLUMNS": "500"})
+    assert outcome.exit_code == 1
+    assert "error: OUT: would write over" in outcome.stderr
