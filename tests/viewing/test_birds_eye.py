@@ -7,6 +7,7 @@ import ldls
 from ldls.palette import instance_colours
 from ldls.viewing import birds_eye_view
 from ldls.viewing.birds_eye import BACKGROUND, DIM, OUT_OF_VIEW, RINGS
+from ldls.viewing.drawing import PAPER
 from ldls.viewing.ground import corners_of, ground_of
 
 # camera axes (x right, y down, z forward) of a lidar whose x is forward and z up, and of one whose y is forward
@@ -53,6 +54,16 @@ def test_a_camera_that_looks_down_takes_x_for_ahead() -> None:
     masks = ldls.InstanceMasks.from_boxes([[40, 40, 60, 60]], (100, 100), categories=[1])
     camera = ldls.Camera(projection=[[60, 0, 50], [0, 60, 50], [0, 0, 1]])
     np.testing.assert_array_equal(ground_of(ldls.segment(points, masks, camera)).forward, [1, 0])
+
+
+def test_without_a_view_all_points_are_shown_with_x_ahead() -> None:
+    points = np.random.default_rng(1).uniform([-30, -20, 0], [30, 20, 1], (4000, 3)).astype(np.float32)
+    result = ldls.segment(points, [])
+    ground, picture = ground_of(result), np.asarray(birds_eye_view(result))
+    np.testing.assert_array_equal(ground.forward, [1, 0])
+    for edge, metres in (("ahead_m", 30), ("behind_m", -30), ("left_m", -20), ("right_m", 20)):
+        assert getattr(ground, edge) == pytest.approx(metres, abs=2)
+    assert (picture > np.array(PAPER) + 10).all(axis=2).sum() > 4000
 
 
 def test_rings_stand_at_their_ranges() -> None:

@@ -54,3 +54,10 @@ def test_a_ring_and_an_empty_cloud_show_themselves_too(small_scene) -> None:
     ring = ldls.segment(points, [ldls.View(masks, camera, "left"), ldls.View(masks, camera, "right")])
     assert "2 of 2 objects found" in ring._repr_html_()
     assert "0 of 2 objects found" in ldls.segment(points[:0], masks, camera)._repr_html_()
+
+
+@pytest.mark.parametrize("n_points", [500, 0])
+def test_a_result_without_views_shows_its_points_from_above(small_scene, n_points) -> None:
+    html = ldls.segment(small_scene[0][:n_points], [])._repr_html_()
+    assert f"{n_points} points, 0 in view, 0 of 0 objects found" in html
+    assert html.count("<img") == 1 and "the points from above" in html

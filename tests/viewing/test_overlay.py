@@ -2,9 +2,11 @@
 
 import importlib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import ldls
 from ldls.palette import BACKGROUND, instance_colours
@@ -113,12 +115,30 @@ def test_cameras_without_names_are_numbered(small_scene) -> None:
         pytest.param([photo(), photo()], "images: got 2, expected 1", id="more images than cameras"),
         pytest.param(photo(80, 60), r"expected \(60, 80, 3\) uint8, the size of the masks", id="swapped sides"),
         pytest.param(photo().astype(float), "float64; read it with ldls.read_image", id="not uint8"),
-        pytest.param(photo()[..., 0], "images: got 60, expected 1", id="grey"),
+        pytest.param(photo()[..., 0], r"image: expected \(60, 80, 3\) uint8, .*got \(60, 80\) uint8", id="grey"),
+        pytest.param(Image.fromarray(photo()).convert("L"), r"got \(60, 80\) uint8; read it", id="grey of Pillow"),
+        pytest.param("a.png", "got 'a.png'; read it with ldls.read_image", id="name of a file"),
+        pytest.param(Path("a.png"), r"got \w*Path\('a.png'\); read it with ldls.read_image", id="path"),
+        pytest.param(["a.png"], "got 'a.png'; read it with ldls.read_image", id="name of a file in a list"),
+        pytest.param(3, "got 3; read it with ldls.read_image", id="a number"),
     ],
 )
 def test_images_that_do_not_fit_are_refused(result, images, message) -> None:
     with pytest.raises(ldls.InputError, match=message):
         overlay(result, images)
+
+
+def test_images_of_pillow_are_taken(result) -> None:
+    for draw in (overlay, comparison, lambda _, image: masks_overlay(result.views[0].view.masks, image)):
+        expected = draw(result, photo()).tobytes()
+        assert draw(result, Image.fromarray(photo())).tobytes() == expected
+    assert overlay(result, [Image.fromarray(photo())]).tobytes() == overlay(result, photo()).tobytes()
+
+
+@pytest.mark.parametrize("draw", [overlay, comparison])
+def test_without_a_view_there_is_no_image_to_draw_on(small_scene, draw) -> None:
+    with pytest.raises(ldls.InputError, match="result: has no views, .*birds_eye_view draws its points"):
+        draw(ldls.segment(small_scene[0], []))
 
 
 def test_a_picture_without_width_is_refused(result) -> None:

@@ -41,8 +41,8 @@ def birds_eye_view(
 ) -> Image.Image:
     """The cloud from above, the first camera looking up: points, oriented boxes, names and rings of equal range.
 
-    Points that no camera sees are dark, the background is grey. Points of the background that fall on a mask, but lie
-    before or behind its object, are dim in its colour.
+    Without a camera, x is up. Points that no camera sees are dark, the background is grey. Points of the background
+    that fall on a mask, but lie before or behind its object, are dim in its colour.
 
     Args:
         result: The segmentation.

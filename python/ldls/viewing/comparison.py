@@ -31,7 +31,7 @@ def comparison(result: Segmentation, images: Images = None) -> Image.Image:
         images: As for `overlay`.
 
     Raises:
-        InputError: There are more or fewer images than cameras, or one has not the size of the masks.
+        InputError: As for `overlay`.
     """
     changed = result.direct_labels != result.labels
     pair = [Shown.of(result, "direct", changed), Shown.of(result, "final", changed)]

@@ -29,7 +29,7 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
 
     Raises:
         UnsupportedFormatError: The name does not end in `.png`.
-        InputError: There are more or fewer images than cameras, or one has not the size of the masks.
+        InputError: As for `overlay`.
     """
     check_picture(path)
     path, birds_eye, compared = picture_files(path)

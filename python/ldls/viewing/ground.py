@@ -8,6 +8,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.cloud import finite_rows
 from ldls.errors import ParameterError
 from ldls.segmentation import OrientedBox, Segmentation
 
@@ -55,7 +56,8 @@ def ground_of(
 ) -> Ground:
     """The part of the ground that a picture of a result shows, as large as fits into a width and a height.
 
-    With `fill`, room that is left at the sides shows more of the ground.
+    With `fill`, room that is left at the sides shows more of the ground. Of a result without a point in view, all
+    points are shown.
 
     Raises:
         ParameterError: The range is not more than 0.
@@ -63,9 +65,10 @@ def ground_of(
     if range_m is not None and not range_m > 0:
         raise ParameterError(f"range_m: got {range_m}, expected more than 0")
     forward = _heading(result)
-    seen = _turned(result.points[result.in_view, :2].astype(np.float64), forward)
+    rows = result.in_view if len(result.in_view) else finite_rows(result.points)
+    seen = _turned(result.points[rows, :2].astype(np.float64), forward)
     ranges = np.hypot(*seen.T)
-    objects = result.labels[result.in_view] > 0
+    objects = result.labels[rows] > 0
     reach = range_m or _reach(ranges[objects] if objects.any() else ranges)
     corners = [corners_of(each.box) for each in result.objects if each.box is not None]
     held = _turned(np.concatenate([np.zeros((1, 2)), *corners]), forward)
@@ -89,7 +92,12 @@ def corners_of(box: OrientedBox) -> NDArray[np.float64]:
 
 
 def _heading(result: Segmentation) -> NDArray[np.float64]:
-    """(2,) direction in which the first camera looks along the ground of the lidar frame; x if it looks up or down."""
+    """(2,) direction in which the first camera looks along the ground of the lidar frame.
+
+    It is x if the camera looks up or down, or if there is none.
+    """
+    if not result.views:
+        return np.array([1.0, 0.0])
     axis: NDArray[np.float64] = result.views[0].view.camera.T_camera_lidar[2, :2]
     length = np.hypot(*axis)
     return axis / length if length > 1e-6 else np.array([1.0, 0.0])

@@ -25,10 +25,12 @@ def html_of(result: Segmentation) -> str:
     A result does not hold the image; `ldls.viewing.overlay(result, image)` draws on it, and notebooks show that too.
     """
     numbers = f"{len(result.labels):,} points, {len(result.in_view):,} in view, {objects_found(result.objects)}"
-    seen = overlay(result, width_px=WIDTH_PX if len(result.views) == 1 else None)
+    pictures = ""
+    if result.views:
+        pictures = _img(overlay(result, width_px=WIDTH_PX if len(result.views) == 1 else None), "masks and points")
     ground = ground_of(result, size_px=(WIDTH_PX, HEIGHT_PX), fill=True)
     above = birds_eye_of(Shown.of(result, "final"), ground, surroundings(result, ground), boxes=True)
-    pictures = _img(seen, "masks and points") + _img(above, "the points from above")
+    pictures += _img(above, "the points from above")
     return f"<div><p>{numbers}</p>{pictures}{_table(result)}</div>"
 
 

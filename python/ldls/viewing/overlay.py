@@ -14,7 +14,7 @@ from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView, camera_names
 from ldls.viewing.drawing import MARK, Canvas, disc, grid, half, places_in_grid
-from ldls.viewing.shown import Images, Shown, Stage, image_like, images_of
+from ldls.viewing.shown import AnImage, Images, Shown, Stage, image_like, images_of
 from ldls.viewing.tags import Tag, draw_tags
 
 WIDTH_PX = 1800
@@ -36,14 +36,15 @@ def overlay(
 
     Args:
         result: The segmentation.
-        images: (H, W, 3) uint8 RGB image; for several cameras one for each, None where there is none. Without an image
-            masks and points stand on a dark one.
+        images: (H, W, 3) uint8 RGB image, or one of Pillow's; for several cameras a list of one for each, None where
+            there is none. Without an image masks and points stand on a dark one.
         stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
         width_px: Width of the picture of each image; by default 1800 pixels, or half of it where there are several,
             which then stand two by two.
 
     Raises:
-        InputError: There are more or fewer images than cameras, or one has not the size of the masks.
+        InputError: There is no camera, there are more or fewer images than cameras, or one has not the size of the
+            masks.
         ParameterError: There is no such stage, or the width is below 1.
     """
     if width_px is not None and width_px < 1:
@@ -83,7 +84,7 @@ def pixel_of(result: Segmentation, size_px: tuple[int, int], at_px: tuple[float,
     raise InputError(f"{at_px[0]:g},{at_px[1]:g} lies in no image of the picture of {size_px[1]} x {size_px[0]} pixels")
 
 
-def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) -> Image.Image:
+def masks_overlay(masks: InstanceMasks, image: AnImage | None = None) -> Image.Image:
     """The image with masks and their names and scores.
 
     Raises:
@@ -91,9 +92,9 @@ def masks_overlay(masks: InstanceMasks, image: NDArray[np.uint8] | None = None) 
     """
     colours = as_tuples(instance_colours(masks.categories.tolist()))
     names = [f"{mask.name} {mask.score:.2f}" for mask in masks]
-    image = image_like(image, masks.image_size)
-    scale = WIDTH_PX / image.shape[1]
-    picture, covered = _with_masks(image, masks, colours, scale)
+    pixels = image_like(image, masks.image_size)
+    scale = WIDTH_PX / pixels.shape[1]
+    picture, covered = _with_masks(pixels, masks, colours, scale)
     draw_tags(picture, _tags(masks, colours, names, scale), covered, _pen_px(picture))
     return picture
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
+from ldls.checks import as_array, shown
 from ldls.errors import InputError, ParameterError
 from ldls.palette import Colour, as_tuples, label_colours
 from ldls.segmentation import Segmentation
 
 Stage = Literal["direct", "diffused", "final"]
-Images = NDArray[np.uint8] | Sequence[NDArray[np.uint8] | None] | None
+AnImage = NDArray[np.uint8] | Image.Image
+Images = AnImage | Sequence[AnImage | None] | None
 
 STAGES = {"direct": "direct_labels", "diffused": "diffused_labels", "final": "labels"}
 """Field of a result that has the labels of a stage."""
@@ -72,17 +75,20 @@ def images_of(result: Segmentation, images: Images) -> list[NDArray[np.uint8]]:
     """An image for every view: one of those given, or a dark one where there is none.
 
     Raises:
-        InputError: There are more or fewer images than cameras, or one has not the size of the masks.
+        InputError: There is no camera, there are more or fewer images than cameras, or one has not the size of the
+            masks.
     """
-    if images is None:
-        images = [None] * len(result.views)
-    each = [images] if isinstance(images, np.ndarray) and images.ndim == 3 else list(images)
+    if not result.views:
+        raise InputError("result: has no views, expected one or more to draw; birds_eye_view draws its points")
+    given: Any = [None] * len(result.views) if images is None else images
+    several = isinstance(given, Iterable) and not isinstance(given, str) and getattr(given, "ndim", 4) == 4
+    each = list(given) if several else [given]
     if len(each) != len(result.views):
         raise InputError(f"images: got {len(each)}, expected {len(result.views)}, one a camera")
     return [image_like(image, seen.view.masks.image_size) for image, seen in zip(each, result.views, strict=True)]
 
 
-def image_like(image: NDArray[np.uint8] | None, size: tuple[int, int]) -> NDArray[np.uint8]:
+def image_like(image: AnImage | None, size: tuple[int, int]) -> NDArray[np.uint8]:
     """`image` (H, W, 3), or a dark one of the size if it is None.
 
     Raises:
@@ -90,9 +96,10 @@ def image_like(image: NDArray[np.uint8] | None, size: tuple[int, int]) -> NDArra
     """
     if image is None:
         return np.full((*size, 3), CANVAS, np.uint8)
-    if image.shape != (*size, 3) or image.dtype != np.uint8:
+    pixels = as_array("image", image, InputError)
+    if pixels.shape != (*size, 3) or pixels.dtype != np.uint8:
+        found = f"{pixels.shape} {pixels.dtype}" if pixels.ndim else shown(image)
         raise InputError(
-            f"image: expected {(*size, 3)} uint8, the size of the masks, got {image.shape} {image.dtype}; "
-            "read it with ldls.read_image"
+            f"image: expected {(*size, 3)} uint8, the size of the masks, got {found}; read it with ldls.read_image"
         )
-    return image
+    return pixels
