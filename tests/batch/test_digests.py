@@ -11,6 +11,7 @@ from batch import runs
 from ldls import batch
 from ldls.batch import known_files
 from ldls.errors import BatchError, ChangedFileWarning
+from ldls.segmenters import SEGMENTERS, BoxSegmenter
 
 
 def run(source, out, **settings):
@@ -76,7 +77,8 @@ def test_a_file_that_all_frames_share_is_read_once(few, tmp_path, monkeypatch):
     digested = []
     digest_of = known_files.digest_of
     monkeypatch.setattr(known_files, "digest_of", lambda path: (digested.append(path), digest_of(path))[1])
-    shared = f"boxes:{few}/label_2/000000.txt"
+    monkeypatch.setitem(SEGMENTERS, "model", BoxSegmenter.read_kitti)
+    shared = f"model:{few}/label_2/000000.txt"
     out = tmp_path / "out"
     batch.run(few, out, batch.RunSettings(segmenter=shared), workers=1)
     assert 1 <= digested.count(few / "label_2/000000.txt") <= 2

@@ -158,6 +158,37 @@ def test_boxes_of_each_frame(few, tmp_path):
     assert "label_2/000003.txt, of which frame 000003 was made, was changed since" in outcome.output
 
 
+ONE_IMAGE = [
+    pytest.param("segmenter", "boxes:{source}/label_2/000000.txt", 3, 1, "frame", id="boxes"),
+    pytest.param("segmenter", "grabcut:{source}/label_2/000000.txt", 3, 1, "frame", id="grabcut"),
+    pytest.param("segmenter", "boxes:{source}/label_2/{camera}.txt", 2, 2, "frame", id="boxes of cameras"),
+    pytest.param("segmenter", "boxes:{source}/label_2/{frame}.txt", 1, 2, "camera", id="boxes for two cameras"),
+    pytest.param("masks", "{source}/masks/image_2/{frame}.json", 1, 2, "camera", id="masks for two cameras"),
+]
+
+
+@pytest.mark.parametrize(("option", "place", "n_frames", "n_cameras", "word"), ONE_IMAGE)
+@pytest.mark.parametrize("name", ["run", "view"])
+def test_masks_of_one_image_are_not_given_to_others(tmp_path, name, option, place, n_frames, n_cameras, word):
+    source = layouts.many_frames(tmp_path / "source", 3, cameras=range(2, 2 + n_cameras))
+    place = place.replace("{source}", str(source))
+    where = ["--out", tmp_path / "out"] if name == "run" else ["--picture", tmp_path / "seen.png"]
+    cameras = ["--option", f"camera={','.join(map(str, range(2, 2 + n_cameras)))}"]
+    outcome = command(name, source, f"--{option}", place, "--frames", f":{n_frames}", *cameras, *where)
+    assert outcome.exit_code == 1
+    count = max(n_frames, n_cameras)
+    assert f"error: {option}: {place} is the file of one image, there are {count} {word}s" in outcome.output
+    assert f"put {{{word}}} into the path" in outcome.output
+    assert {path.name for path in tmp_path.iterdir()} == {"source"}
+
+
+def test_masks_of_one_image_are_given_to_it(few, tmp_path):
+    words = ("--segmenter", f"boxes:{few}/label_2/000003.txt", "--frames", 3, "--out", tmp_path / "out")
+    outcome = command("run", few, *words)
+    assert outcome.exit_code == 0, outcome.output
+    assert "1 of 1 frames done" in outcome.output
+
+
 def test_rings_with_masks_of_each_camera(tmp_path):
     source = layouts.many_frames(tmp_path / "source", 3, cameras=(2, 3))
     ring = open_source(source, camera=(2, 3))

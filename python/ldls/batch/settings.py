@@ -13,7 +13,7 @@ from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
-from ldls.segmenters.registry import segmenter_file
+from ldls.segmenters.registry import OF_ONE_IMAGE, segmenter_file
 from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS
 from ldls.viewing.formats import BAG, RESULT, check_formats
 
@@ -77,6 +77,29 @@ class RunSettings:
         """Share of common points from which on instances of two images are one object."""
         usual = SAME_OBJECT_OF_SWEEPS if self.sweeps else SAME_OBJECT
         return usual if self.same_object is None else self.same_object
+
+    def check_images(self, n_frames: int, n_cameras: int) -> None:
+        """Refuse a file of one image where there are several, which would all get its masks.
+
+        Args:
+            n_frames: Number of frames that are to be done.
+            n_cameras: Number of images of each.
+
+        Raises:
+            ParameterError: The place of masks or boxes does not tell frames or cameras apart.
+        """
+        name, place = "masks", self.masks
+        if self.segmenter is not None and self.segmenter.partition(":")[0] in OF_ONE_IMAGE:
+            name, place = "segmenter", self.segmenter
+        # what of masks has no {frame} is a folder, or a file of all images
+        elif place is None or "{frame}" not in place:
+            return
+        for word, count in (("frame", n_frames), ("camera", n_cameras)):
+            if count > 1 and f"{{{word}}}" not in place:
+                raise ParameterError(
+                    f"{name}: {place} is the file of one image, there are {count:,} {word}s, which would all get its "
+                    f"masks; put {{{word}}} into the path, where the name of the {word} stands"
+                )
 
     def segmenter_file(self, frame: str, camera: str) -> Path | None:
         """The file that the segmenter of an image is made of, as a model or boxes; None where there is none."""

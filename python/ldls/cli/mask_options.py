@@ -22,6 +22,15 @@ SEGMENTER_HELP = (
     "What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt."
 )
 SegmenterOption = Annotated[str | None, typer.Option(metavar="NAME[:FILE]", help=SEGMENTER_HELP, show_default=False)]
+FrameSegmenterOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME[:FILE]",
+        help="What makes masks of the images: onnx:MODEL.onnx, torchvision[:NAME], boxes:label_2/{frame}.txt or "
+        "grabcut:label_2/{frame}.txt; for several cameras boxes:boxes/{camera}/{frame}.txt.",
+        show_default=False,
+    ),
+]
 MinScoreOption = Annotated[
     float | None,
     typer.Option(metavar="X", help="Lowest score of a mask that counts.", show_default="0.5 of a network, 0 of a file"),

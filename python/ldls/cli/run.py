@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption, chosen_categories, say_own_masks
+from ldls.cli.mask_options import (
+    CategoriesOption,
+    FrameSegmenterOption,
+    MinScoreOption,
+    chosen_categories,
+    say_own_masks,
+)
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.method_options import takes_params
 from ldls.cli.options import (
@@ -39,7 +45,7 @@ def run(
     source: SourceArgument,
     out: OutOption,
     masks: StoredMasksOption = None,
-    segmenter: SegmenterOption = None,
+    segmenter: FrameSegmenterOption = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
     formats: FormatsOption = "npz,label",

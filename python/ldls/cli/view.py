@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ldls.cli.mask_options import CategoriesOption, MinScoreOption, SegmenterOption
+from ldls.cli.mask_options import CategoriesOption, FrameSegmenterOption, MinScoreOption
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import FRAMES_FAILED, PictureOption, refuse
 from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, where_recorded
@@ -40,7 +40,7 @@ def view(
         ),
     ] = None,
     masks: StoredMasksOption = None,
-    segmenter: SegmenterOption = None,
+    segmenter: FrameSegmenterOption = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
     results: Annotated[
@@ -103,7 +103,13 @@ def view(
         refuse({"image": image}, f"{path} is a source, which has its images")
         source, indices = chosen_frames(path, dataset, option or [], frames)
         label = labelled(
-            source, masks=masks, segmenter=segmenter, min_score=min_score, categories=categories, results=results
+            source,
+            indices,
+            masks=masks,
+            segmenter=segmenter,
+            min_score=min_score,
+            categories=categories,
+            results=results,
         )
         failures = show_frames(
             source, indices, label=label, picture=picture, target=target, name=name, diffusion=diffusion

@@ -45,6 +45,7 @@ def chosen_frames(
 
 def labelled(
     source: Source,
+    indices: Sequence[int],
     *,
     masks: str | None,
     segmenter: str | None,
@@ -54,8 +55,11 @@ def labelled(
 ) -> Labelled:
     """Frames of a source, segmented by given masks or its own, or with stored results, or without labels.
 
+    `indices` are those that will be asked for.
+
     Raises:
-        ParameterError: Labels would come from two places, or options choose among masks and there are none.
+        ParameterError: Labels would come from two places, masks of one image are given for several, or options choose
+            among masks and there are none.
         InputError: There are no stored results.
     """
     own = results is None and say_own_masks(source, masks, segmenter)
@@ -72,6 +76,7 @@ def labelled(
 
     chosen = chosen_categories(categories)
     settings = RunSettings(masks=masks, segmenter=segmenter, min_score=min_score, categories=chosen)
+    settings.check_images(len(indices), len(source.camera_names))
     # nothing is written, so there is no folder to write to
     return partial(_segmented, source, FrameWork(source, settings, Path()))
 

@@ -33,6 +33,8 @@ EXAMPLES = {
     "grabcut": "grabcut:label_2/000001.txt",
 }
 WITHOUT_ARGUMENT = frozenset({"torchvision"})
+OF_ONE_IMAGE = frozenset({"boxes", "grabcut"})
+"""Those whose file is of one image."""
 
 
 def segmenter_file(spec: str | None) -> Path | None:
