@@ -24,6 +24,24 @@ def test_real_frames(data_folder, tmp_path):
     assert {"Car", "DontCare"} <= {*found.names}
 
 
+def test_files_that_are_there_are_kept(data_folder, tmp_path):
+    command = ["annotate", str(data_folder / "kitti/training"), str(tmp_path / "out")]
+    assert "kept" not in run(app, command).output
+    made = (tmp_path / "out/000001.txt").read_bytes()
+    (tmp_path / "out/000002.txt").write_text("edited\n")
+    (tmp_path / "out/000001.txt").unlink()
+    outcome = run(app, command)
+    assert outcome.exit_code == 0, outcome.output
+    assert "wrote 1 files" in outcome.output
+    assert "kept 3 that were there; delete them to make them anew" in outcome.output
+    assert (tmp_path / "out/000001.txt").read_bytes() == made
+    assert (tmp_path / "out/000002.txt").read_text() == "edited\n"
+    outcome = run(app, command)
+    assert outcome.exit_code == 0, outcome.output
+    assert "kept 4" in outcome.output
+    assert "annotated" not in outcome.output
+
+
 def test_annotations_are_truth_for_evaluate_and_score_full_against_their_boxes(data_folder, tmp_path):
     training = data_folder / "kitti/training"
     outcome = run(app, ["annotate", str(training), str(tmp_path / "out"), "--no-clean"])
@@ -66,6 +84,6 @@ def test_without_images_the_usual_size_is_taken(broken, tmp_path):
     assert outcome.exit_code == 0, outcome.output
     (broken / "image_2").mkdir()
     (broken / "image_2/000003.png").write_bytes(b"PNG")
-    outcome = run(app, ["annotate", str(broken), str(tmp_path / "out")])
+    outcome = run(app, ["annotate", str(broken), str(tmp_path / "other")])
     assert outcome.exit_code == 1
     assert "000003.png: not a whole image" in outcome.stderr

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.messages import console, say_kept, speaks_plainly
 from ldls.cli.progress import progress
 from ldls.errors import InputError
 
@@ -35,7 +35,8 @@ def annotate(
     """Start point annotations from KITTI's 3D boxes.
 
     Writes a text file a frame, with a line `instance class` for each point of the sweep: the class of the box that
-    holds the point, DontCare for points of DontCare regions and points out of view, or background.
+    holds the point, DontCare for points of DontCare regions and points out of view, or background. Files that are there
+    already are kept: somebody may have edited them.
 
     Example: ldls annotate kitti/training annotations
     """
@@ -47,11 +48,12 @@ def annotate(
     labels = label_paths(training)
     check_outputs({"OUT": [out / path.name for path in labels]}, labels)
     folders = FrameFolders(points=training / "velodyne", calib=training / "calib", images=training / "image_2")
+    missing = [path for path in labels if not (out / path.name).exists()]
     out.mkdir(parents=True, exist_ok=True)
     n_objects: Counter[str] = Counter()
     n_points: Counter[str] = Counter()
     n_ground = 0
-    for path in progress(labels, len(labels), "annotating"):
+    for path in progress(missing, len(missing), "annotating"):
         points, camera = folders.read_points(path.stem), folders.read_camera(path.stem)
         made = annotate_cloud(read_kitti_objects(path), points, camera, clean=clean)
         write_annotations(out / path.name, made.labeling)
@@ -59,10 +61,12 @@ def annotate(
         n_points.update(made.labeling.counts())
         n_ground += made.n_ground
     screen = console()
-    screen.print(summary(n_objects, n_points))
-    if clean:
-        screen.print(f"{n_ground:,} points of ground under objects left them")
-    screen.print(f"wrote {len(labels)} files to {out}", soft_wrap=True)
+    if missing:
+        screen.print(summary(n_objects, n_points))
+        if clean:
+            screen.print(f"{n_ground:,} points of ground under objects left them")
+    screen.print(f"wrote {len(missing)} files to {out}", soft_wrap=True)
+    say_kept(len(labels) - len(missing))
 
 
 def label_paths(training: Path) -> list[Path]:

@@ -114,6 +114,12 @@ def timing_table(timings: Mapping[str, float]) -> Table:
     return table
 
 
+def say_kept(count: int) -> None:
+    """Say how many files or frames were there already and are as they were, if there are any."""
+    if count:
+        console().print(f"kept {count:,} that were there; delete them to make them anew")
+
+
 def console() -> Console:
     """Return the console for tables: as wide as the terminal, and wide enough where there is none; silent if quiet.
 

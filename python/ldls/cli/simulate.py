@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.messages import console, say_kept, speaks_plainly
 from ldls.cli.options import CoresOption, SuitePart
 from ldls.cli.progress import progress
 from ldls.errors import ParameterError
@@ -205,10 +205,8 @@ def _follow(frames: Iterator[FrameSummary | None], total: int, where: Path) -> N
     made = [s for s in summaries if s is not None]
     if made:
         screen.print(summary_table(made))
-    kept = len(summaries) - len(made)
     screen.print(f"wrote {len(made)} frames to {where}", soft_wrap=True)
-    if kept:
-        screen.print(f"kept {kept} that were there; delete them to make them anew")
+    say_kept(len(summaries) - len(made))
 
 
 def _write_bag(
