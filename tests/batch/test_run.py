@@ -355,6 +355,23 @@ def test_a_command_may_be_spelt_from_another_folder(few, tmp_path, monkeypatch):
     assert batch.run("..", tmp_path / "out", replace(STORED, masks="../masks")).n_earlier == 12
 
 
+def test_a_segmenter_is_the_file_that_its_path_leads_to(few, tmp_path, monkeypatch):
+    other = layouts.many_frames(tmp_path / "other", 12)
+    monkeypatch.chdir(few)
+    batch.run(few, tmp_path / "out", batch.RunSettings(segmenter="boxes:label_2/{frame}.txt"))
+    monkeypatch.chdir(few / "velodyne")
+    settings = batch.RunSettings(segmenter="boxes:../label_2/{frame}.txt")
+    assert batch.run("..", tmp_path / "out", settings).n_earlier == 12
+    monkeypatch.chdir(other)
+    with pytest.raises(BatchError, match=r"segmenter was 'boxes:.*source/label_2/{frame}\.txt', is 'boxes:.*other"):
+        batch.run(few, tmp_path / "out", batch.RunSettings(segmenter="boxes:label_2/{frame}.txt"))
+
+
+@pytest.mark.parametrize("spec", ["torchvision", "torchvision:maskrcnn_resnet50_fpn_v2"])
+def test_a_segmenter_without_a_file_is_recorded_as_it_is(spec):
+    assert batch.RunSettings(segmenter=spec).record()["segmenter"] == spec
+
+
 def test_a_run_of_another_version_is_refused(few, tmp_path):
     run(few, tmp_path / "out")
     journal = tmp_path / "out/journal.jsonl"

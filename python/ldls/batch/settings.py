@@ -13,7 +13,7 @@ from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
-from ldls.segmenters.registry import OF_ONE_IMAGE, segmenter_file
+from ldls.segmenters.registry import OF_ONE_IMAGE, resolved, segmenter_file
 from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS
 from ldls.viewing.formats import BAG, RESULT, check_formats
 
@@ -115,6 +115,7 @@ class RunSettings:
         settings["same_object"] = self.share_of_same
         for name, path in (("masks", self.masks), ("poses", self.poses)):
             settings[name] = None if path is None else str(Path(path).resolve())
+        settings["segmenter"] = None if self.segmenter is None else resolved(self.segmenter)
         settings["version"] = _ldls.__version__
         recorded: dict[str, Any] = json.loads(json.dumps(settings))
         return recorded

@@ -43,6 +43,12 @@ def segmenter_file(spec: str | None) -> Path | None:
     return path if path.is_file() else None
 
 
+def resolved(spec: str) -> str:
+    """`spec` with the absolute path of its file, if it names one: the same from any folder."""
+    name, colon, argument = spec.partition(":")
+    return spec if name in WITHOUT_ARGUMENT or not argument else f"{name}{colon}{Path(argument).resolve()}"
+
+
 def open_segmenter(spec: str, *, min_score: float | None = None, **options: Any) -> Segmenter:  # noqa: ANN401
     """The segmenter that `spec` says: a name of `SEGMENTERS`, then after a colon its file or model.
 
