@@ -21,6 +21,10 @@ def test_frames_are_written_and_counted(tmp_path):
     assert sorted(p.name for p in (training / "velodyne").iterdir()) == ["000000.bin", "000001.bin"]
     assert ldls.read_masks(training / "masks/000001.json").image_size == (480, 640)
     assert "kept 2" in run(tmp_path / "out", "--count", 2, "--scene", "campus", "--seed", 4, *SMALL).output
+    other = run(tmp_path / "out", "--count", 3, "--scene", "street", "--seed", 4, *SMALL)
+    assert other.exit_code == 1
+    assert "holds frames that are made of something else" in " ".join(other.output.split())
+    assert len(list((training / "velodyne").iterdir())) == 2
 
 
 def test_no_errors_means_perfect_masks_and_calibration(tmp_path):

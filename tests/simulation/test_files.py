@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 import ldls
+from batch import runs
 from ldls.errors import ParameterError
 from ldls.evaluation import ClassSet
 from ldls.io.labels.annotations import read_annotations
@@ -167,8 +168,30 @@ def test_two_processes_write_what_one_writes(tmp_path):
     list(make_frames(alone, orders(2), processes=1))
     list(make_frames(together, orders(2), processes=2))
     files = sorted(p.relative_to(alone) for p in alone.rglob("*") if p.is_file())
-    assert len(files) == 12
+    assert len(files) == 14
     assert all((alone / f).read_bytes() == (together / f).read_bytes() for f in files)
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        pytest.param({"seed": 7}, "line 3: got '\"seed\": 1', expected '\"seed\": 7'", id="seed"),
+        pytest.param({"kind": "campus"}, '"kind": "campus"', id="scene"),
+        pytest.param({"lidar": "hdl-32e"}, '"lidar": "hdl-32e"', id="lidar"),
+        pytest.param({"camera": "kitti"}, '"camera": "kitti"', id="rig"),
+        pytest.param({"segmenter": SegmenterErrors.none()}, '"mask_cells": 0', id="errors"),
+    ],
+)
+def test_frames_of_another_kind_are_neither_kept_nor_added_to(tmp_path, changed, named):
+    list(make_frames(tmp_path, orders(2), processes=1))
+    before = runs.contents(tmp_path)
+    others = [replace(order, **changed) if order.seed else order for order in orders(3)]
+    with pytest.raises(ParameterError, match=rf"holds frames that are made of something else: 000001\.json: .*{named}"):
+        next(make_frames(tmp_path, others, processes=1))
+    assert runs.contents(tmp_path) == before
+    # what was not finished binds nobody
+    (tmp_path / "training/annotations/000001.txt").unlink()
+    assert [order.is_whole(tmp_path) for order in others] == [True, False, False]
 
 
 def test_no_process_is_refused(tmp_path):

@@ -117,8 +117,8 @@ def simulate(
     is in DATE. With --spinning, points have the coordinates of the lidar at their own time, in which it turns
     clockwise from timestamps_start.txt to timestamps_end.txt of velodyne_points.
 
-    A seed is a frame, or a drive: the same one gives the same files. Frames that are there already are kept; a drive
-    goes on only where it is the same one. Needs the extra `sim` of ldls.
+    A seed is a frame, or a drive: the same one gives the same files. Frames that are there already are kept, and those
+    made of something else refused; a drive goes on only where it is the same one. Needs the extra `sim` of ldls.
 
     With --layout rosbag1, rosbag2 (SQLite) or mcap, OUT holds a bag of the VLP-16 and the camera of a robot, ten
     frames a second, and masks (of the right categories) and annotations named by stamp. With --spinning, points have a

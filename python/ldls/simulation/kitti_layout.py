@@ -5,6 +5,7 @@ OUT/training/image_2/NNNNNN.png      image ahead
 OUT/training/calib/NNNNNN.txt        calibration as given; P0, P1 and P3 repeat P2, as there is one camera
 OUT/training/label_2/NNNNNN.txt      boxes of the objects in the image
 OUT/training/masks/NNNNNN.json       masks that the segmenter finds, as COCO JSON with scores
+OUT/training/made_of/NNNNNN.json     what the frame is made of; no other is taken for it
 OUT/training/annotations/NNNNNN.txt  `instance class`, a line a point of the whole cloud; `0 background` for no object
 
 The other cameras of a ring have image_ring_K, calib_ring_K (their P2) and masks_ring_K, K from 1 to 5, to the left.
@@ -13,7 +14,8 @@ The other cameras of a ring have image_ring_K, calib_ring_K (their P2) and masks
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import zip_longest
 from os import PathLike
 from pathlib import Path
 
@@ -22,7 +24,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.camera import Camera
-from ldls.io.files import whole_file
+from ldls.errors import ParameterError
+from ldls.io.files import read_lines, whole_file
 from ldls.io.images import png_of
 from ldls.io.labels import write_annotations
 from ldls.io.labels.kitti_objects import in_camera_frame
@@ -47,6 +50,28 @@ def write_kitti(folder: str | PathLike[str], name: str, frame: SimulatedFrame) -
         write_masks(training / f"masks{ring}" / f"{name}.json", image.masks, int(name))
     write_lines(training / "label_2" / f"{name}.txt", _label_rows(frame.objects, frame.images[0]))
     write_truth(training / "annotations" / f"{name}.txt", frame)
+
+
+def check_there(path: Path, expected: Mapping[Path, Sequence[str]], other: str) -> None:
+    """Refuse to go on with something else: each file that is there is as it would be written, or its beginning.
+
+    Args:
+        path: The folder that holds them.
+        expected: The lines of each file.
+        other: What the folder holds where they differ, for the message.
+
+    Raises:
+        ParameterError: One is not.
+    """
+    for file, lines in expected.items():
+        found = read_lines(file) if file.is_file() else []
+        for number, (got, line) in enumerate(zip_longest(found, lines[: len(found)]), start=1):
+            if got != line:
+                wanted = "no more lines" if line is None else repr(line.strip(" ,"))
+                raise ParameterError(
+                    f"{path}: holds {other}: {file.name}: line {number}: got {got.strip(' ,')!r}, expected {wanted}; "
+                    "write to another folder, or remove it"
+                )
 
 
 def write_points(path: Path, frame: SimulatedFrame) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from os import PathLike, fspath
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
-from ldls.simulation.kitti_layout import write_kitti
+from ldls.simulation.kitti_layout import check_there, write_kitti, write_lines
 from ldls.simulation.rigs import make_rig
 from ldls.simulation.simulated_frame import SimulatedFrame, scene_frame
 
@@ -41,7 +42,11 @@ class Order(Protocol):
         ...
 
     def is_whole(self, folder: str | PathLike[str]) -> bool:
-        """True where the frame is in `folder` with all its files."""
+        """True where the frame is in `folder` with all its files.
+
+        Raises:
+            ParameterError: Another frame is in its place.
+        """
         ...
 
     def make(self, folder: str | PathLike[str]) -> SimulatedFrame:
@@ -72,15 +77,30 @@ class FrameOrder:
     sensors: SensorErrors
 
     def is_whole(self, folder: str | PathLike[str]) -> bool:
-        """True where the frame is in `folder`; its annotations come last."""
-        return (Path(folder) / "training" / "annotations" / f"{self.name}.txt").is_file()
+        """True where the frame is in `folder`; its annotations come last.
+
+        Raises:
+            ParameterError: It is made of something else.
+        """
+        training = Path(folder) / "training"
+        if not (training / "annotations" / f"{self.name}.txt").is_file():
+            return False
+        check_there(training, {self._noted(folder): self._made_of()}, "frames that are made of something else")
+        return True
 
     def make(self, folder: str | PathLike[str]) -> SimulatedFrame:
         """Make and write the frame."""
+        write_lines(self._noted(folder), self._made_of())
         rig = make_rig(lidar=self.lidar, camera=self.camera)
         frame = scene_frame(self.seed, kind=self.kind, rig=rig, segmenter=self.segmenter, sensors=self.sensors)
         write_kitti(folder, self.name, frame)
         return frame
+
+    def _noted(self, folder: str | PathLike[str]) -> Path:
+        return Path(folder) / "training" / "made_of" / f"{self.name}.json"
+
+    def _made_of(self) -> list[str]:
+        return json.dumps(asdict(self), indent=1).splitlines()
 
 
 @dataclass(frozen=True)
@@ -110,7 +130,7 @@ def make_frames(
     With more than one process, call it from a script's main part only, as Python starts processes anew.
 
     Raises:
-        ParameterError: `processes` is below 1.
+        ParameterError: `processes` is below 1, or a frame that is there is made of something else.
         ImportError: `ldls[sim]` is not installed.
     """
     check_processes(processes)

@@ -19,20 +19,25 @@ NNNN is the seed; a day is that of the seed too, for its calibration is.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from itertools import zip_longest
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.errors import ParameterError
-from ldls.io.files import read_lines
 from ldls.io.poses.kitti_raw import EARTH_RADIUS_M
 from ldls.simulation.drives import PERIOD_S, Drive, drive_frame, drive_plan, drive_poses
-from ldls.simulation.kitti_layout import row_of, write_lines, write_masks, write_picture, write_points, write_truth
+from ldls.simulation.kitti_layout import (
+    check_there,
+    row_of,
+    write_lines,
+    write_masks,
+    write_picture,
+    write_points,
+    write_truth,
+)
 from ldls.simulation.production import FrameSummary, check_processes, make_frames
 from ldls.simulation.simulated_frame import SimulatedFrame
 
@@ -66,7 +71,7 @@ def write_drive(folder: str | PathLike[str], drive: Drive, *, processes: int = 1
     shared = {path / "drive.json": _made_of(drive)} | _calibration(path.parent, drive) | _stamps(path, drive)
     for number, pose in enumerate(drive_poses(drive)):
         shared[path / "oxts/data" / f"{number:010d}.txt"] = [_measured(drive, pose)]
-    _check_there(path, shared)
+    check_there(path, shared, "another drive, or more frames")
     for file, lines in shared.items():
         if lines:
             write_lines(file, lines)
@@ -103,23 +108,6 @@ class DriveFrameOrder:
         write_masks(path / "masks_02" / f"{self.name}.json", image.masks, self.number)
         write_truth(path / "annotations" / f"{self.name}.txt", frame)
         return frame
-
-
-def _check_there(path: Path, shared: Mapping[Path, Sequence[str]]) -> None:
-    """Refuse to go on with another drive: each shared file that is there is as it would be written, or its beginning.
-
-    Raises:
-        ParameterError: One is not.
-    """
-    for file, expected in shared.items():
-        found = read_lines(file) if file.is_file() else []
-        for number, (got, line) in enumerate(zip_longest(found, expected[: len(found)]), start=1):
-            if got != line:
-                wanted = "no more lines" if line is None else repr(line.strip(" ,"))
-                raise ParameterError(
-                    f"{path}: holds another drive, or more frames: {file.name}: line {number}: got "
-                    f"{got.strip(' ,')!r}, expected {wanted}; write to another folder, or remove it"
-                )
 
 
 def _made_of(drive: Drive) -> list[str]:
