@@ -1,4 +1,4 @@
-"""COCO's categories, by the ids of its 91-entry list."""
+"""COCO's categories, by the ids of its 91-entry list, and what other data sets call the same classes."""
 
 from __future__ import annotations
 
@@ -31,6 +31,21 @@ FIRST_OTHER_ID = 100
 """Category id of class 0 of another program where COCO has no class of its name."""
 _COCO_IDS = {name: category for category, name in COCO_NAMES.items()}
 
+SYNONYMS: tuple[tuple[str, ...], ...] = (
+    ("Car", "car", "moving-car", "vehicle.car"),
+    ("Pedestrian", "pedestrian", "person", "moving-person", "human.pedestrian.adult", "human.pedestrian.child",
+     "human.pedestrian.construction_worker", "human.pedestrian.personal_mobility", "human.pedestrian.police_officer",
+     "human.pedestrian.stroller", "human.pedestrian.wheelchair"),
+    ("Cyclist", "cyclist", "bicyclist", "moving-bicyclist"),
+    ("Truck", "truck", "moving-truck", "vehicle.truck"),
+    ("Tram", "train", "on-rails", "moving-on-rails"),
+    ("bicycle", "vehicle.bicycle"),
+    ("motorcycle", "vehicle.motorcycle"),
+    ("bus", "moving-bus", "vehicle.bus.rigid", "vehicle.bus.bendy"),
+)  # fmt: skip
+"""Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes; the usual one of several first."""
+_GROUPS = {name: group for group in SYNONYMS for name in group}
+
 
 def category_ids(names: Mapping[int, str]) -> tuple[dict[int, int], dict[int, str]]:
     """Category id of each class index of another program, and the name of each such id.
@@ -49,6 +64,20 @@ def category_ids(names: Mapping[int, str]) -> tuple[dict[int, int], dict[int, st
         raise ParameterError(f"names: class {wrong[0]} is negative, expected 0 or more")
     ids = {index: _COCO_IDS.get(name.strip().lower(), FIRST_OTHER_ID + index) for index, name in names.items()}
     return ids, {ids[index]: COCO_NAMES.get(ids[index], name) for index, name in names.items()}
+
+
+def synonyms(name: str) -> tuple[str, ...]:
+    """All names that mean the class `name`, itself first."""
+    return (name, *(other for other in _GROUPS.get(name, ()) if other != name))
+
+
+def own_name(name: str, own: Iterable[str], wider: Mapping[str, str]) -> str | None:
+    """What a data set with the classes `own` calls the class `name`; None where it has no such class.
+
+    `wider` says which of its classes holds one that it has no name for.
+    """
+    names = {**wider, **{each: each for each in own}}
+    return next((names[each] for each in synonyms(name) if each in names), None)
 
 
 def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> list[int]:

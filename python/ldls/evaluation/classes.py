@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.categories import COCO_NAMES
+from ldls.categories import COCO_NAMES, synonyms
 from ldls.checks import checked
 from ldls.errors import InputError, ParameterError
 from ldls.io.labels.kitti_objects import KITTI
@@ -24,19 +24,6 @@ LEFT_OUT: tuple[str, ...] = ("Van", "Cyclist", "Misc", "DontCare")
 
 VOID: tuple[str, ...] = ("unlabeled", "outlier", "noise", "vehicle.ego")
 """Names under which a data set says that it does not know, or that the sensor saw its own car."""
-
-SYNONYMS: tuple[tuple[str, ...], ...] = (
-    ("Car", "car", "moving-car", "vehicle.car"),
-    ("Pedestrian", "pedestrian", "person", "moving-person",
-     *(name for name in NUSCENES.values() if name.startswith("human.pedestrian."))),
-    ("Cyclist", "cyclist", "bicyclist", "moving-bicyclist"),
-    ("Truck", "truck", "moving-truck", "vehicle.truck"),
-    ("Tram", "train", "on-rails", "moving-on-rails"),
-    ("bicycle", "vehicle.bicycle"),
-    ("motorcycle", "vehicle.motorcycle"),
-    ("bus", "moving-bus", "vehicle.bus.bendy", "vehicle.bus.rigid"),
-)  # fmt: skip
-"""Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes."""
 
 
 @checked
@@ -105,7 +92,7 @@ class ClassSet:
             raise ParameterError(f"leave_out: {clash} are scored too; score a class or leave it out")
         aliases = {alias: name for name in names for alias in _merged(name, merge_sitting) if alias not in names}
         wanted = LEFT_OUT if leave_out is None else leave_out
-        left_out = {alias for name in wanted for alias in _synonyms(name)}
+        left_out = {alias for name in wanted for alias in synonyms(name)}
         left_out |= {*VOID} | (set() if merge_sitting else {SITTING})
         left_out -= {*names, *aliases}
         others = (known | {*background}) - left_out - {*names, *aliases}
@@ -172,13 +159,8 @@ def _distinct_instances(labeling: Labeling, classes: NDArray[np.int32]) -> NDArr
 
 
 def _merged(name: str, merge_sitting: bool) -> tuple[str, ...]:
-    group = _synonyms(name)
+    group = synonyms(name)
     return (*group, SITTING) if merge_sitting and "Pedestrian" in group else group
-
-
-def _synonyms(name: str) -> tuple[str, ...]:
-    """All names that mean the class `name`, itself among them."""
-    return next((group for group in SYNONYMS if name in group), (name,))
 
 
 def _known_names() -> set[str]:

@@ -125,6 +125,26 @@ def test_the_writer_and_the_reader_of_label_files_agree(small_scene, tmp_path):
     assert class_names(found) == [expected[c] for c in result.categories.tolist()]
 
 
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        pytest.param("car", "car", id="COCO's car under the id of its person"),
+        pytest.param("vehicle.car", "car", id="nuScenes"),
+        pytest.param("Pedestrian", "person", id="KITTI's person"),
+        pytest.param("Cyclist", "bicyclist", id="KITTI's cyclist"),
+        pytest.param("train", "on-rails", id="COCO's train"),
+        pytest.param("moving-bus", "moving-bus", id="a name of its own"),
+        pytest.param("stop sign", "traffic-sign", id="in a wider class"),
+        pytest.param("gnome", "other-object", id="unknown"),
+    ],
+)
+def test_classes_of_label_files_go_by_name(small_scene, tmp_path, name, expected):
+    points, masks, camera = small_scene
+    own = ldls.InstanceMasks.from_array(masks.to_array(), categories=[1, 2], names={1: name, 2: "person"})
+    ldls.save(ldls.segment(points, own, camera), tmp_path / "a.label")
+    assert set(class_names(read_semantic_kitti(tmp_path / "a.label"))) == {"unlabeled", expected, "person"}
+
+
 def test_nuscenes(tmp_path):
     np.array([17, 2, 0, 24], np.uint8).tofile(tmp_path / "a_lidarseg.bin")
     found = read_lidarseg(tmp_path / "a_lidarseg.bin")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ldls.categories import own_name
 from ldls.errors import CorruptFileError, InputError, LimitError, TruncatedFileError
 from ldls.io.files import open_file, whole_file
 from ldls.labeling import Labeling
@@ -22,10 +23,11 @@ SEMANTIC_KITTI: dict[int, str] = {
 }  # fmt: skip
 """Classes by their numbers."""
 
-OTHER_OBJECT = 99
-CLASSES = {1: 30, 2: 11, 3: 10, 4: 15, 6: 13, 7: 16, 8: 18, 13: 81, 64: 70}
-"""SemanticKITTI class of a COCO category: person, bicycle, car, motorcycle, bus, on-rails, truck, traffic sign and
-vegetation; anything else is `OTHER_OBJECT`. Background and points out of view are 0, unlabeled."""
+NUMBERS = {name: number for number, name in SEMANTIC_KITTI.items()}
+OTHER_OBJECT = "other-object"
+WIDER = {"Person_sitting": "person", "stop sign": "traffic-sign", "potted plant": "vegetation"}
+"""Class of what has none of its own; anything else is `OTHER_OBJECT`. Background and points out of view are 0,
+unlabeled."""
 LABEL_BYTES = 4
 MOST_INSTANCES = (1 << 16) - 1
 
@@ -54,13 +56,13 @@ def write(path: Path, result: Segmentation) -> None:
     Raises:
         LimitError: An instance has a number beyond 16 bits.
     """
-    classes = [CLASSES.get(instance.category, OTHER_OBJECT) for instance in result.instances]
+    names = [own_name(instance.name, NUMBERS, WIDER) or OTHER_OBJECT for instance in result.instances]
     numbers = result.instance_ids
     if numbers.max() > MOST_INSTANCES:
         raise LimitError(
             f"{path}: a .label has 16 bits for the number of an instance, got {numbers.max()}; expected at most "
             f"{MOST_INSTANCES:,}; .npz keeps any"
         )
-    codes = np.array([0, *classes], np.uint32) | numbers.astype(np.uint32) << 16
+    codes = np.array([0, *(NUMBERS[name] for name in names)], np.uint32) | numbers.astype(np.uint32) << 16
     with whole_file(path) as file:
         file.write(result.per_point(codes).astype("<u4").tobytes())
