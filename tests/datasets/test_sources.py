@@ -105,6 +105,18 @@ def test_a_raw_drive_leaves_out_frames_that_lack_a_file(tmp_path):
         assert len(open_source(drive)) == 2
 
 
+def test_frames_are_in_the_order_of_their_numbers(tmp_path):
+    names = [str(number) for number in range(12)]
+    assert open_source(layouts.plain_folder(tmp_path / "folder", frames=names)).names == tuple(names)
+    frames = layouts.kitti_object(tmp_path / "kitti", frames=names)
+    for name in ("10", "2"):
+        (frames / f"calib/{name}.txt").unlink()
+    with pytest.warns(LeftOutWarning, match="2 of 12 sweeps"):
+        source = open_source(frames)
+    assert source.names == tuple(name for name in names if name not in ("2", "10"))
+    assert list(source.left_out) == ["2", "10"]
+
+
 def way(n, step_m=0.5):
     """A lidar that goes ahead and turns to the left."""
     poses = np.tile(np.eye(4), (n, 1, 1))

@@ -16,6 +16,7 @@ from ldls.cloud import Points
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.errors import InputError, LeftOutWarning, SourceError, some, within
 from ldls.io import read_image, read_points
+from ldls.io.files import name_order
 from ldls.io.labels import read_labeling
 from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
@@ -30,7 +31,7 @@ class FileSource:
 
     Attributes:
         path: Folder of the source.
-        names: Names of the frames of which every file is there, sorted.
+        names: Names of the frames of which every file is there, in the order of `name_order`.
         stamps: Times of the sweeps in seconds; None where the source does not say.
         left_out: Parts that the others lack, by name of the frame.
         camera_names: Name of the camera of each image of a frame.
@@ -60,13 +61,14 @@ class FileSource:
         self.path, self.camera_names = path, tuple(camera_names)
         self._parts, self._truth, self._columns = parts, truth, columns
         lacks = {name: [part for part in parts if name not in parts[part]] for name in set().union(*parts.values())}
-        self.names = tuple(sorted(name for name, missing in lacks.items() if not missing))
+        self.names = tuple(sorted((name for name, missing in lacks.items() if not missing), key=name_order))
         if not self.names:
             counts = ", ".join(f"{part} {len(files)}" for part, files in parts.items())
             raise SourceError(f"{path}: no frame has a file in each of these, found {counts}; names must agree")
         self.stamps: tuple[float | None, ...] = (None,) * len(self.names)
         self._trajectory: Trajectory | None = None
-        self.left_out = {name: f"no {' and no '.join(lacks[name])}" for name in sorted(lacks) if lacks[name]}
+        left_out = sorted((name for name, missing in lacks.items() if missing), key=name_order)
+        self.left_out = {name: f"no {' and no '.join(lacks[name])}" for name in left_out}
         self._points = next(iter(parts.values()))
         warn_left_out(path, [why for name, why in self.left_out.items() if name in self._points], len(self._points))
 
@@ -136,7 +138,7 @@ def find_files(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
     """
     check_folders(folder.parent, [folder.name])
     files = (path for path in folder.iterdir() if path.suffix in suffixes and not path.name.startswith("."))
-    return {path.name.removesuffix(path.suffix): path for path in sorted(files)}
+    return {path.name.removesuffix(path.suffix): path for path in sorted(files, key=lambda path: name_order(path.name))}
 
 
 def find_points(folder: Path) -> dict[str, Path]:

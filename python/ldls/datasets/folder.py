@@ -35,7 +35,7 @@ class FolderSource(FileSource):
     Attributes:
         kind: "folder".
         path: Folder of ldls.toml.
-        names: Values of {frame}, sorted.
+        names: Values of {frame}, sorted; numbers by their value.
         stamps: Times of the sweeps in seconds; None for each without a file of stamps.
         left_out: Parts that incomplete frames lack, by name of the frame.
         stored_masks: Place of the masks of each camera that has them, as the description names it.

@@ -24,6 +24,15 @@ def test_frames_are_paired_by_name(tmp_path):
     assert frame.prediction == LabelFile(ours / "1.label", "label")
 
 
+def test_frames_are_in_the_order_of_their_numbers(tmp_path):
+    names = [str(number) for number in range(12)]
+    ours = touch(tmp_path / "ours", *(f"{name}.npz" for name in names))
+    theirs = touch(tmp_path / "theirs", *(f"{name}.label" for name in names if name not in ("2", "10")))
+    frames, lacking = pair_files(ours, theirs, missing="skip")
+    assert [frame.name for frame in frames] == [name for name in names if name not in ("2", "10")]
+    assert lacking == ("2", "10")
+
+
 def test_nuscenes_endings_belong_to_the_format(tmp_path):
     ours = touch(tmp_path / "ours", "token_panoptic.npz")
     theirs = touch(tmp_path / "theirs", "token_lidarseg.bin")
@@ -34,7 +43,7 @@ def test_nuscenes_endings_belong_to_the_format(tmp_path):
 def test_frames_without_their_pair_are_listed(tmp_path):
     ours = touch(tmp_path / "ours", "1.npz", "2.npz")
     theirs = touch(tmp_path / "theirs", "2.label", *(f"{n}.label" for n in range(3, 15)))
-    with pytest.raises(InputError, match="1 of .*ours have no truth; 10, 11, 12, 13, 14, 3, .* and 2 more of .*theirs"):
+    with pytest.raises(InputError, match="1 of .*ours have no truth; 3, 4, 5, 6, 7, 8, .* and 2 more of .*theirs"):
         pair_files(ours, theirs)
     frames, lacking = pair_files(ours, theirs, missing="skip")
     assert [frame.name for frame in frames] == ["2"]

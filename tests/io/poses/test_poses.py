@@ -155,6 +155,16 @@ def test_oxts_lead_over_the_imu_to_the_lidar(tmp_path):
     np.testing.assert_allclose(trajectory.poses[:, :3, :3], WAY[:, :3, :3], atol=1e-6)
 
 
+def test_oxts_are_in_the_order_of_their_numbers(tmp_path):
+    folder = oxts(tmp_path)
+    lines = (folder / "timestamps.txt").read_text()
+    (folder / "timestamps.txt").write_text("\n" * 8 + lines)
+    expected = ldls.read_poses(oxts(tmp_path / "padded"))
+    for number, file in enumerate(sorted((folder / "data").iterdir()), start=8):
+        file.rename(folder / f"data/{number}.txt")
+    np.testing.assert_array_equal(ldls.read_poses(folder).poses, expected.poses)
+
+
 def test_oxts_without_a_stamp_are_left_out(tmp_path):
     folder = oxts(tmp_path)
     lines = (folder / "timestamps.txt").read_text().splitlines()

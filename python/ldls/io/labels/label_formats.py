@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
 from ldls.errors import InputError, ParameterError, UnsupportedFormatError, some
-from ldls.io.files import folder_hint, open_file
+from ldls.io.files import folder_hint, name_order, open_file
 from ldls.io.labels.annotations import is_annotation, read_annotations
 from ldls.io.labels.kitti_objects import is_kitti_object, read_kitti_boxes
 from ldls.io.labels.labeling_npz import read_labeling_npz
@@ -154,7 +154,7 @@ def pair_files(
     truth_format: str | None = None,
     missing: Literal["error", "skip"] = "error",
 ) -> tuple[tuple[LabelFiles, ...], tuple[str, ...]]:
-    """The frames that both sides have, by name, and the names of those that only one side has.
+    """The frames that both sides have, in the order of `name_order`, and the names of those that only one side has.
 
     Two files are one frame, whatever their names. In a folder that holds a frame in several formats, the one that comes
     first in `FORMATS` is taken.
@@ -170,12 +170,14 @@ def pair_files(
     theirs = label_files(truth, truth_format)
     if Path(predictions).is_file() and Path(truth).is_file():
         theirs = dict(zip(ours, theirs.values(), strict=True))
-    lacking = sorted(ours.keys() ^ theirs.keys())
-    both = sorted(ours.keys() & theirs.keys())
+    lacking = sorted(ours.keys() ^ theirs.keys(), key=name_order)
+    both = sorted(ours.keys() & theirs.keys(), key=name_order)
     if lacking and (missing == "error" or not both):
         sides = (predictions, "no truth", ours.keys() - theirs), (truth, "no prediction", theirs.keys() - ours)
         listed = "; ".join(
-            f"{some(sorted(names), LISTED)} of {side} have {what}" for side, what, names in sides if names
+            f"{some(sorted(names, key=name_order), LISTED)} of {side} have {what}"
+            for side, what, names in sides
+            if names
         )
         raise InputError(f"frames without their pair: {listed}; add them, or skip them (--missing skip)")
     return tuple(LabelFiles(name, ours[name], theirs[name]) for name in both), tuple(lacking)

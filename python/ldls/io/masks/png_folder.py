@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ldls.errors import MaskError, within
-from ldls.io.files import open_file
+from ldls.io.files import name_order, open_file
 from ldls.io.images import read_image
 from ldls.masks import InstanceMasks
 
@@ -37,7 +37,7 @@ def read(
     Raises:
         MaskError: There is no PNG, or they are of different sizes or no masks, or metadata.csv is of others.
     """
-    files = sorted(Path(path).glob("*.png"), key=lambda file: (len(file.stem), file.stem))
+    files = sorted(Path(path).glob("*.png"), key=lambda file: name_order(file.stem))
     if not files:
         raise MaskError(f"{path}: a folder without .png, expected one an instance")
     if scores is None and (Path(path) / METADATA).is_file():

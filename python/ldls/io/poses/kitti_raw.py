@@ -17,7 +17,7 @@ from ldls.camera.extrinsic import turn_of
 from ldls.camera.rigid import from_parts, inverse, rigid
 from ldls.errors import CorruptFileError, UnsupportedFormatError, within
 from ldls.io.cameras.kitti import read_raw_transform
-from ldls.io.files import open_file
+from ldls.io.files import name_order, open_file
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
 from ldls.io.poses.pose_rows import check_ascending, read_pose_rows
 from ldls.sequences import Trajectory
@@ -45,7 +45,8 @@ def read(path: Path) -> Trajectory:
         FileFormatError: A file is broken; the message names it.
         FileNotFoundError: The stamps, or the calibration of the day, are missing.
     """
-    files = {file.stem: file for file in sorted((path / "data").glob("*.txt")) if not file.name.startswith(".")}
+    found = sorted((path / "data").glob("*.txt"), key=lambda file: name_order(file.name))
+    files = {file.stem: file for file in found if not file.name.startswith(".")}
     if not files:
         raise UnsupportedFormatError(f"{path}: no folder of poses, expected KITTI's oxts with data/*.txt")
     calibration = path.absolute().parents[1] / CALIBRATION

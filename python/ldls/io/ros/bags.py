@@ -23,7 +23,7 @@ from ldls.errors import (
     UnsupportedFormatError,
     within,
 )
-from ldls.io.files import opened, parsing
+from ldls.io.files import name_order, opened, parsing
 from ldls.io.ros.known_types import KnownTypes
 from ldls.io.ros.messages import Message, RawMessage, Topic, Types, seconds, standard_types
 from ldls.io.ros.salvage import NO_LIMIT, Salvage, check_database_size, open_bag_file, salvage
@@ -178,7 +178,9 @@ def storage_files(path: Path) -> list[Path]:
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such bag")
     if path.is_dir():
-        return sorted(file for file in path.iterdir() if file.suffix in SUFFIXES)
+        return sorted(
+            (file for file in path.iterdir() if file.suffix in SUFFIXES), key=lambda file: name_order(file.name)
+        )
     with open_bag_file(path):
         if path.suffix not in SUFFIXES:
             raise UnsupportedFormatError(f"expected a {', '.join(SUFFIXES)} file or a folder with metadata.yaml")
