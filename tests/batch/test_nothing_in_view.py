@@ -121,7 +121,7 @@ def test_segment_exits_well_and_prints_the_warning(astray, tmp_path):
     words = [word for name, file in files.items() for word in (f"--{name}", str(astray / file))]
     outcome = runs.finished(["segment", *words, "--out", str(tmp_path / "out")])
     assert outcome.returncode == 0
-    assert outcome.stderr.startswith("warning: points: every point lies behind the camera; nothing is labelled; is ")
+    assert outcome.stderr.startswith("warning: --points: every point lies behind the camera; nothing is labelled; is ")
     assert outcome.stderr.count("\n") == 1
 
 

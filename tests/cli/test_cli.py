@@ -281,7 +281,7 @@ def test_polygons_take_the_size_of_the_image_from_the_calibration(demo, tmp_path
     words[at] = str(demo[0] / "input/calib.txt")
     at = words.index("--image")
     outcome = run(app, [*words[:at], *words[at + 2 :]])
-    assert "a.txt: says nothing of the image's size; give the image, or image_size=" in outcome.stderr
+    assert "a.txt: says nothing of the image's size; give its --image" in outcome.stderr
 
 
 def test_errors_of_the_system_are_said_without_their_number(tmp_path):

@@ -291,7 +291,7 @@ def test_range_comes_of_the_points(frames):
         np.save(frames / f"{name}.npy", np.array([[1, 0, 0], [30, 0, 0], [1, 1, 0], [2, 0, 0]], np.float32))
     outcome = evaluate(frames, "--max-range", "20")
     assert outcome.exit_code == 1
-    assert "needs the points' ranges_m" in outcome.stderr
+    assert "has no ranges of its points; give its --points" in outcome.stderr
     outcome = evaluate(frames, "--max-range", "20", "--points", frames, "--out", frames / "t")
     assert outcome.exit_code == 0, outcome.output
     assert scores(frames / "t")["Car recall"] == 100.0
@@ -334,7 +334,7 @@ def test_formats_are_asked_for_where_no_file_tells(frames):
         (frames / f"truth/{name}.txt").write_text("")
     outcome = evaluate(frames)
     assert outcome.exit_code == 1
-    assert "may be annotations or kitti-boxes; say which by format=, or as FORMAT:PATH" in outcome.stderr
+    assert "may be annotations or kitti-boxes; say which by FORMAT:PATH" in outcome.stderr
     outcome = run(app, ["evaluate", str(frames / "mine"), f"kitti-boxes:{frames / 'truth'}"])
     assert outcome.exit_code == 1
     assert "frame 1: needs its points" in outcome.stderr

@@ -81,13 +81,13 @@ def test_variants_are_written(masks):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        pytest.param(["out.png"], "overlap", id="overlaps in a PNG"),
+        pytest.param(["out.png"], "--resolve score leaves it to one", id="overlaps in a PNG"),
         pytest.param(["out.npy"], "pixels", id="categories would be lost"),
         pytest.param(["out.tiff"], "cannot write '.tiff'", id="suffix"),
         pytest.param(["out.json", "--categories", "carr"], "did you mean 'car'", id="category"),
         pytest.param(["out.json", "--image-size", "12"], "expected HEIGHTxWIDTH", id="size"),
         pytest.param(["out.json", "--image-size", "60x40"], "swapped", id="swapped"),
-        pytest.param(["out.json", "--min-score", "2"], "min_score: got 2.0", id="score"),
+        pytest.param(["out.json", "--min-score", "2"], "--min-score: got 2.0", id="score"),
     ],
 )
 def test_faults_are_said_in_a_line_and_nothing_is_written(masks, words, message):

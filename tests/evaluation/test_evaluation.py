@@ -66,7 +66,7 @@ def test_errors_name_the_frame():
         pair(prediction=labeling([1]))
     with pytest.raises(ShapeError, match=r"frame a: ranges_m: expected shape \(4,\), got \(3,\)"):
         pair(ranges_m=np.zeros(3))
-    with pytest.raises(InputError, match="frame a: max_range_m needs the points' ranges_m"):
+    with pytest.raises(InputError, match="max_range_m: frame a has no ranges of its points; give its ranges_m="):
         evaluate([pair()], classes=CLASSES, max_range_m=10)
     unknown = labeling([1, 1, 1, 1], names=("background", "gnome"))
     with pytest.raises(InputError, match="frame a: truth has points of \\['gnome'\\]"):

@@ -32,7 +32,7 @@ def test_polygons_of_yolo(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        pytest.param(f"2 {YOLO}", {"image_size": None}, "give the image, or image_size=", id="no size"),
+        pytest.param(f"2 {YOLO}", {"image_size": None}, "give its image_size=", id="no size"),
         pytest.param("2 0.5 0.5 0.1 0.2", {}, r"line 1: a box, expected a polygon", id="boxes"),
         pytest.param(f"80 {YOLO}", {}, "class 80 has no name; pass names=", id="unknown class"),
         pytest.param("2 10 10 20 10 20 20", {}, "as shares of the image from 0 to 1", id="pixels"),

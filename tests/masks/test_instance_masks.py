@@ -342,7 +342,7 @@ def test_an_array_with_the_masks_last_is_refused_until_it_says_so():
     pixels = np.zeros((120, 160, 2), bool)
     pixels[5:9, 5:9, 1] = True
     with pytest.raises(
-        ldls.MaskError, match=r"looks like 2 masks of 120 x 160; pass instance_axis=-1, or 0 if it is 120"
+        ldls.MaskError, match=r"looks like 2 masks of 120 x 160; pass instance_axis=-1, or instance_axis=0 if it is 120"
     ):
         ldls.InstanceMasks.from_array(pixels)
     assert ldls.InstanceMasks.from_array(pixels, instance_axis=-1).image_size == (120, 160)

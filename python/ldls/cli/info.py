@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.messages import console, in_options, speaks_plainly
 from ldls.cli.options import refuse
 from ldls.cli.progress import progress
 from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption, parse_options
@@ -190,7 +190,7 @@ def finding_table(findings: Sequence[Finding]) -> Table:
         table.add_column(heading, overflow="fold")
     in_order = sorted(findings, key=lambda finding: not finding.broken)
     for finding in in_order[:SHOWN]:
-        table.add_row("broken" if finding.broken else "look", finding.frame, finding.what)
+        table.add_row("broken" if finding.broken else "look", finding.frame, in_options(finding.what))
     if len(findings) > SHOWN:
         table.add_row("", "", f"and {len(findings) - SHOWN:,} more")
     return table

@@ -7,12 +7,15 @@ import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from rich.console import Console
 from rich.table import Table
+from typer.models import OptionInfo
 
+from ldls.cli.option_names import by_options
 from ldls.errors import LdlsError
 
 if TYPE_CHECKING:
@@ -38,11 +41,17 @@ QUIET = inspect.Parameter(
     annotation=Annotated[bool, typer.Option("--quiet", "-q", help="Print errors and warnings only.")],
 )
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+_options: ContextVar[Mapping[str, str]] = ContextVar("options", default=MappingProxyType({}))
 
 
 def is_quiet() -> bool:
     """Return True where --quiet was given."""
     return _quiet.get()
+
+
+def in_options(message: str) -> str:
+    """`message` of the library with the options of the command in place of arguments."""
+    return by_options(message, _options.get())
 
 
 def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
@@ -54,10 +63,12 @@ def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
     parameters = [*own.parameters.values()]
     if "out" in own.parameters:
         parameters.append(QUIET)
+    options = {each.name: option for each in parameters if (option := _option(each)) is not None}
 
     @functools.wraps(command)
     def wrapped(*args: Any, quiet: bool = False, **kwargs: Any) -> R:  # noqa: ANN401 - what Typer parsed
         _quiet.set(quiet)
+        _options.set(options)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("default")
             try:
@@ -67,7 +78,7 @@ def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
                 raise typer.Exit(1) from None
             finally:
                 for warning in caught:
-                    typer.secho(f"warning: {warning.message}", err=True, fg="yellow")
+                    typer.secho(f"warning: {in_options(str(warning.message))}", err=True, fg="yellow")
         return result
 
     wrapped.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
@@ -76,11 +87,20 @@ def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
     return wrapped
 
 
+def _option(parameter: inspect.Parameter) -> str | None:
+    """The option of a parameter of a command, as --depth-gap; None for an argument."""
+    for info in getattr(parameter.annotation, "__metadata__", ()):
+        if isinstance(info, OptionInfo):
+            given = [word for word in info.param_decls or () if word.startswith("--")]
+            return given[0].partition("/")[0] if given else f"--{parameter.name.replace('_', '-')}"
+    return None
+
+
 def _plain(error: Exception) -> str:
-    """What went wrong; of the system's errors without their number."""
+    """What went wrong, in options; of the system's errors without their number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror}"
-    return str(error)
+    return in_options(str(error)) if isinstance(error, LdlsError) else str(error)
 
 
 def flowing(text: str) -> str:

@@ -14,7 +14,7 @@ from ldls.cli.mask_options import (
     chosen_categories,
     say_own_masks,
 )
-from ldls.cli.messages import console, speaks_plainly
+from ldls.cli.messages import console, in_options, speaks_plainly
 from ldls.cli.method_options import takes_params
 from ldls.cli.options import (
     FRAMES_FAILED,
@@ -182,7 +182,9 @@ def show(summary: Summary, out: Path) -> None:
         screen.print(object_counts(summary))
     if summary.seconds:
         screen.print(stage_times(summary))
-    failed = [f"{each.frame} failed ({each.stage}): {each.message}" for each in summary.failures[:MOST_LISTED]]
+    failed = [
+        f"{each.frame} failed ({each.stage}): {in_options(each.message)}" for each in summary.failures[:MOST_LISTED]
+    ]
     more = len(summary.failures) - MOST_LISTED
     if more > 0:
         failed.append(f"and {more} more; {out / 'failures.jsonl'} has all")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ldls.cli.mask_options import chosen_categories, say_own_masks
+from ldls.cli.messages import in_options
 from ldls.cli.options import refuse
 from ldls.cli.progress import progress
 from ldls.cli.recording_options import every_of
@@ -142,7 +143,7 @@ def show_frames(
                 failures.append((source.names[index], error))
         if len(failures) == len(indices):
             raise failures[0][1]
-    return [f"{frame} failed: {error}" for frame, error in failures]
+    return [f"{frame} failed: {in_options(str(error))}" for frame, error in failures]
 
 
 def _named(picture: Path, frame: str) -> Path:

@@ -95,6 +95,6 @@ def guess_kind(path: Path) -> str:
         return fitting[0]
     if fitting:
         what = "; ".join(f"{kind} ({SOURCES[kind].looks_for})" for kind in fitting)
-        raise SourceError(f"{path}: may be {what}; say which by kind= or --dataset")
+        raise SourceError(f"{path}: may be {what}; say which by kind=")
     what = "; ".join(f"{kind} ({source.looks_for})" for kind, source in SOURCES.items())
     raise SourceError(f"{path}: is no source of frames; `ldls init` describes files of your own; looked for {what}")

@@ -65,7 +65,7 @@ class Pair:
             farthest = np.finfo(np.float64).max if max_range_m is None else max_range_m
             truth = truth.restricted(np.asarray(self.ranges_m) <= farthest)
         elif max_range_m is not None:
-            raise InputError(f"frame {self.name}: max_range_m needs the points' ranges_m, got none")
+            raise InputError(f"max_range_m: frame {self.name} has no ranges of its points; give its ranges_m=")
         return replace(self, prediction=classes.map(self.prediction), truth=truth)
 
 

@@ -128,5 +128,5 @@ def _refuse_overlaps(spans: NDArray[np.int64], owners: NDArray[np.int64], height
         first, second = sorted(owners[at : at + 2].tolist())
         raise MaskError(
             f"masks {first} and {second} share pixel ({row}, {column}), and an instance image gives each pixel to one; "
-            "call resolve_overlaps() first"
+            "resolve_overlaps() leaves it to one"
         )

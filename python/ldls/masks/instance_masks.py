@@ -411,8 +411,8 @@ def _refuse_last_axis(shape: tuple[int, ...]) -> None:
     if len(shape) == 3 and max(LEAST_SIDE, STRIP * shape[2]) < min(shape[:2]):
         height, width, n_masks = shape
         raise MaskError(
-            f"masks: shape {shape} looks like {n_masks} masks of {height} x {width}; pass instance_axis=-1, or 0 if it "
-            f"is {height} masks of {width} x {n_masks}"
+            f"masks: shape {shape} looks like {n_masks} masks of {height} x {width}; pass instance_axis=-1, or "
+            f"instance_axis=0 if it is {height} masks of {width} x {n_masks}"
         )
 
 

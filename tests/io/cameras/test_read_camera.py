@@ -54,7 +54,7 @@ def test_the_content_tells_the_format(tmp_path, name, text, options):
 @pytest.mark.parametrize(
     ("text", "options", "error", "message"),
     [
-        pytest.param(OPENCV, {}, ldls.CalibrationError, "pass T_camera_lidar=", id="no lidar"),
+        pytest.param(OPENCV, {}, ldls.CalibrationError, "as T_camera_lidar=", id="no lidar"),
         pytest.param("names: 3\n", {}, ldls.UnsupportedFormatError, "found names; expected camera_matrix", id="other"),
         pytest.param(
             OPENCV,

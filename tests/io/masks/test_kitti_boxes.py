@@ -55,7 +55,7 @@ def test_an_empty_file_has_no_masks(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "error", "message"),
     [
-        pytest.param(LINES, {}, ldls.MaskError, "give the image, or image_size=", id="no size"),
+        pytest.param(LINES, {}, ldls.MaskError, "give its image_size=", id="no size"),
         pytest.param(
             f"Crane 0 0 0 0 0 5 5 {REST}",
             {"image_size": (6, 10)},

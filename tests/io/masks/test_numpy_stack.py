@@ -48,7 +48,11 @@ def test_categories_and_scores_can_be_given(tmp_path):
     ("array", "options", "error", "message"),
     [
         pytest.param(
-            LAST, {}, ldls.MaskError, "11 masks of 17 x 3 or 3 of 11 x 17 .*instance_axis=0 or -1", id="unclear"
+            LAST,
+            {},
+            ldls.MaskError,
+            "11 masks of 17 x 3 or 3 of 11 x 17 .*instance_axis=0 or instance_axis=-1",
+            id="unclear",
         ),
         pytest.param(np.zeros((5, 5, 5)), {"image_size": (5, 5)}, ldls.MaskError, "pass instance_axis=", id="a cube"),
         pytest.param(PIXELS, {"image_size": (17, 11)}, ldls.MaskError, r"image is \(17, 11\)", id="another size"),

@@ -90,7 +90,9 @@ def read_camera(
     reader = READERS[format]
     check_options(f"{format} calibration ({path})", reader, given)
     if format in ("opencv", "camera-info") and T_camera_lidar is None:
-        raise CalibrationError(f"{path}: does not say where the lidar is; pass T_camera_lidar=, (4, 4) or a file")
+        raise CalibrationError(
+            f"{path}: does not say where the lidar is; pass its matrix, or a file of it, as T_camera_lidar="
+        )
     return reader(source, **given)
 
 

@@ -52,7 +52,7 @@ FORMATS: dict[str, Format] = {
 }
 """Formats by name; longer endings come before the shorter ones that they end in."""
 
-SAY_WHICH = "say which by format=, or as FORMAT:PATH on the command line"
+SAY_WHICH = "say which by format="
 LISTED = 10
 """Number of frames that an error lists."""
 LONGEST_LINE_BYTES = 1 << 12

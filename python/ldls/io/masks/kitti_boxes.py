@@ -76,7 +76,7 @@ def read(
         FileFormatError: The file is broken; see `read_kitti_objects`.
     """
     if image_size is None:
-        raise MaskError(f"{path}: says nothing of the image's size; give the image, or image_size=(height, width)")
+        raise MaskError(f"{path}: says nothing of the image's size; give its image_size=(height, width)")
     objects = read_boxes(path, names=names)
     with within(path):
         return InstanceMasks.from_boxes(

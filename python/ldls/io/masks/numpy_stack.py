@@ -91,5 +91,5 @@ def _instance_axis(place: str | PathLike[str], stack: NDArray[Any], image_size: 
     if image_size is None and first <= last:
         return 0
     layouts = f"{first} masks of {middle} x {last} or {last} of {first} x {middle}"
-    mend = "pass instance_axis=0 or -1" if fitting else f"the image is {tuple(image_size or ())}"
+    mend = "pass instance_axis=0 or instance_axis=-1" if fitting else f"the image is {tuple(image_size or ())}"
     raise MaskError(f"{place}: shape {stack.shape} holds {layouts} pixels; {mend}")

@@ -49,7 +49,7 @@ def read(
         CorruptFileError: A line that is none of YOLO's.
     """
     if image_size is None:
-        raise MaskError(f"{path}: says nothing of the image's size; give the image, or image_size=(height, width)")
+        raise MaskError(f"{path}: says nothing of the image's size; give its image_size=(height, width)")
     if names is None:
         names = _names_beside(Path(path)) or CONTIGUOUS_NAMES
     ids, names_of_ids = category_ids(names)
