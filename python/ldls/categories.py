@@ -32,19 +32,26 @@ FIRST_OTHER_ID = 100
 _COCO_IDS = {name: category for category, name in COCO_NAMES.items()}
 
 SYNONYMS: tuple[tuple[str, ...], ...] = (
-    ("Car", "car", "moving-car", "vehicle.car"),
-    ("Pedestrian", "pedestrian", "person", "moving-person", "human.pedestrian.adult", "human.pedestrian.child",
+    ("Car", "moving-car", "vehicle.car"),
+    ("Pedestrian", "person", "moving-person", "human.pedestrian.adult", "human.pedestrian.child",
      "human.pedestrian.construction_worker", "human.pedestrian.personal_mobility", "human.pedestrian.police_officer",
      "human.pedestrian.stroller", "human.pedestrian.wheelchair"),
-    ("Cyclist", "cyclist", "bicyclist", "moving-bicyclist"),
-    ("Truck", "truck", "moving-truck", "vehicle.truck"),
+    ("Cyclist", "bicyclist", "moving-bicyclist"),
+    ("Truck", "moving-truck", "vehicle.truck"),
     ("Tram", "train", "on-rails", "moving-on-rails"),
     ("bicycle", "vehicle.bicycle"),
     ("motorcycle", "vehicle.motorcycle"),
     ("bus", "moving-bus", "vehicle.bus.rigid", "vehicle.bus.bendy"),
 )  # fmt: skip
 """Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes; the usual one of several first."""
-_GROUPS = {name: group for group in SYNONYMS for name in group}
+
+
+def folded(name: str) -> str:
+    """What names of classes are compared by: `name` without capitals and outer blanks."""
+    return name.strip().lower()
+
+
+_GROUPS = {folded(name): group for group in SYNONYMS for name in group}
 
 
 def category_ids(names: Mapping[int, str]) -> tuple[dict[int, int], dict[int, str]]:
@@ -62,13 +69,13 @@ def category_ids(names: Mapping[int, str]) -> tuple[dict[int, int], dict[int, st
     wrong = [index for index in names if index < 0]
     if wrong:
         raise ParameterError(f"names: class {wrong[0]} is negative, expected 0 or more")
-    ids = {index: _COCO_IDS.get(name.strip().lower(), FIRST_OTHER_ID + index) for index, name in names.items()}
+    ids = {index: _COCO_IDS.get(folded(name), FIRST_OTHER_ID + index) for index, name in names.items()}
     return ids, {ids[index]: COCO_NAMES.get(ids[index], name) for index, name in names.items()}
 
 
 def synonyms(name: str) -> tuple[str, ...]:
     """All names that mean the class `name`, itself first."""
-    return (name, *(other for other in _GROUPS.get(name, ()) if other != name))
+    return (name, *_GROUPS.get(folded(name), ()))
 
 
 def own_name(name: str, own: Iterable[str], wider: Mapping[str, str]) -> str | None:
@@ -76,8 +83,8 @@ def own_name(name: str, own: Iterable[str], wider: Mapping[str, str]) -> str | N
 
     `wider` says which of its classes holds one that it has no name for.
     """
-    names = {**wider, **{each: each for each in own}}
-    return next((names[each] for each in synonyms(name) if each in names), None)
+    names = {folded(held): holds for held, holds in wider.items()} | {folded(each): each for each in own}
+    return next((names[each] for each in map(folded, synonyms(name)) if each in names), None)
 
 
 def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> list[int]:

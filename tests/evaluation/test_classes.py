@@ -1,7 +1,9 @@
+import numpy as np
 import pytest
 
 from ldls.errors import ParameterError
 from ldls.evaluation import ClassSet
+from ldls.labeling import Labeling
 
 
 @pytest.mark.parametrize(
@@ -15,6 +17,9 @@ from ldls.evaluation import ClassSet
         pytest.param("pedestrian", 2, id="SqueezeSeg pedestrian"),
         pytest.param("human.pedestrian.wheelchair", 2, id="nuScenes pedestrian"),
         pytest.param("Person_sitting", 2, id="sitting"),
+        pytest.param("CAR", 1, id="capitals"),
+        pytest.param(" Person", 2, id="a capital and a blank"),
+        pytest.param("MOVING-CAR", 1, id="capitals of a synonym"),
         pytest.param("truck", 0, id="another class"),
         pytest.param("Van", 0, id="left out"),
         pytest.param("gnome", 0, id="unknown"),
@@ -52,15 +57,28 @@ def test_own_classes_take_part():
     assert found.index("vehicle.bicycle") == 2
 
 
+def test_capitals_do_not_count():
+    scored = ClassSet.kitti(("CAR", "person"), leave_out=("van",), background=("Gnome",))
+    assert scored.names == ("CAR", "person")
+    assert [scored.index(name) for name in ("car", "Car", "vehicle.Car", "Pedestrian")] == [1, 1, 1, 2]
+    assert scored.knows("gnome") and scored.knows("Background") and "Van" not in scored.background
+    truth = Labeling.from_instance_labels(np.array([0, 1, 2, 3, 4]), ["Van", "car", "Traffic Light", "NOISE"])
+    mapped = scored.map(truth, truth=True)
+    assert mapped.ignored.tolist() == [False, True, False, False, True]
+    assert mapped.classes.tolist() == [0, 0, 1, 0, 0]
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         pytest.param(lambda: ClassSet(names=()), "expected one or more", id="none"),
         pytest.param(lambda: ClassSet(names=("Car", "Car")), "different classes", id="twice"),
-        pytest.param(lambda: ClassSet(names=("background",)), "without background", id="background"),
+        pytest.param(lambda: ClassSet(names=("Car", "car")), "different classes", id="twice but for a capital"),
+        pytest.param(lambda: ClassSet(names=("Background",)), "without background", id="background"),
         pytest.param(lambda: ClassSet(names=("Car",), aliases={"a": "Bus"}), "'a' stands for 'Bus'", id="alias"),
         pytest.param(lambda: ClassSet(names=("Car",), left_out=("Car",)), "scored too", id="scored and left out"),
         pytest.param(lambda: ClassSet.kitti(leave_out=("Car",)), "scored too", id="leave out what is scored"),
+        pytest.param(lambda: ClassSet.kitti(leave_out=("car",)), "scored too", id="leave out what has a capital"),
         pytest.param(lambda: ClassSet.kitti(leave_out=("Vann",)), "no data set has \\['Vann'\\]", id="typing error"),
     ],
 )

@@ -139,6 +139,8 @@ def test_csv_files_are_tables(result, tmp_path):
     [
         pytest.param(("person", "car"), (2, 17), id="COCO"),
         pytest.param(("vehicle.trailer", "human.pedestrian.child"), (22, 3), id="its own names"),
+        pytest.param(("Pedestrian", "Car"), (2, 17), id="KITTI"),
+        pytest.param(("BUS", "Traffic Light"), (16, 28), id="capitals"),
         pytest.param(("toaster", "dog"), (29, 1), id="others"),
         pytest.param(("potted plant", "stop sign"), (30, 28), id="background"),
     ],

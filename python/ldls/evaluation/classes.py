@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.categories import COCO_NAMES, synonyms
+from ldls.categories import COCO_NAMES, folded, synonyms
 from ldls.checks import checked
 from ldls.errors import InputError, ParameterError
 from ldls.io.labels.kitti_objects import KITTI
@@ -29,7 +30,7 @@ VOID: tuple[str, ...] = ("unlabeled", "outlier", "noise", "vehicle.ego")
 @checked
 @dataclass(frozen=True, kw_only=True)
 class ClassSet:
-    """The scored classes and how names of other vocabularies map onto them.
+    """The scored classes and how names of other vocabularies map onto them. Capitals of names do not count.
 
     Attributes:
         names: The scored classes, in the order of the tables.
@@ -50,14 +51,14 @@ class ClassSet:
     def __post_init__(self) -> None:
         names = tuple(self.names)
         object.__setattr__(self, "names", names)
-        if not names or len(set(names)) != len(names) or BACKGROUND in names or "" in names:
+        if not names or len({BACKGROUND, "", *map(folded, names)}) != len(names) + 2:
             raise ParameterError(f"names: got {names}, expected one or more different classes without background")
         for alias, name in self.aliases.items():
             if name not in names:
                 raise ParameterError(f"aliases: {alias!r} stands for {name!r}, which is none of {names}")
-        both = set(self.left_out) & {*names, *self.aliases}
+        both = sorted(name for name in self.left_out if self.index(name))
         if both:
-            raise ParameterError(f"left_out: {sorted(both)} are scored too; score a class or leave it out")
+            raise ParameterError(f"left_out: {both} are scored too; score a class or leave it out")
 
     @classmethod
     @checked
@@ -84,23 +85,21 @@ class ClassSet:
         """
         known = _known_names()
         leave_out = None if leave_out is None else tuple(leave_out)
-        unknown = [name for name in leave_out or () if name not in known]
+        unknown = _without(leave_out or (), known)
         if unknown:
             raise ParameterError(f"leave_out: no data set has {unknown}; expected names such as {', '.join(KITTI)}")
-        clash = sorted({*names} & {*(leave_out or ())})
+        clash = [name for name in leave_out or () if not _without([name], names)]
         if clash:
             raise ParameterError(f"leave_out: {clash} are scored too; score a class or leave it out")
-        aliases = {alias: name for name in names for alias in _merged(name, merge_sitting) if alias not in names}
+        aliases = {alias: name for name in names for alias in _without(_merged(name, merge_sitting), names)}
         wanted = LEFT_OUT if leave_out is None else leave_out
-        left_out = {alias for name in wanted for alias in synonyms(name)}
-        left_out |= {*VOID} | (set() if merge_sitting else {SITTING})
-        left_out -= {*names, *aliases}
-        others = (known | {*background}) - left_out - {*names, *aliases}
+        wanted = (*wanted, *VOID) if merge_sitting else (*wanted, *VOID, SITTING)
+        left_out = _without((alias for name in wanted for alias in synonyms(name)), [*names, *aliases])
         return cls(
             names=tuple(names),
             aliases=aliases,
-            left_out=tuple(sorted(left_out)),
-            background=tuple(sorted(others)),
+            left_out=tuple(left_out),
+            background=tuple(_without([*known, *background], [*names, *aliases, *left_out])),
         )
 
     @property
@@ -124,19 +123,26 @@ class ClassSet:
         classes = targets[labeling.classes]
         ignored = labeling.ignored
         if truth:
-            ignored = ignored | np.array([name in self.left_out for name in labeling.names])[labeling.classes]
+            left_out = {*map(folded, self.left_out)}
+            ignored = ignored | np.array([folded(name) in left_out for name in labeling.names])[labeling.classes]
         return Labeling(classes, _distinct_instances(labeling, classes), ignored, self.vocabulary)
 
     @checked
     def index(self, name: str) -> int:
         """Number of the class of `name` in `vocabulary`; 0 for whatever is not scored."""
-        scored = self.aliases.get(name, name)
-        return self.names.index(scored) + 1 if scored in self.names else 0
+        return self._numbers.get(folded(name), 0)
 
     @checked
     def knows(self, name: str) -> bool:
         """True for a name that truth may hold."""
-        return name == BACKGROUND or self.index(name) > 0 or name in self.left_out or name in self.background
+        return self.index(name) > 0 or folded(name) in map(folded, (BACKGROUND, *self.left_out, *self.background))
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """Index of each name and alias, these folded."""
+        places = {name: number for number, name in enumerate(self.names, start=1)}
+        every = places | {alias: places[name] for alias, name in self.aliases.items()}
+        return {folded(name): number for name, number in every.items()}
 
     def _check_known(self, truth: Labeling) -> None:
         unknown = [name for name, count in truth.counts().items() if count and not self.knows(name)]
@@ -161,6 +167,12 @@ def _distinct_instances(labeling: Labeling, classes: NDArray[np.int32]) -> NDArr
 def _merged(name: str, merge_sitting: bool) -> tuple[str, ...]:
     group = synonyms(name)
     return (*group, SITTING) if merge_sitting and "Pedestrian" in group else group
+
+
+def _without(names: Iterable[str], others: Iterable[str]) -> list[str]:
+    """Each of `names` once that is none of the `others`, sorted."""
+    gone = {*map(folded, others)}
+    return sorted({name for name in names if folded(name) not in gone})
 
 
 def _known_names() -> set[str]:

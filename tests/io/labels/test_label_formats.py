@@ -132,6 +132,8 @@ def test_the_writer_and_the_reader_of_label_files_agree(small_scene, tmp_path):
         pytest.param("vehicle.car", "car", id="nuScenes"),
         pytest.param("Pedestrian", "person", id="KITTI's person"),
         pytest.param("Cyclist", "bicyclist", id="KITTI's cyclist"),
+        pytest.param("TRUCK", "truck", id="capitals"),
+        pytest.param(" Stop Sign", "traffic-sign", id="capitals of a wider class, and a blank"),
         pytest.param("train", "on-rails", id="COCO's train"),
         pytest.param("moving-bus", "moving-bus", id="a name of its own"),
         pytest.param("stop sign", "traffic-sign", id="in a wider class"),

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
 from ldls.camera.rigid import transformed
+from ldls.categories import own_name
 from ldls.cloud import as_points
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
 from ldls.io.files import read_lines, whole_file
@@ -29,8 +30,6 @@ KITTI: tuple[str, ...] = (
     "Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc", "DontCare",
 )  # fmt: skip
 """Classes of KITTI's object labels."""
-TYPES = {name.lower(): name for name in KITTI} | {"person": "Pedestrian", "train": "Tram"}
-"""KITTI's class of a category; any other name stays, with `_` for blanks, which separate fields."""
 N_FIELDS = 15
 DECIMALS = 4
 UNKNOWN_TRUNCATION = -1
@@ -190,7 +189,8 @@ def _from_result(result: Segmentation, label: int) -> KittiObject:
     x, _, z = box.location
     return replace(
         box,
-        type=TYPES.get(instance.name.lower(), "_".join(instance.name.split()) or "Misc"),
+        # any other name stays, with `_` for blanks, which separate fields
+        type=own_name(instance.name, KITTI, {}) or "_".join(instance.name.split()) or "Misc",
         alpha=_wrapped(box.rotation_y - math.atan2(x, z)),
         bbox=bbox,
         score=float(instance.score),

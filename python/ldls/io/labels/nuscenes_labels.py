@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.categories import own_name
 from ldls.errors import CorruptFileError, InputError, LimitError
 from ldls.io.arrays import open_npz, write_npz
 from ldls.io.files import open_file, whole_file
@@ -34,16 +35,16 @@ CLASS_NAMES: tuple[str, ...] = (
 NUSCENES: dict[int, str] = dict(enumerate(CLASS_NAMES))
 
 OTHER_OBJECT = "static.other"
-COCO_CLASSES: dict[str, str] = {
-    "person": "human.pedestrian.adult", "bicycle": "vehicle.bicycle", "car": "vehicle.car",
-    "motorcycle": "vehicle.motorcycle", "bus": "vehicle.bus.rigid", "truck": "vehicle.truck",
+WIDER: dict[str, str] = {
+    "Person_sitting": "human.pedestrian.adult",
     **dict.fromkeys(
         ("bird", "cat", "dog", "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe"), "animal"
     ),
     **dict.fromkeys(("traffic light", "fire hydrant", "stop sign", "parking meter", "bench"), "static.manmade"),
     "potted plant": "static.vegetation",
 }  # fmt: skip
-"""Class of a COCO category; anything else is `OTHER_OBJECT`. Background and points out of view are 0, noise."""
+"""Class of what has none of its own; anything else is `OTHER_OBJECT`. Background and points out of view are 0,
+noise."""
 
 
 def read_lidarseg(path: str | PathLike[str]) -> Labeling:
@@ -114,6 +115,5 @@ def write_panoptic(path: Path, result: Segmentation) -> None:
 
 def _classes(result: Segmentation) -> NDArray[np.int64]:
     """(M + 1,) class of the background, then of each instance."""
-    names = [COCO_CLASSES.get(instance.name, instance.name) for instance in result.instances]
-    known = [name if name in CLASS_NAMES else OTHER_OBJECT for name in names]
-    return np.array([0, *(CLASS_NAMES.index(name) for name in known)], np.int64)
+    names = [own_name(instance.name, CLASS_NAMES, WIDER) or OTHER_OBJECT for instance in result.instances]
+    return np.array([0, *(CLASS_NAMES.index(name) for name in names)], np.int64)
