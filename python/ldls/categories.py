@@ -41,7 +41,9 @@ SYNONYMS: tuple[tuple[str, ...], ...] = (
     ("Tram", "train", "on-rails", "moving-on-rails"),
     ("bicycle", "vehicle.bicycle"),
     ("motorcycle", "vehicle.motorcycle"),
+    ("motorcyclist", "moving-motorcyclist"),
     ("bus", "moving-bus", "vehicle.bus.rigid", "vehicle.bus.bendy"),
+    ("other-vehicle", "moving-other-vehicle"),
 )  # fmt: skip
 """Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes; the usual one of several first."""
 

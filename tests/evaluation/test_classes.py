@@ -3,6 +3,7 @@ import pytest
 
 from ldls.errors import ParameterError
 from ldls.evaluation import ClassSet
+from ldls.io.labels.semantic_kitti import SEMANTIC_KITTI
 from ldls.labeling import Labeling
 
 
@@ -27,6 +28,13 @@ from ldls.labeling import Labeling
 )
 def test_names_of_all_vocabularies_find_their_class(name, index):
     assert ClassSet.kitti().index(name) == index
+
+
+@pytest.mark.parametrize("moving", [name for name in SEMANTIC_KITTI.values() if name.startswith("moving-")])
+def test_what_moves_is_of_the_class_of_what_stands(moving):
+    standing = moving.removeprefix("moving-")
+    assert standing in SEMANTIC_KITTI.values()
+    assert ClassSet.kitti((standing,)).index(moving) == ClassSet.kitti((moving,)).index(standing) == 1
 
 
 def test_who_sits_can_stand_apart():
