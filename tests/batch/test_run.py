@@ -177,7 +177,7 @@ def test_masks_of_one_image_are_not_given_to_others(tmp_path, name, option, plac
     outcome = command(name, source, f"--{option}", place, "--frames", f":{n_frames}", *cameras, *where)
     assert outcome.exit_code == 1
     count = max(n_frames, n_cameras)
-    assert f"error: {option}: {place} is the file of one image, there are {count} {word}s" in outcome.output
+    assert f"error: --{option}: {place} is the file of one image, there are {count} {word}s" in outcome.output
     assert f"put {{{word}}} into the path" in outcome.output
     assert {path.name for path in tmp_path.iterdir()} == {"source"}
 
