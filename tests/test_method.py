@@ -111,6 +111,22 @@ def test_points_of_a_lattice_that_hardly_hang_together_equal_the_oracle():
     check_winners(result, oracle.segment(points, pixels, camera.projection @ camera.T_camera_lidar, params))
 
 
+@pytest.mark.parametrize("iterations", [200, 400])
+@pytest.mark.parametrize("seed", [1, 28, 44, 46])
+def test_points_of_a_line_whose_series_grows_equal_the_oracle(seed, iterations):
+    """Their graph passes values on in one direction: its eigenvalues are complex, and terms of a series grow."""
+    generator = np.random.default_rng(seed)
+    points = np.array([0, 0, 4.0]) + generator.normal(size=(120, 1)) * [1, 0.3, 0.2]
+    pixels = np.zeros((3, 60, 80), bool)
+    for mask in pixels:
+        left, right = sorted(generator.integers(0, 81, 2))
+        mask[:, left:right] = True
+    camera = ldls.Camera(projection=[[20, 0, 40], [0, 20, 30], [0, 0, 1]])
+    params = replace(ldls.Params.paper(), neighbors=5, iterations=iterations)
+    result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera, params=params)
+    check_winners(result, oracle.segment(points, pixels, camera.projection @ camera.T_camera_lidar, params))
+
+
 def random_scene(generator, added=False):
     """A scene with what goes wrong in life: overlapping and empty masks, points behind, missing and doubled; with the
     parameters of the paper's method or with those `added` to it too."""

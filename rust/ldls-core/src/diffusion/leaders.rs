@@ -16,6 +16,8 @@ use rayon::prelude::*;
 
 /// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
 const EQUAL: f64 = 1e-13;
+/// By how many times what the series leaves out of two values together may be more than the probe says.
+const SAFETY: f64 = 5.0;
 
 /// The leader of `candidates`, ascending, at each of `points`, with `series` in the place of the products where there is one. `exact`
 /// is that of [`super::diffuse`].
@@ -44,7 +46,7 @@ pub(super) fn leaders(
     let planner = Planner {
         schedule: &schedule,
         width: WIDTH_F64,
-        probe: false,
+        probe: series.is_some(),
         steps,
     };
     let mut leaders = with_room(points.len())?;
@@ -62,6 +64,8 @@ pub(super) fn leaders(
         let offer = |(at, leader): (usize, &mut Leader)| {
             // points are the first of those that they reach
             let row = reach.as_ref().map_or(points[at] as usize, |_| at);
+            // the probe is in one pass alone
+            leader.error += pass.errors.get(row).map_or(0.0, |error| f64::from(*error));
             let mut values = pass.at(row);
             values.try_for_each(|(label, value)| leader.offer(label, value))
         };
@@ -76,6 +80,10 @@ pub(super) fn leaders(
 pub(super) struct Leader {
     /// The labels whose values are [`EQUAL`] to the largest, and these values.
     equal: Vec<(u32, f64)>,
+    /// The largest value that is not.
+    next: f64,
+    /// What the series may leave out, going by the probe.
+    error: f64,
 }
 
 impl Leader {
@@ -86,8 +94,14 @@ impl Leader {
         }
         let largest = self.value().max(value);
         push(&mut self.equal, (label, value))?;
-        self.equal
-            .retain(|(_, value)| *value >= largest * (1.0 - EQUAL));
+        let next = &mut self.next;
+        self.equal.retain(|(_, value)| {
+            let is_equal = *value >= largest * (1.0 - EQUAL);
+            if !is_equal {
+                *next = value.max(*next);
+            }
+            is_equal
+        });
         Ok(())
     }
 
@@ -100,6 +114,15 @@ impl Leader {
     pub(super) fn label(&self) -> u32 {
         let labels = self.equal.iter().map(|(label, _)| *label);
         labels.min().unwrap_or(0)
+    }
+
+    /// True if what the series may leave out does not matter.
+    pub(super) fn is_sure(&self) -> bool {
+        let value = self.value();
+        match self.equal.len() {
+            1 => SAFETY * self.error <= value - self.next,
+            _ => self.error <= EQUAL * value,
+        }
     }
 }
 

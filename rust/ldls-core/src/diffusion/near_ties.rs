@@ -1,7 +1,8 @@
 //! The points at which single precision cannot decide between labels.
 //!
 //! At most of many seeds alone show the winner, as where several masks show all that anything flows from. What seeds leave open, and a
-//! few at once, is decided in double precision, with a series that leaves out next to nothing.
+//! few at once, is decided in double precision, with a series that leaves out next to nothing, or where a probe says that it leaves out
+//! as much as labels differ by, with the products.
 
 use super::errors::Errors;
 use super::lanes::WIDTH_F32;
@@ -17,14 +18,14 @@ use crate::{Cancel, Result};
 use std::collections::BTreeMap;
 
 /// What the series leaves out, as a share of the largest value.
-const TOLERANCE: f64 = 1e-13;
+const TOLERANCE: f64 = 1e-16;
 /// Points up to which they are a few: what flows to these is diffused in double precision in the time that it takes to look at all
 /// seeds. More are those of masks that lie over one another, most of whose labels are equal.
 const FEW: usize = 1 << 8;
 
 /// Puts right the best of `winners` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
-/// points. The `schedule` is that of `a`, `largest` the largest error, and `series` one that can be trusted on every graph, for nobody
-/// watches what it leaves out here. Other arguments as in [`super::diffuse`].
+/// points. The `schedule` is that of `a`, `largest` the largest error, and `series` one near whose interval all eigenvalues lie. Other
+/// arguments as in [`super::diffuse`].
 pub(super) fn decide(
     (a, b, schedule): (&PointGraph, &PixelLabels, &Schedule),
     winners: &mut Winners,
@@ -37,21 +38,34 @@ pub(super) fn decide(
     let mut ties = winners.near_ties(largest, error)?;
     let best = &mut winners.best;
     let contested = ties.values().map(Vec::len).sum();
-    // endlessly many products take a look at all of the graph for one point as for all
-    if contested > FEW || iterations.is_none() {
-        let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
-        settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
-    }
-    if ties.is_empty() {
-        return Ok(contested);
-    }
-    let candidates = candidates(&ties);
-    let points: Vec<u32> = ties.into_values().flatten().collect();
     let series = series.and_then(|series| series.within(TOLERANCE, iterations));
-    let products = (series.as_ref(), iterations);
-    let leaders = leaders(a, &points, &candidates, products, &exact, cancel)?;
-    for (point, leader) in points.iter().zip(leaders) {
-        best[*point as usize].label = leader.label();
+    // what is left for the products, which many more points flow in, are equal labels for the most part
+    let rounds = [(series.as_ref(), FEW), (None, 0)];
+    // endlessly many end where they change little, which says no more
+    let rounds = rounds.iter().take(1 + usize::from(iterations.is_some()));
+    for &(series, few) in rounds {
+        let open: usize = ties.values().map(Vec::len).sum();
+        // endlessly many products take a look at all of the graph for one point as for all
+        if open > few || iterations.is_none() {
+            let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
+            settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
+        }
+        if ties.is_empty() {
+            break;
+        }
+        let candidates = candidates(&ties);
+        let points: Vec<u32> = ties.values().flatten().copied().collect();
+        let products = (series, iterations);
+        let mut leaders = leaders(a, &points, &candidates, products, &exact, cancel)?.into_iter();
+        // all of them are asked about in this order
+        let mut is_open = |point: &u32| {
+            let leader = leaders.next().unwrap_or_default();
+            best[*point as usize].label = leader.label();
+            !leader.is_sure()
+        };
+        let sets = ties.values_mut();
+        sets.for_each(|points| points.retain(&mut is_open));
+        ties.retain(|_, points| !points.is_empty());
     }
     Ok(contested)
 }

@@ -87,13 +87,14 @@ impl Series {
 
     /// The series of 1 + x + ... + x^(`terms` - 1).
     fn of_geometric_sum(terms: usize, middle: f64, half_width: f64, tolerance: f64) -> Self {
-        let sum = |x: f64| {
-            let complement = 1.0 - x;
-            // the closed form loses its digits near 1, where terms are nearly equal
-            if complement.abs() * (terms as f64) < 1e-6 {
+        // of 1 - x, which keeps its digits where x is near 1 and terms are nearly equal
+        let sum = |complement: f64| {
+            if complement.abs() * (terms as f64) < 1e-9 {
                 terms as f64
+            } else if complement < 1.0 {
+                -(terms as f64 * (-complement).ln_1p()).exp_m1() / complement
             } else {
-                (1.0 - x.powi(terms as i32)) / complement
+                (1.0 - (1.0 - complement).powi(terms as i32)) / complement
             }
         };
         // twice as many as there are terms yield all of them
@@ -103,9 +104,9 @@ impl Series {
             // the sum is a polynomial of degree `terms` - 1: beyond it there is rounding and nothing else
             coefficients.truncate(terms);
             let all = coefficients.len() == terms;
-            let degree = degree_within(&coefficients, tolerance * sum(middle + half_width));
+            let degree = degree_within(&coefficients, tolerance * sum(1.0 - middle - half_width));
             // far from the last coefficient: those that were cut off are smaller still
-            if all || 4 * degree < 3 * coefficients.len() || nodes >= 1 << 14 {
+            if all || 8 * degree < 7 * coefficients.len() || nodes >= 1 << 14 {
                 let (kept, rest) = coefficients.split_at(degree + 1);
                 let tail = rest.iter().map(|c| c.abs()).sum();
                 return Self {
@@ -186,31 +187,34 @@ fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
     )
 }
 
-/// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes; the
-/// upper half would be aliases of higher terms.
+/// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes, by what these lack of
+/// 1; the upper half would be aliases of higher terms. They are off by the rounding of one value: where there were more, sums of
+/// many would never be small.
 fn interpolate(
     function: impl Fn(f64) -> f64,
     middle: f64,
     half_width: f64,
     nodes: usize,
 ) -> Vec<f64> {
-    let t: Vec<f64> = (0..nodes)
-        .map(|j| ((j as f64 + 0.5) * PI / nodes as f64).cos())
+    let angle = |quarters: usize| PI / 2.0 * quarters as f64 / nodes as f64;
+    let values: Vec<f64> = (0..nodes)
+        .map(|j| {
+            let below = 2.0 * (angle(2 * j + 1) / 2.0).sin().powi(2);
+            function(1.0 - middle - half_width + half_width * below)
+        })
         .collect();
-    let x = t.iter().map(|t| middle + half_width * t);
-    let values: Vec<f64> = x.map(function).collect();
-    // T_0 and T_1 at the nodes; T_(k + 1) = 2 t T_k - T_(k - 1)
-    let (mut current, mut next) = (vec![1.0; nodes], t.clone());
+    // T_k at node j is the cosine of k times its angle
+    let cosines: Vec<f64> = (0..4 * nodes)
+        .map(|quarters| angle(quarters).cos())
+        .collect();
     let coefficient = |k: usize| {
+        // of a power of two, which a mask takes the remainder by
+        let at_nodes = (0..nodes).map(|j| cosines[(k * (2 * j + 1)) & (4 * nodes - 1)]);
         let sum: f64 = values
             .iter()
-            .zip(&current)
-            .map(|(value, current)| value * current)
+            .zip(at_nodes)
+            .map(|(value, at)| value * at)
             .sum();
-        for ((current, next), t) in current.iter_mut().zip(&mut next).zip(&t) {
-            let after = 2.0 * t * *next - *current;
-            (*current, *next) = (*next, after);
-        }
         sum * if k == 0 { 1.0 } else { 2.0 } / nodes as f64
     };
     (0..nodes / 2).map(coefficient).collect()
