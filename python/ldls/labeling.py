@@ -71,7 +71,7 @@ class Labeling:
         codes = as_array("codes", codes)
         if codes.ndim != 1 or codes.dtype.kind not in "iuf":  # whole numbers, which some data sets keep as floats
             raise ShapeError(f"codes: expected (N,) whole numbers, got {codes.dtype} {codes.shape}")
-        names = (BACKGROUND, *(name for name in table.values() if name != BACKGROUND))
+        names = tuple(dict.fromkeys([BACKGROUND, *table.values()]))
         lookup = np.full(max(table) + 2, -1, np.int32)
         lookup[list(table)] = [names.index(name) for name in table.values()]
         # the last entry, which no number of the table reaches, stands for all that are out of range

@@ -1,5 +1,6 @@
 """Every source on a small layout of its own, and what is said where something is missing."""
 
+import json
 import pickle
 import re
 import shutil
@@ -551,6 +552,44 @@ def test_other_cameras_in_the_layout_of_nuscenes(tmp_path):
     source = open_source(tmp_path)
     assert source.camera_names == ("CAM_BACK", "CAM_SIDE")
     assert [image.name for image in source[0].images] == ["CAM_BACK", "CAM_SIDE"]
+
+
+OWN_CATEGORIES = [{"name": name, "index": at} for at, name in ((17, "tractor"), (2, "barn"), (3, "barn"))]
+
+
+@pytest.mark.parametrize("table", ["lidarseg", "panoptic"])
+def test_truth_in_the_layout_of_nuscenes_has_the_classes_of_its_own_table(tmp_path, table):
+    folder = layouts.nuscenes(tmp_path, n_frames=1)
+    layouts.write_text(folder / "v1.0-mini/category.json", json.dumps(OWN_CATEGORIES))
+    labels = np.repeat(np.array([17, 2, 3, 0], np.uint16), [50, 20, 10, 20])
+    if table == "panoptic":
+        rows = json.loads((folder / "v1.0-mini/lidarseg.json").read_text())
+        rows[0]["filename"] = "a_panoptic.npz"
+        layouts.write_text(folder / "v1.0-mini/panoptic.json", json.dumps(rows))
+        np.savez(folder / "a_panoptic.npz", data=1000 * labels)
+    else:
+        layouts.write_points(next(folder.glob("lidarseg/*/*.bin")), labels.astype(np.uint8))
+    truth = open_source(folder)[0].truth
+    assert truth.counts() == {"background": 0, "tractor": 50, "barn": 30, "noise": 20}
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        pytest.param([OWN_CATEGORIES[0]] * 2, "row 2: index is 17, as in another row", id="twice"),
+        pytest.param([{"name": "barn", "index": -1}], "row 1: index is -1, expected 0 to 65535", id="negative"),
+        pytest.param([{"name": "barn", "index": 1 << 16}], "row 1: index is 65536, expected 0 to", id="too large"),
+        pytest.param([{"name": "barn", "index": "1"}], "row 1: index is '1', expected 0 to", id="text"),
+        pytest.param([{"name": 1, "index": 1}], "row 1: name is '1', expected", id="a number as the name"),
+        pytest.param([{"index": 1}], "row 1: lacks name", id="no name"),
+    ],
+)
+def test_a_table_of_categories_that_is_none_is_refused(tmp_path, rows, message):
+    folder = layouts.nuscenes(tmp_path, n_frames=1)
+    layouts.write_text(folder / "v1.0-mini/category.json", json.dumps(rows))
+    with pytest.raises(ldls.CorruptFileError, match=rf"category\.json, {message}"):
+        open_source(folder)
+    assert open_source(folder, truth=False)[0].truth is None
 
 
 def test_a_data_set_of_others_in_the_layout_of_nuscenes(data_folder):

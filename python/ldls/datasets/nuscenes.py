@@ -101,6 +101,7 @@ class NuScenesSource:
         self._poses = tables.read_poses(folder, {taken.pose for frame in self._frames for taken in frame.values()})
         sweeps = {frame[self._lidar].token for frame in self._frames} if truth else set()
         self._truths = {name: tables.read_truth_files(folder, name, sweeps) for name in TRUTHS}
+        self._classes = tables.read_classes(folder) if any(self._truths.values()) else {}
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
@@ -151,7 +152,7 @@ class NuScenesSource:
         for name, read in TRUTHS.items():
             if sweep in self._truths[name]:
                 path = self._file(self._truths[name][sweep])
-                return check_truth(read(path), points, path)
+                return check_truth(read(path, classes=self._classes), points, path)
         return None
 
     def _file(self, name: str) -> Path:

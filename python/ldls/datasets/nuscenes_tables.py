@@ -21,6 +21,8 @@ from ldls.datasets.file_source import choose
 from ldls.errors import CalibrationError, CorruptFileError, SourceError, some, within
 from ldls.io.files import parsing
 from ldls.io.json_rows import read_json_rows
+from ldls.io.labels.nuscenes_labels import NUSCENES
+from ldls.labeling import MOST_CODES
 
 Number = int | float
 Side = int | None
@@ -194,6 +196,29 @@ def read_truth_files(tables: Path, name: str, tokens: set[str]) -> dict[str, str
         return {}
     rows = _rows(tables, name, {"sample_data_token": str, "filename": str})
     return {row["sample_data_token"]: row["filename"] for row in rows if row["sample_data_token"] in tokens}
+
+
+def read_classes(tables: Path) -> dict[int, str]:
+    """Names of the classes of truth by their numbers, where the table of categories has any, else nuScenes'.
+
+    0 is nuScenes' noise where the table does not say.
+
+    Raises:
+        CorruptFileError: The table is broken, or two rows have one number.
+    """
+    if not (tables / "category.json").is_file():
+        return NUSCENES
+    own: dict[int, str] = {}
+    for number, row in enumerate(_rows(tables, "category", {"name": str}), start=1):
+        place, index = f"{tables / 'category.json'}, row {number}", row.get("index")
+        if index is None:
+            continue
+        if not isinstance(index, int) or not 0 <= index <= MOST_CODES:
+            raise CorruptFileError(f"{place}: index is {index!r}, expected 0 to {MOST_CODES}")
+        if index in own:
+            raise CorruptFileError(f"{place}: index is {index}, as in another row")
+        own[index] = row["name"]
+    return {0: NUSCENES[0]} | own if own else NUSCENES
 
 
 def _transform(place: str, row: Mapping[str, Any]) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ Source: https://github.com/nutonomy/nuscenes-devkit/blob/master/docs/instruction
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import count
 from os import PathLike
 from pathlib import Path
@@ -47,25 +48,26 @@ WIDER: dict[str, str] = {
 noise."""
 
 
-def read_lidarseg(path: str | PathLike[str]) -> Labeling:
+def read_lidarseg(path: str | PathLike[str], *, classes: Mapping[int, str] = NUSCENES) -> Labeling:
     """Labels of a `_lidarseg.bin` file, one a point; there are no instances.
 
     Raises:
-        CorruptFileError: A point has a class above 31; the message names it.
+        CorruptFileError: A point has a class that is none of `classes`, names by number; the message names it.
         FileNotFoundError: There is no such file.
     """
     with open_file(path, "file of labels") as file:
         try:
-            return Labeling.from_codes(np.frombuffer(file.read(), np.uint8), NUSCENES)
+            return Labeling.from_codes(np.frombuffer(file.read(), np.uint8), classes)
         except InputError as error:
             raise CorruptFileError(f"{error}; is it a point cloud?") from None
 
 
-def read_panoptic(path: str | PathLike[str]) -> Labeling:
+def read_panoptic(path: str | PathLike[str], *, classes: Mapping[int, str] = NUSCENES) -> Labeling:
     """Labels of a `_panoptic.npz` file, one a point; instances by their whole numbers, which differ between classes.
 
     Raises:
-        CorruptFileError: It is not a whole `.npz` file with one array `data` of such labels.
+        CorruptFileError: It is not a whole `.npz` file with one array `data` of such labels, or a point has a class
+            that is none of `classes`, names by number.
         FileNotFoundError: There is no such file.
     """
     with open_npz(path) as arrays:
@@ -74,7 +76,7 @@ def read_panoptic(path: str | PathLike[str]) -> Labeling:
             raise CorruptFileError(f"found arrays {arrays.listed()}, expected 'data' with a uint16 a point")
         try:
             instances = np.where(labels % INSTANCES_A_CLASS > 0, labels, 0)
-            return Labeling.from_codes(labels // INSTANCES_A_CLASS, NUSCENES, instances=instances)
+            return Labeling.from_codes(labels // INSTANCES_A_CLASS, classes, instances=instances)
         except InputError as error:
             raise CorruptFileError(str(error)) from None
 
