@@ -87,6 +87,15 @@ def test_capitals_do_not_count():
         pytest.param(lambda: ClassSet(names=("Car",), left_out=("Car",)), "scored too", id="scored and left out"),
         pytest.param(lambda: ClassSet.kitti(leave_out=("Car",)), "scored too", id="leave out what is scored"),
         pytest.param(lambda: ClassSet.kitti(leave_out=("car",)), "scored too", id="leave out what has a capital"),
+        pytest.param(
+            lambda: ClassSet.kitti(leave_out=("vehicle.car",)), r"\['vehicle.car'\] are sc", id="leave a synonym out"
+        ),
+        pytest.param(lambda: ClassSet.kitti(leave_out=("Person_sitting",)), "scored too", id="leave out who is merged"),
+        pytest.param(
+            lambda: ClassSet.kitti(("Truck", "Car", "vehicle.car")),
+            "'Car' and 'vehicle.car' are one class",
+            id="synonyms",
+        ),
         pytest.param(lambda: ClassSet.kitti(leave_out=("Vann",)), "no data set has \\['Vann'\\]", id="typing error"),
     ],
 )

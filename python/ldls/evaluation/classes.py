@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
 from typing import Self
 
 import numpy as np
@@ -81,17 +82,21 @@ class ClassSet:
                 known.
 
         Raises:
-            ParameterError: A name is scored and left out, or `leave_out` holds a name of no vocabulary.
+            ParameterError: Two names are of one class, one is scored and left out, by whatever of its names, or
+                `leave_out` holds a name of no vocabulary.
         """
         known = _known_names()
         leave_out = None if leave_out is None else tuple(leave_out)
         unknown = _without(leave_out or (), known)
         if unknown:
             raise ParameterError(f"leave_out: no data set has {unknown}; expected names such as {', '.join(KITTI)}")
-        clash = [name for name in leave_out or () if not _without([name], names)]
+        for one, other in combinations(names, 2):
+            if not _without([one], synonyms(other)):
+                raise ParameterError(f"names: {one!r} and {other!r} are one class; score it by one of its names")
+        aliases = {alias: name for name in names for alias in _without(_merged(name, merge_sitting), names)}
+        clash = [name for name in leave_out or () if not _without([name], [*names, *aliases])]
         if clash:
             raise ParameterError(f"leave_out: {clash} are scored too; score a class or leave it out")
-        aliases = {alias: name for name in names for alias in _without(_merged(name, merge_sitting), names)}
         wanted = LEFT_OUT if leave_out is None else leave_out
         wanted = (*wanted, *VOID) if merge_sitting else (*wanted, *VOID, SITTING)
         left_out = _without((alias for name in wanted for alias in synonyms(name)), [*names, *aliases])
