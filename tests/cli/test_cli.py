@@ -72,6 +72,25 @@ def test_names_and_paths_are_printed_as_they_are(demo, tmp_path, name):
     assert shown.exit_code == 0 and f" {name} " in shown.output
 
 
+def test_segment_and_explain_take_the_number_of_columns(demo, tmp_path):
+    folder, _ = demo
+    points = ldls.read_points(folder / "input/points.bin")
+    wide = tmp_path / "wide.bin"
+    np.column_stack([points, np.zeros((len(points), 4), "<f4")]).astype("<f4").tofile(wide)
+    words = [*arguments(folder, tmp_path / "out"), "--points", str(wide), "--columns", "8", "--formats", "npz"]
+    outcome = run(app, words)
+    assert outcome.exit_code == 0, outcome.output
+    with np.load(folder / "demo.npz") as expected, np.load(tmp_path / "out/wide.npz") as stored:
+        np.testing.assert_array_equal(stored["labels"], expected["labels"])
+    files = [
+        str(word)
+        for name, ending in (("calib", "txt"), ("masks", "npz"))
+        for word in (f"--{name}", folder / f"input/{name}.{ending}")
+    ]
+    outcome = run(app, ["explain", "4477", "--points", str(wide), "--columns", "8", *files])
+    assert outcome.exit_code == 0, outcome.output
+
+
 @pytest.mark.parametrize("ending", ["csv", "json"])
 def test_segment_writes_a_table_of_the_objects(demo, tmp_path, ending):
     outcome = run(app, arguments(demo[0], tmp_path / "out", objects=tmp_path / f"out/objects.{ending}"))

@@ -14,6 +14,7 @@ from ldls.cli.frame_files import (
     IMAGE_ID,
     MASKS,
     POINTS,
+    ColumnsOption,
     ExtrinsicOption,
     FisheyeOption,
     RectifiedOption,
@@ -51,6 +52,7 @@ def explain(
         typer.Argument(metavar="RESULT", help="An .npz file of ldls.", show_default=False, **EXISTING),
     ] = None,
     points: Annotated[Path | None, POINTS] = None,
+    columns: ColumnsOption = None,
     calib: Annotated[Path | None, CALIB] = None,
     masks: Annotated[Path | None, MASKS] = None,
     camera: Annotated[
@@ -105,6 +107,7 @@ def explain(
     if result is not None:
         of_sweep = {
             "points": points,
+            "columns": columns,
             "calib": calib,
             "masks": masks,
             "image-id": image_id,
@@ -119,7 +122,7 @@ def explain(
             raise InputError("RESULT: missing; give an .npz file of ldls, or --points, --calib and --masks, all three")
         seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
         instances = masks_of(None, masks=masks, segmenter=None, image_id=image_id, image_size=seen_by.image_size)
-        segmentation, view = segment(read_points(points), instances, seen_by), None
+        segmentation, view = segment(read_points(points, columns=columns), instances, seen_by), None
     chosen = chosen_point(point, segmentation, view, on)
     explanation = explain_point(segmentation, chosen.row)
     if as_json:

@@ -14,6 +14,10 @@ EXISTING: dict[str, Any] = {"exists": True, "dir_okay": False, "readable": True}
 POINTS = typer.Option(
     metavar="FILE", help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, .csv, .txt or .xyz.", **EXISTING
 )
+ColumnsOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Floats a row of a .bin sweep.", show_default="4, and 5 for .pcd.bin"),
+]
 CALIB = typer.Option(
     metavar="PATH",
     help="Calibration of the camera: KITTI's (of KITTI raw the folder of the day), OpenCV's (YAML or XML), ROS's or "

@@ -14,6 +14,7 @@ from ldls.cli.frame_files import (
     IMAGE_ID,
     MASKS,
     POINTS,
+    ColumnsOption,
     ExtrinsicOption,
     FisheyeOption,
     RectifiedOption,
@@ -39,6 +40,7 @@ def segment(
     points: Annotated[Path, POINTS],
     calib: Annotated[Path, CALIB],
     out: OutOption,
+    columns: ColumnsOption = None,
     masks: Annotated[Path | None, MASKS] = None,
     segmenter: SegmenterOption = None,
     image: Annotated[
@@ -128,7 +130,7 @@ def segment(
     )
     if save_masks is not None:
         save(chosen, save_masks)
-    result = label_points(read_points(points), chosen, seen_by, params=replace(params, threads=cores))
+    result = label_points(read_points(points, columns=columns), chosen, seen_by, params=replace(params, threads=cores))
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, name, wanted, [pixels])
     if write_objects is not None and objects is not None:

@@ -85,6 +85,55 @@ def test_a_guess_that_scrambles_the_rows_is_refused(tmp_path, name, n, columns, 
     assert ldls.read_points(tmp_path / name, columns=guess).shape == (400 // guess, guess)
 
 
+def scan(n):
+    """Points as a lidar sees them, in the order of a ring, with an intensity."""
+    azimuth = np.linspace(np.pi, -np.pi, n, endpoint=False)
+    range_m = 12 + 4 * np.sin(3 * azimuth)
+    x, y = range_m * np.cos(azimuth), range_m * np.sin(azimuth)
+    return np.column_stack([x, y, np.full(n, -1.7), 0.5 + 0.4 * np.cos(azimuth)]).astype("<f4")
+
+
+N = 840
+MORE = {
+    "no intensity": scan(N)[:, :3],
+    "time": np.column_stack([scan(N), np.linspace(0, 0.1, N)]),
+    "ring and time": np.column_stack([scan(N), np.arange(N) // 100, np.linspace(0, 0.1, N)]),
+    "velocities": np.column_stack([scan(N), np.random.default_rng(0).normal(0, 0.2, (N, 3))]),
+    "as PCL pads them": np.insert(scan(N), [3, 4, 4, 4], [1, 0, 0, 0], axis=1),
+}
+
+
+@pytest.mark.parametrize("values", MORE.values(), ids=MORE)
+def test_a_sweep_of_another_width_is_refused_with_its_width(tmp_path, values):
+    columns = values.shape[1]
+    values.astype("<f4").tofile(tmp_path / "sweep.bin")
+    message = rf"sweep\.bin: guessed 4 floats a point.*pass columns={columns} \(or columns=4 to insist"
+    with pytest.raises(ldls.FileFormatError, match=message):
+        ldls.read_points(tmp_path / "sweep.bin")
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / "sweep.bin", columns=columns), values.astype("<f4"))
+    assert ldls.read_points(tmp_path / "sweep.bin", columns=4).shape[1] == 4
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 3, 32, 33, 60, N])
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(lambda values: values, id="of a lidar"),
+        pytest.param(np.random.default_rng(0).permutation, id="in no order"),
+        pytest.param(lambda values: values * (np.arange(len(values)) % 2 > 0)[:, None], id="every second is zero"),
+        pytest.param(lambda values: values * [1, 1, 1, 0], id="no intensity"),
+        pytest.param(lambda values: np.where(np.arange(len(values))[:, None] % 3, np.nan, values), id="NaN"),
+        pytest.param(lambda values: values * 0, id="zeros"),
+        pytest.param(lambda values: values[:1].repeat(len(values), axis=0), id="one place"),
+        pytest.param(lambda values: values[np.argsort(values[:, 2] + values[:, 3])], id="by height"),
+    ],
+)
+def test_rows_of_four_are_read_whatever_their_points(tmp_path, n, change):
+    values = change(scan(N)[:: N // n][:n] if n else scan(N)[:0]).astype("<f4")
+    values.tofile(tmp_path / "sweep.bin")
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / "sweep.bin"), values)
+
+
 @pytest.mark.parametrize("name, columns", [("sweep.pcd.bin", 5), ("sweep.bin", 4)])
 @pytest.mark.parametrize("zeros", [False, True], ids=["a sweep", "nothing but zeros"])
 def test_a_guess_that_fits_stands_though_the_other_divides(tmp_path, name, columns, zeros):

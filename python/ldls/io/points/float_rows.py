@@ -18,6 +18,11 @@ FARTHEST_M = 1e7
 SMALLEST_M = 1e-20
 MOST_TRIED = 16
 """Columns that a file of another layout is tried with."""
+SAMPLED_POINTS = 256
+FEWEST_SAMPLED = 32
+"""Of fewer points the directions tell nothing."""
+NEAR_DEG, FAR_DEG = 5.0, 15.0
+"""From one point to the next a lidar turns less than the one; more than the other no lidar turns each time."""
 
 
 def read(path: Path, *, columns: int | None = None, recover: bool = False) -> NDArray[np.float32]:
@@ -56,7 +61,8 @@ def _rows(path: Path, content: bytes, columns: int, *, guessed: bool, recover: b
     values = np.frombuffer(content, "<f4", count=whole // FLOAT_BYTES)
     if guessed:
         _check_positions(values, columns)
-        _check_guess(values, columns)
+        _check_rings(values, columns)
+        _check_directions(values, columns)
     return values.reshape(-1, columns).astype(np.float32, copy=False)
 
 
@@ -66,10 +72,7 @@ def _check_positions(values: NDArray[np.float32], columns: int) -> None:
         return
     likeliest = _likeliest(values)
     if likeliest is not None:
-        raise FileFormatError(
-            f"guessed {columns} floats a point, but then points lie farther than {FARTHEST_M:.0e} m; pass "
-            f"columns={likeliest} (or columns={columns} to insist)"
-        )
+        raise _wrong_guess(columns, f"then points lie farther than {FARTHEST_M:.0e} m", likeliest)
 
 
 def likeliest_columns(path: Path) -> int | None:
@@ -107,7 +110,7 @@ def _are_positions(values: NDArray[np.float32], columns: int) -> bool:
         return not ((positions > FARTHEST_M) | ((positions > 0) & (positions < SMALLEST_M))).any()
 
 
-def _check_guess(values: NDArray[np.float32], columns: int) -> None:
+def _check_rings(values: NDArray[np.float32], columns: int) -> None:
     """Refuse a guess that the fifth column contradicts, where the file divides into rows of four and of five.
 
     Of five columns the last is nuScenes' ring number; all zeros are no evidence for five, nor against it.
@@ -124,6 +127,43 @@ def _check_guess(values: NDArray[np.float32], columns: int) -> None:
         fault = f"with {other} the last column holds ring numbers"
     else:
         return
-    raise FileFormatError(
-        f"guessed {columns} floats a point, but {fault}; pass columns={other} (or columns={columns} to insist)"
+    raise _wrong_guess(columns, fault, other)
+
+
+def _check_directions(values: NDArray[np.float32], columns: int) -> None:
+    """Refuse a guess by which the lidar looks elsewhere with each point, if with another number it turns by little."""
+    turn_deg = _turn_deg(values, columns)
+    if not turn_deg > FAR_DEG:
+        return
+    tried = (other for other in range(3, MOST_TRIED + 1) if values.size % other == 0)
+    others = (other for other in tried if other % columns or not _are_alike(values, columns, other // columns))
+    likeliest = next((other for other in others if _turn_deg(values, other) < NEAR_DEG), None)
+    if likeliest is not None:
+        fault = f"then each point lies {turn_deg:.0f} degrees to the side of the last, with {likeliest} beside it"
+        raise _wrong_guess(columns, fault, likeliest)
+
+
+def _turn_deg(values: NDArray[np.float32], columns: int) -> float:
+    """Median angle from one point to the next, seen from above, of a sample; NaN where hardly any has a direction."""
+    rows = values.reshape(-1, columns)
+    if len(rows) <= FEWEST_SAMPLED:
+        return np.nan
+    at = np.linspace(0, len(rows) - 2, min(SAMPLED_POINTS, len(rows) - 1)).astype(np.intp)
+    with np.errstate(invalid="ignore"):  # NaNs that signal
+        one, other = (rows[places, :2].astype(np.float64) @ (1, 1j) for places in (at, at + 1))
+        turned = np.conj(one) * other
+        turns = np.angle(turned[np.abs(turned) > 0], deg=True)
+    return float(np.median(np.abs(turns))) if len(turns) >= FEWEST_SAMPLED else np.nan
+
+
+def _are_alike(values: NDArray[np.float32], columns: int, period: int) -> bool:
+    """True if the rows after every `period`-th are as far away as these, as where two lidars take turns."""
+    rows = np.nan_to_num(values.reshape(-1, columns)[:, :2])
+    one, other = (float(np.median(np.hypot(*rows[start::period].T))) for start in (0, 1))
+    return one < 4 * other and other < 4 * one
+
+
+def _wrong_guess(columns: int, fault: str, likeliest: int) -> FileFormatError:
+    return FileFormatError(
+        f"guessed {columns} floats a point, but {fault}; pass columns={likeliest} (or columns={columns} to insist)"
     )
