@@ -89,7 +89,7 @@ impl Series {
     fn of_geometric_sum(terms: usize, middle: f64, half_width: f64, tolerance: f64) -> Self {
         // of 1 - x, which keeps its digits where x is near 1 and terms are nearly equal
         let sum = |complement: f64| {
-            if complement.abs() * (terms as f64) < 1e-9 {
+            if complement.abs() < f64::MIN_POSITIVE {
                 terms as f64
             } else if complement < 1.0 {
                 -(terms as f64 * (-complement).ln_1p()).exp_m1() / complement
