@@ -46,6 +46,20 @@ def test_boxes_take_points_calibration_and_the_size_of_the_image(boxes):
     assert not read(boxes, points="velodyne", calib="calib").truth.ignored.any()
 
 
+@pytest.mark.parametrize("suffix", [".jpg", ".jpeg"])
+def test_images_may_be_jpeg(boxes, suffix):
+    (boxes / "image_2/7.png").unlink()
+    Image.new("RGB", (100, 80)).save(boxes / f"image_2/7{suffix}")
+    pair = read(boxes, points="velodyne", calib="calib", images="image_2")
+    assert pair.truth.ignored.tolist() == [False, False, True]
+
+
+def test_a_frame_without_an_image_in_the_folder_of_images_is_named(boxes):
+    (boxes / "image_2/7.png").rename(boxes / "image_2/8.png")
+    with pytest.raises(InputError, match=r"frame 7: has no image in .*image_2, expected 7 with \.png, \.jpg, \.jpeg"):
+        read(boxes, points="velodyne", calib="calib", images="image_2")
+
+
 def test_what_boxes_need_is_named(boxes):
     with pytest.raises(InputError, match="frame 7: needs its points; .*--points"):
         read(boxes)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
+from ldls.datasets.file_source import IMAGE_SUFFIXES
 from ldls.errors import InputError, ShapeError, within
 from ldls.evaluation.bound import bound_labels
 from ldls.evaluation.classes import ClassSet
@@ -34,7 +35,7 @@ class FrameFolders:
     Attributes:
         points: Folder of lidar sweeps.
         calib: Folder of KITTI calibration files.
-        images: Folder of images, of which only the size is read.
+        images: Folder of images, of which only the size is read; one that is not there is not known.
     """
 
     points: Path | None = None
@@ -54,18 +55,29 @@ class FrameFolders:
         return read_points(next((path for path in paths if path.exists()), paths[0]))
 
     def read_camera(self, name: str) -> Camera:
-        """Camera of the frame `name`, with the size of its image where there is one.
+        """Camera of the frame `name`, with the size of its image where the folder of images is known.
 
         Raises:
-            InputError: The folder is not known.
+            InputError: The folder of calibrations is not known, or that of images has none of the frame.
             CalibrationError: The file is broken.
             FileNotFoundError: There is no such file.
         """
         if self.calib is None:
             raise InputError(f"frame {name}: needs its calibration; name the folder (--calib)")
         camera = read_camera(self.calib / f"{name}.txt", format="kitti")
-        image = None if self.images is None else self.images / f"{name}.png"
-        return replace(camera, image_size=read_image_size(image) if image is not None and image.exists() else None)
+        return replace(camera, image_size=self._image_size(name))
+
+    def _image_size(self, name: str) -> tuple[int, int] | None:
+        if self.images is None or not self.images.is_dir():
+            return None
+        paths = [self.images / f"{name}{suffix}" for suffix in IMAGE_SUFFIXES]
+        found = next((path for path in paths if path.exists()), None)
+        if found is None:
+            raise InputError(
+                f"frame {name}: has no image in {self.images}, expected {name} with {', '.join(IMAGE_SUFFIXES)}; add "
+                "it, or leave out the folder for KITTI's usual size"
+            )
+        return read_image_size(found)
 
     def in_view(self, name: str) -> NDArray[np.bool_] | None:
         """(N,) True for the points of the frame `name` that its camera sees; None without a calibration.
