@@ -7,7 +7,7 @@ import zlib
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageOps
 
 import ldls
 from ldls.io.images import SIGNATURES, png_of, read_image_size
@@ -61,6 +61,47 @@ def test_grey_palettes_and_alpha_become_rgb(write, mode):
     source = Image.fromarray(RGB) if mode != "I;16" else Image.fromarray(RGB[:, :, 0].astype(np.uint16))
     source.convert(mode).save(file, "PNG")
     assert ldls.read_image(write(file.getvalue())).shape == (60, 80, 3)
+
+
+GREY_16 = np.array([[0, 255, 256, 1000, 30000, 65535]], np.uint16)
+
+
+def test_of_16_bits_the_upper_8_are_taken(write):
+    upper = np.repeat((GREY_16 >> 8)[..., None], 3, axis=2)
+    np.testing.assert_array_equal(ldls.read_image(write(content("PNG", GREY_16))), upper)
+    rows = b"\0" + np.repeat(GREY_16[..., None], 3, axis=2).astype(">u2").tobytes()
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", 6, 1, 16, 2, 0, 0, 0))
+    colour = b"".join([SIGNATURES["PNG"], head, chunk(b"IDAT", zlib.compress(rows)), chunk(b"IEND", b"")])
+    np.testing.assert_array_equal(ldls.read_image(write(colour)), upper)
+
+
+@pytest.mark.parametrize("orientation", range(10))
+def test_a_jpeg_is_turned_upright_by_its_exif(write, orientation):
+    smooth = np.add.outer(np.arange(60), 2 * np.arange(80)).astype(np.uint8)
+    picture = Image.fromarray(smooth)
+    exif = picture.getexif()
+    exif[0x112] = orientation
+    path = write(content("JPEG", smooth, quality=100, exif=exif))
+    with Image.open(path) as opened:
+        expected = np.asarray(ImageOps.exif_transpose(opened).convert("RGB"))
+    assert expected.shape == ((80, 60, 3) if 5 <= orientation <= 8 else (60, 80, 3))
+    np.testing.assert_array_equal(ldls.read_image(path), expected)
+    assert read_image_size(path) == expected.shape[:2]
+
+
+@pytest.mark.parametrize(
+    "exif",
+    [
+        pytest.param(b"Exif\0\0hello", id="no TIFF"),
+        pytest.param(b"Exif\0\0MM\0*\0\0\0\x08\0\x09\x01", id="cut"),
+        pytest.param(b"Exif\0\0MM\0*\0\0\0\x08\0\1\x01\x12\0\2\0\0\0\1a\0\0\0\0\0\0\0", id="a word"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Corrupt EXIF data")
+def test_exif_that_is_broken_turns_nothing(write, exif):
+    path = write(content("JPEG", exif=exif))
+    assert ldls.read_image(path).shape == (60, 80, 3)
+    assert read_image_size(path) == (60, 80)
 
 
 @pytest.mark.parametrize("read", [ldls.read_image, read_image_size], ids=["pixels", "size"])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from os import PathLike
 from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import ExifTags, Image, UnidentifiedImageError
+from PIL.Image import Transpose
 
 import ldls._ldls as _ldls
 from ldls.checks import checked
@@ -25,11 +26,19 @@ DEFLATE_RATIO = 1032
 """Nothing in a PNG unpacks to more than so many times its size."""
 PIXELS_A_BYTE = 1024
 """Most pixels that a byte of a JPEG can hold: a block of 64 takes a bit, and often more."""
+TURNS = {
+    2: Transpose.FLIP_LEFT_RIGHT, 3: Transpose.ROTATE_180, 4: Transpose.FLIP_TOP_BOTTOM, 5: Transpose.TRANSPOSE,
+    6: Transpose.ROTATE_270, 7: Transpose.TRANSVERSE, 8: Transpose.ROTATE_90,
+}  # fmt: skip
+"""How a picture is to be turned, by the orientation in its EXIF."""
+SIDEWAYS = (5, 6, 7, 8)
 
 
 @checked
 def read_image(path: str | PathLike[str]) -> NDArray[np.uint8]:
     """(H, W, 3) RGB pixels of a PNG or JPEG file, whatever its name ends in.
+
+    A JPEG is turned upright by its EXIF; of 16 bits the upper 8 are taken.
 
     Raises:
         UnsupportedFormatError: It is of another format.
@@ -43,7 +52,7 @@ def read_image(path: str | PathLike[str]) -> NDArray[np.uint8]:
 
 @checked
 def read_image_size(path: str | PathLike[str]) -> tuple[int, int]:
-    """(height, width) in pixels of a PNG or JPEG file, by its head.
+    """(height, width) in pixels of a PNG or JPEG file, by its head, of the upright picture.
 
     Raises:
         UnsupportedFormatError: It is of another format.
@@ -52,11 +61,12 @@ def read_image_size(path: str | PathLike[str]) -> tuple[int, int]:
         FileNotFoundError: There is no such file.
     """
     with open_file(path, "image", limit=MAX_BYTES) as file, _opened(file) as image:
-        return image.height, image.width
+        size = image.height, image.width
+        return size[::-1] if _orientation(image) in SIDEWAYS else size
 
 
 def decode(file: IO[bytes], n_bytes: int) -> NDArray[np.uint8]:
-    """(H, W, 3) RGB pixels of a PNG or JPEG of `n_bytes`.
+    """(H, W, 3) RGB pixels of a PNG or JPEG of `n_bytes`, as those of `read_image`.
 
     Raises:
         FileFormatError: It is of another format, or not whole.
@@ -64,7 +74,19 @@ def decode(file: IO[bytes], n_bytes: int) -> NDArray[np.uint8]:
     """
     with parsing("image"), _opened(file) as image:
         check_pixels(image, n_bytes)
-        return np.asarray(image.convert("RGB"))
+        turn = TURNS.get(_orientation(image))
+        # of 16 bits of grey Pillow makes white from 255 on
+        grey = Image.fromarray((np.asarray(image) >> 8).astype(np.uint8)) if image.mode.startswith("I") else image
+        rgb = grey.convert("RGB")
+        return np.asarray(rgb if turn is None else rgb.transpose(turn))
+
+
+def _orientation(image: Image.Image) -> int:
+    """Orientation of a JPEG by its EXIF, as OpenCV takes it: 1 to 8, and 1 where it does not say or is broken."""
+    if image.format != "PNG":
+        with suppress(Exception):  # whatever Pillow raises on it, the picture may be whole
+            return int(image.getexif().get(ExifTags.Base.Orientation, 1))
+    return 1
 
 
 def png_of(picture: Image.Image) -> bytes:
