@@ -232,3 +232,10 @@ def test_names_are_in_the_order_of_their_numbers(names):
 @given(st.lists(st.from_regex(r"[ab-]?[0-9]{4}[._][0-9]{3}", fullmatch=True), max_size=8))
 def test_names_of_one_width_are_in_the_order_of_text(names):
     assert sorted(names, key=name_order) == sorted(names)
+
+
+def test_a_folder_in_the_place_of_a_file_is_refused_by_its_name(tmp_path):
+    (tmp_path / "d.npz").mkdir()
+    with pytest.raises(ldls.FileFormatError, match=r"d\.npz: expected a file to write to, got a folder"):
+        ldls.save(ldls.InstanceMasks.from_array(np.ones((1, 2, 2), bool)), tmp_path / "d.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["d.npz"]

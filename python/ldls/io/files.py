@@ -229,9 +229,16 @@ def _identity(path: Path) -> tuple[int, int]:
 
 @contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
-    """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails."""
+    """A file to write to that takes the place of `path` when the block ends, and leaves no trace if it fails.
+
+    Raises:
+        FileFormatError: There is a folder of that name.
+        FileNotFoundError: There is no such folder to write to.
+    """
     target = Path(path)
     check_folder(target)
+    if target.is_dir():
+        raise FileFormatError(f"{target}: expected a file to write to, got a folder; name another")
     # beside the target, for only within one file system is a file renamed at a stroke; without its name, which may be
     # as long as names can be
     temporary = target.with_name(f".{secrets.token_hex(8)}{UNFINISHED}")

@@ -36,6 +36,16 @@ def test_a_camera_of_a_day(write):
     assert first.image_size is None
 
 
+@pytest.mark.parametrize("name", ["calib_velo_to_cam.txt", "calib_cam_to_cam.txt"])
+def test_a_file_of_a_day_asks_for_the_folder_of_the_day(write, name):
+    folder = write()
+    with pytest.raises(
+        ldls.CalibrationError, match=rf"{name}: half a calibration of KITTI raw; pass the folder"
+    ) as caught:
+        ldls.read_camera(folder / name)
+    assert str(caught.value).endswith(f"of the day, {folder}")
+
+
 def test_it_is_the_camera_of_the_object_file(write, data_folder):
     """The same numbers, spread over two files, make the same camera as in KITTI's object file."""
     path = data_folder / "kitti/training/calib/000571.txt"

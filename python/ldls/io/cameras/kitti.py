@@ -16,6 +16,8 @@ from ldls.io.files import open_file
 MAX_BYTES = 1 << 20
 OBJECT_ARCHIVE = "data_object_calib"
 RAW_ARCHIVE = "the calibration of that day"
+RAW_FILES = ("calib_velo_to_cam.txt", "calib_cam_to_cam.txt")
+"""Where the lidar is, and the cameras of a day of KITTI raw."""
 SIZES = {"P0": 12, "P1": 12, "P2": 12, "P3": 12, "R0_rect": 9, "Tr_velo_to_cam": 12, "Tr": 12}
 """Numbers in each line that a camera needs."""
 SPELLINGS = {"R_rect": "R0_rect", "R_rect_00": "R0_rect", "Tr_velo_cam": "Tr_velo_to_cam"}
@@ -41,6 +43,8 @@ def read(path: str | PathLike[str], *, camera: int = 2, image_size: tuple[int, i
     _check_number(camera)
     path = Path(path)
     matrices = _read_matrices(path, SIZES, SPELLINGS)
+    if f"P{camera}" not in matrices and path.name in RAW_FILES:
+        raise CalibrationError(f"{path}: half a calibration of KITTI raw; pass the folder of the day, {path.parent}")
     projection = _get_matrix(path, matrices, f"P{camera}", OBJECT_ARCHIVE).reshape(3, 4)
     if "Tr" in matrices and "Tr_velo_to_cam" not in matrices:
         T_camera_lidar = _homogeneous(matrices["Tr"].reshape(3, 4))
@@ -75,7 +79,7 @@ def read_raw(folder: str | PathLike[str], *, camera: int = 2) -> Camera:
     """
     _check_number(camera)
     folder = Path(folder)
-    lidar_path, camera_path = folder / "calib_velo_to_cam.txt", folder / "calib_cam_to_cam.txt"
+    lidar_path, camera_path = (folder / name for name in RAW_FILES)
     p_rect, s_rect = f"P_rect_{camera:02}", f"S_rect_{camera:02}"
     cameras = _read_matrices(camera_path, {p_rect: 12, "R_rect_00": 9, s_rect: 2}, {})
     to_camera = read_raw_transform(lidar_path)
