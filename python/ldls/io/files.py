@@ -18,6 +18,9 @@ from os import PathLike
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import IO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ldls.errors import (
     CorruptFileError,
     FileFormatError,
@@ -78,10 +81,20 @@ class InputFile(io.BufferedReader):
         wanted = left if size is None or size < 0 else min(size, left)
         content = super().read(wanted)
         if len(content) < wanted:
-            raise TruncatedFileError(
-                f"ends at byte {self.tell()}, it had {self.size} when it was opened; read it when nobody writes to it"
-            )
+            raise self._shrunk()
         return content
+
+    def array(self) -> NDArray[np.uint8]:
+        """What is left of the file as an array that can be written to, without a copy; errors as of `read`."""
+        content = np.empty(max(self.size - self.tell(), 0), np.uint8)
+        if self.readinto(content.data) < len(content):
+            raise self._shrunk()
+        return content
+
+    def _shrunk(self) -> TruncatedFileError:
+        return TruncatedFileError(
+            f"ends at byte {self.tell()}, it had {self.size} when it was opened; read it when nobody writes to it"
+        )
 
     def text(self) -> str:
         """What is left of the file as text in UTF-8, with or without a byte order mark.

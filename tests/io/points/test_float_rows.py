@@ -25,6 +25,7 @@ def test_bin_files_hold_rows_of_floats(tmp_path, name, columns, options):
     points = ldls.read_points(tmp_path / name, **options)
     np.testing.assert_array_equal(points, values)
     assert points.dtype == np.float32
+    assert points.flags.writeable, "as points of other formats"
 
 
 def test_npy_files_keep_their_precision(tmp_path):

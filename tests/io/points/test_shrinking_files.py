@@ -27,13 +27,17 @@ def test_a_file_that_shrinks_while_it_is_read_is_refused(tmp_path, monkeypatch, 
     path = tmp_path / name
     WRITERS[name](path, ldls.segment(*small_scene))
     ldls.read_points(path)
-    half, read = path.stat().st_size // 32 * 16, InputFile.read
+    half = path.stat().st_size // 32 * 16
 
-    def shrink(file, size=-1):
-        with path.open("r+b") as writer:
-            writer.truncate(half)
-        return read(file, size)
+    def shrinking(read):
+        def shrink(file, *size):
+            with path.open("r+b") as writer:
+                writer.truncate(half)
+            return read(file, *size)
 
-    monkeypatch.setattr(InputFile, "read", shrink)
+        return shrink
+
+    for name_of_read in ("read", "array"):
+        monkeypatch.setattr(InputFile, name_of_read, shrinking(getattr(InputFile, name_of_read)))
     with pytest.raises(ldls.FileFormatError, match=name):
         ldls.read_points(path)

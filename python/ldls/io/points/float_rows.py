@@ -44,10 +44,10 @@ def read(path: Path, *, columns: int | None = None, recover: bool = False) -> ND
     if not 3 <= columns <= MAX_COLUMNS:
         raise ParameterError(f"columns: got {columns}, expected 3 to {MAX_COLUMNS}")
     with open_file(path, "file of float32 rows") as file:
-        return _rows(path, file.read(), columns, guessed=guessed, recover=recover)
+        return _rows(path, file.array(), columns, guessed=guessed, recover=recover)
 
 
-def _rows(path: Path, content: bytes, columns: int, *, guessed: bool, recover: bool) -> NDArray[np.float32]:
+def _rows(path: Path, content: NDArray[np.uint8], columns: int, *, guessed: bool, recover: bool) -> NDArray[np.float32]:
     row_bytes = FLOAT_BYTES * columns
     whole = len(content) // row_bytes * row_bytes
     if whole != len(content):
