@@ -54,7 +54,7 @@ class Labeling:
             if count and not (values.min() >= 0 and values.max() <= highest):
                 raise InputError(f"{name}: got {values.min()} to {values.max()}, expected 0 to {highest}")
             object.__setattr__(self, name, values.astype(np.int32))
-        object.__setattr__(self, "ignored", numbers("ignored", self.ignored, np.bool_, (count,)))
+        object.__setattr__(self, "ignored", numbers("ignored", self.ignored, np.bool_, (count,)).copy())
 
     @classmethod
     @checked

@@ -56,6 +56,11 @@ def no_engine(work, frames):
     yield from ()
 
 
+def test_frames_that_an_engine_lost_are_not_done(few, settings, tmp_path):
+    summary = batch.run(few, tmp_path / "out", settings, engine=lambda work, windows: (outcome for outcome in ()))
+    assert (summary.n_frames, summary.n_done, summary.failures) == (12, 0, ())
+
+
 def test_a_run_that_goes_on_writes_the_table_of_all(few, settings, expected, tmp_path):
     batch.run(few, tmp_path / "out", settings)
     journal = tmp_path / "out/journal.jsonl"

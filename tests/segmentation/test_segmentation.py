@@ -44,6 +44,23 @@ def test_values_of_labels_become_values_of_points(small_scene):
     assert result.per_point(colours).shape == (len(result.labels), 3)
     assert result.per_point(colours, out_of_view=(7, 8, 9))[-1].tolist() == [7, 8, 9]
     assert {*result.per_point([None, "person", "car"])} == {None, "person", "car"}
+    words = result.per_point(["bg", "person", "car"], out_of_view="none")
+    assert words[-1] == "none"
+    assert result.per_point([0.0, 0.1, 0.2], out_of_view=0.3)[-1] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("values", "out_of_view"),
+    [
+        pytest.param(["bg", "car", "van"], "unknown", id="a longer word"),
+        pytest.param([0, 1, 2], 0.5, id="half a number"),
+        pytest.param(np.array([0, 1, 2], np.float32), 1e300, id="beyond single precision"),
+        pytest.param(np.array([0, 1, 2], np.uint8), -1, id="below 0"),
+    ],
+)
+def test_a_value_out_of_view_that_values_cannot_hold_is_refused(small_scene, values, out_of_view):
+    with pytest.raises(ldls.DtypeError, match="out_of_view: expected"):
+        ldls.segment(*small_scene).per_point(values, out_of_view=out_of_view)
 
 
 def test_objects_describe_their_points(small_scene):

@@ -176,7 +176,7 @@ def run(
         warnings.warn(message, NothingInView, stacklevel=2)
     return Summary(
         n_frames=len(names),
-        n_done=len(names) - len(failures),
+        n_done=sum("error" not in record for record in journal.records(names)),
         n_earlier=n_earlier,
         n_nothing_in_view=sum(map(len, doubts.values())),
         failures=failures,

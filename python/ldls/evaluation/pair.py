@@ -48,7 +48,7 @@ class Pair:
         with within(f"frame {self.name}"):
             for name in ("ranges_m", "confidence"):
                 if getattr(self, name) is not None:
-                    object.__setattr__(self, name, numbers(name, getattr(self, name), np.float64, (n_true,)))
+                    object.__setattr__(self, name, numbers(name, getattr(self, name), np.float64, (n_true,)).copy())
         if self.confidence is not None and not ((self.confidence >= 0) & (self.confidence <= 1)).all():
             raise InputError(f"frame {self.name}: expected confidence from 0 to 1")
 

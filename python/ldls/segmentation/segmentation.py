@@ -128,6 +128,10 @@ class Segmentation:
         Args:
             values: (M + 1, ...): `values[0]` is that of the background, `values[m]` that of `instances[m - 1]`.
             out_of_view: Value of points out of view; by default that of the background.
+
+        Raises:
+            ShapeError: There is not one value a label, or that out of view is of another shape.
+            DtypeError: Values of that type cannot hold the one out of view.
         """
         by_label = as_array("values", values)
         if by_label.ndim == 0 or len(by_label) != len(self.instances) + 1:
@@ -135,8 +139,11 @@ class Segmentation:
         last = by_label[:1]
         if out_of_view is not None:
             try:
-                last = np.asarray(out_of_view, by_label.dtype)[None]
-            except (TypeError, ValueError, OverflowError) as problem:
+                with np.errstate(over="raise"):
+                    last = np.asarray(out_of_view, by_label.dtype)[None]
+                if by_label.dtype.kind in "biuSU" and not np.array_equal(last[0], np.asarray(out_of_view)):
+                    raise ValueError("it would be cut")
+            except (TypeError, ValueError, ArithmeticError) as problem:
                 raise DtypeError(
                     f"out_of_view: expected {by_label.dtype}, got {shown(out_of_view)}; {problem}"
                 ) from None

@@ -43,7 +43,8 @@ class Sweep:
     """A sweep of the lidar, the images that go with it, and where the lidar stood.
 
     Attributes:
-        points: (N, >= 3) float32 or float64, x y z first, in metres in the lidar frame.
+        points: (N, >= 3) float32 or float64, x y z first, in metres in the lidar frame. The array itself is kept: give
+            a copy where a buffer is used again.
         views: Masks and camera of each image; cameras from the lidar at this sweep.
         pose: (4, 4) T_world_lidar: from the lidar frame of this sweep to one that all sweeps share.
         stamp: Time of the sweep in seconds.
