@@ -38,6 +38,9 @@ pub(super) fn decide(
     let mut ties = winners.near_ties(largest, error)?;
     let best = &mut winners.best;
     let contested = ties.values().map(Vec::len).sum();
+    if contested == 0 {
+        return Ok(0);
+    }
     let series = series.and_then(|series| series.within(TOLERANCE, iterations));
     // what is left for the products, which many more points flow in, are equal labels for the most part
     let rounds = [(series.as_ref(), FEW), (None, 0)];
