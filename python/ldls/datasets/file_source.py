@@ -16,8 +16,8 @@ from ldls.cloud import Points
 from ldls.datasets.frame import CameraImage, Frame
 from ldls.errors import InputError, LeftOutWarning, SourceError, some, within
 from ldls.io import read_image, read_points
-from ldls.io.files import name_order
 from ldls.io.labels import read_labeling
+from ldls.io.names import name_order
 from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
 from ldls.sequences import Trajectory

@@ -1,7 +1,4 @@
-"""Files read and written with care: through one door, whole or not there, and below the folder they are named in.
-
-Names of files and frames have one order, that of `name_order`.
-"""
+"""Files read and written with care: through one door, whole or not there, and below the folder they are named in."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import errno
 import hashlib
 import io
 import os
-import re
 import secrets
 import stat
 from collections.abc import Iterable, Iterator, Mapping
@@ -52,8 +48,6 @@ KINDS = (
 FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_NOCTTY", "O_BINARY"))
 LIES = (None, errno.EINVAL, errno.EOVERFLOW)
 """Numbers of errors of the system that come of places that a file names and does not have, or of libraries alone."""
-NUMBER = re.compile(r"(?<![0-9])(?<![0-9]\.)0*([0-9]+)")
-"""A whole number in a name, without what follows its decimal point."""
 
 
 class InputFile(io.BufferedReader):
@@ -321,14 +315,6 @@ def sweep(folder: str | PathLike[str]) -> int:
     for path in left:
         path.unlink(missing_ok=True)
     return len(left)
-
-
-def name_order(name: str) -> tuple[str, str]:
-    """Key by which names of files and frames are sorted: as text, but numbers by their value, so that 2 is before 10.
-
-    Names with leading zeros keep the order of text, and so do decimals, as those of seconds: 1.25 is before 1.5.
-    """
-    return NUMBER.sub(lambda number: f"{len(number[1]):03}{number[1]}", name), name
 
 
 def folder_hint(folder: str | PathLike[str], *beginnings: str, option: str = "") -> str:

@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
 from ldls.errors import InputError, ParameterError, UnsupportedFormatError, some
-from ldls.io.files import folder_hint, name_order, open_file
+from ldls.io.files import folder_hint, open_file
 from ldls.io.labels.annotations import is_annotation, read_annotations
 from ldls.io.labels.kitti_objects import is_kitti_object, read_kitti_boxes
 from ldls.io.labels.labeling_npz import read_labeling_npz
 from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
 from ldls.io.labels.semantic_kitti import read_semantic_kitti
 from ldls.io.labels.squeezeseg import read_squeezeseg
+from ldls.io.names import name_order
 from ldls.labeling import Labeling
 
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ldls.errors import MaskError, within
-from ldls.io.files import name_order, open_file
+from ldls.io.files import open_file
 from ldls.io.images import read_image
+from ldls.io.names import name_order
 from ldls.masks import InstanceMasks
 
 METADATA = "metadata.csv"

@@ -17,8 +17,9 @@ from ldls.camera.extrinsic import turn_of
 from ldls.camera.rigid import from_parts, inverse, rigid
 from ldls.errors import CorruptFileError, UnsupportedFormatError, within
 from ldls.io.cameras.kitti import read_raw_transform
-from ldls.io.files import name_order, open_file
+from ldls.io.files import open_file
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
+from ldls.io.names import name_order
 from ldls.io.poses.pose_rows import check_ascending, read_pose_rows
 from ldls.sequences import Trajectory
 

@@ -23,7 +23,8 @@ from ldls.errors import (
     UnsupportedFormatError,
     within,
 )
-from ldls.io.files import name_order, opened, parsing
+from ldls.io.files import opened, parsing
+from ldls.io.names import name_order
 from ldls.io.ros.known_types import KnownTypes
 from ldls.io.ros.messages import Message, RawMessage, Topic, Types, seconds, standard_types
 from ldls.io.ros.salvage import NO_LIMIT, Salvage, check_database_size, open_bag_file, salvage

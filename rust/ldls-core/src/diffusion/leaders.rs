@@ -116,12 +116,19 @@ impl Leader {
         labels.min().unwrap_or(0)
     }
 
+    /// How far it is ahead of the next: not at all of equal ones.
+    fn lead(&self) -> f64 {
+        match self.equal[..] {
+            [(_, value)] => value - self.next,
+            _ => 0.0,
+        }
+    }
+
     /// True if what the series may leave out does not matter.
     pub(super) fn is_sure(&self) -> bool {
-        let value = self.value();
         match self.equal.len() {
-            1 => SAFETY * self.error <= value - self.next,
-            _ => self.error <= EQUAL * value,
+            1 => SAFETY * self.error <= self.lead(),
+            _ => self.error <= EQUAL * self.value(),
         }
     }
 }
@@ -132,22 +139,37 @@ mod tests {
     use crate::test_support::chain;
     use proptest::prelude::*;
 
-    fn leading(values: &[(u32, f64)]) -> u32 {
+    fn leader(values: &[(u32, f64)]) -> Leader {
         let mut leader = Leader::default();
         for &(label, value) in values {
             leader.offer(label, value).unwrap();
         }
-        leader.label()
+        leader
     }
 
     #[test]
     fn of_values_that_rounding_tells_apart_the_lowest_label_leads() {
         let below = 0.5 * (1.0 - f64::EPSILON);
-        assert_eq!(leading(&[(3, 0.5), (0, below), (7, 0.25)]), 0);
-        assert_eq!(leading(&[(3, 0.0), (5, 0.0)]), 0, "nothing came");
+        let found = leader(&[(3, 0.5), (0, below), (7, 0.25)]);
+        assert_eq!((found.label(), found.lead()), (0, 0.0));
+        assert_eq!(leader(&[(3, 0.0), (5, 0.0)]).label(), 0, "nothing came");
         let below = 0.5 * (1.0 - 1e-12);
-        assert_eq!(leading(&[(1, 0.5), (0, below), (2, 0.5)]), 1);
-        assert_eq!(leading(&[(1, below), (0, 0.25), (2, 0.5)]), 2);
+        let found = leader(&[(1, 0.5), (0, below), (2, 0.5)]);
+        assert_eq!((found.label(), found.lead()), (1, 0.0));
+        let found = leader(&[(1, below), (0, 0.25), (2, 0.5)]);
+        assert_eq!((found.label(), found.lead()), (2, 0.5 - below));
+    }
+
+    #[test]
+    fn a_leader_is_sure_as_far_as_it_is_ahead_and_of_equal_ones_as_far_as_rounding() {
+        let with_error = |values: &[(u32, f64)], error| Leader {
+            error,
+            ..leader(values)
+        };
+        let ahead = |error| with_error(&[(1, 0.5), (2, 0.25)], error).is_sure();
+        assert_eq!([0.05, 0.051, f64::NAN].map(ahead), [true, false, false]);
+        let equal = |error| with_error(&[(1, 0.5), (2, 0.5)], error).is_sure();
+        assert_eq!([5e-14, 6e-14, f64::NAN].map(equal), [true, false, false]);
     }
 
     proptest! {
@@ -164,9 +186,9 @@ mod tests {
             let first = values.iter().find(|(_, value)| *value >= largest * (1.0 - EQUAL));
             let mut shuffled = values.clone();
             shuffled.sort_by_key(|(label, _)| (u64::from(*label) + 1).wrapping_mul(seed | 1));
-            let [one, other] = [&values, &shuffled].map(|values| leading(values));
-            prop_assert_eq!(Some(one), first.map(|(label, _)| *label));
-            prop_assert_eq!(one, other);
+            let [one, other] = [&values, &shuffled].map(|values| leader(values));
+            prop_assert_eq!(Some(one.label()), first.map(|(label, _)| *label));
+            prop_assert_eq!((one.label(), one.lead()), (other.label(), other.lead()));
         }
     }
 

@@ -1,8 +1,8 @@
 //! The points at which single precision cannot decide between labels.
 //!
-//! At most of many seeds alone show the winner, as where several masks show all that anything flows from. What seeds leave open, and a
-//! few at once, is decided in double precision, with a series that leaves out next to nothing, or where a probe says that it leaves out
-//! as much as labels differ by, with the products.
+//! At most of many seeds alone show the winner, as where several masks show all that anything flows from. What seeds leave open, and
+//! where they are few all, is decided in double precision: with a series that leaves out next to nothing, or where a probe says that it
+//! leaves out as much as labels differ by, with the products.
 
 use super::errors::Errors;
 use super::lanes::WIDTH_F32;
@@ -42,7 +42,7 @@ pub(super) fn decide(
         return Ok(0);
     }
     let series = series.and_then(|series| series.within(TOLERANCE, iterations));
-    // what is left for the products, which many more points flow in, are equal labels for the most part
+    // what is left for the products, to which many more points flow, are equal labels for the most part
     let rounds = [(series.as_ref(), FEW), (None, 0)];
     // endlessly many end where they change little, which says no more
     let rounds = rounds.iter().take(1 + usize::from(iterations.is_some()));
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn of_many_points_those_near_a_seed_of_one_label_have_it_and_all_others_the_lowest() {
-        let (n, one) = (2000, 1000);
+        let (n, one) = (2048, 1024);
         let twins: &[(u32, f64)] = &[(1, 0.25), (2, 0.25)];
         let mut seeds = vec![twins; n];
         seeds[one] = &[(2, 0.25)];

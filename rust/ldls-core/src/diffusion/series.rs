@@ -187,9 +187,9 @@ fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
     )
 }
 
-/// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes, by what these lack of
-/// 1; the upper half would be aliases of higher terms. They are off by the rounding of one value: where there were more, sums of
-/// many would never be small.
+/// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes, a power of two; the upper
+/// half would be aliases of higher terms. `function` takes 1 - x. Each is off by little more than the rounding of one value, so that
+/// the sum of many that are next to nothing is next to nothing too.
 fn interpolate(
     function: impl Fn(f64) -> f64,
     middle: f64,
@@ -208,7 +208,6 @@ fn interpolate(
         .map(|quarters| angle(quarters).cos())
         .collect();
     let coefficient = |k: usize| {
-        // of a power of two, which a mask takes the remainder by
         let at_nodes = (0..nodes).map(|j| cosines[(k * (2 * j + 1)) & (4 * nodes - 1)]);
         let sum: f64 = values
             .iter()
