@@ -134,6 +134,25 @@ def test_a_scaled_projection_sees_the_same():
     np.testing.assert_allclose(one[1], other[1])
 
 
+@pytest.mark.parametrize("T_camera_lidar", [np.eye(4), [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]])
+def test_a_projection_of_negative_sign_is_its_negative(T_camera_lidar):
+    # the extrinsic apart, or in the projection, whose third row is then of any direction
+    K = pinhole().projection
+    points = np.random.default_rng(0).normal(size=(500, 3))
+    expected = ldls.stages.project(points, ldls.Camera(projection=K @ T_camera_lidar), image_size=(60, 80))
+    found = ldls.stages.project(points, ldls.Camera(projection=-K @ T_camera_lidar), image_size=(60, 80))
+    assert len(expected[0]) > 5
+    np.testing.assert_array_equal(found[0], expected[0])
+    np.testing.assert_array_equal(found[1], expected[1])
+
+
+def test_the_camera_of_a_mirrored_image_looks_forward():
+    mirrored = ldls.Camera(projection=np.diag([-1.0, 1, 1]) @ pinhole().projection + [[0, 0, 80, 0], [0] * 4, [0] * 4])
+    in_view, pixels = ldls.stages.project(np.array([[1.0, 0, 5], [1, 0, -5]]), mirrored, image_size=(60, 80))
+    assert in_view.tolist() == [0]
+    assert pixels[0, 0] < 40
+
+
 @pytest.mark.parametrize("columns", [3, 4])
 def test_a_transposed_intrinsic_matrix_is_refused(columns):
     transposed = np.hstack([np.array([[720.0, 0, 620], [0, 720, 180], [0, 0, 1]]).T, np.zeros((3, 1))])

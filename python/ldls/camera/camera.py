@@ -26,6 +26,18 @@ def _check_not_transposed(projection: NDArray[np.float64]) -> None:
         )
 
 
+def _depth_forward(projection: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of P and -P, which project alike, the one whose third row is the depth, positive before the camera.
+
+    That is the one of positive determinant (Hartley and Zisserman 2004, section 6.2.3), but for the camera of a mirrored
+    image, whose third row points forward.
+    """
+    third = projection[2, :3]
+    points_forward = third[2] > np.linalg.norm(third) / 2
+    is_negated = not points_forward and np.linalg.det(projection[:, :3]) < 0
+    return -projection if is_negated else projection
+
+
 def _identity() -> NDArray[np.float64]:
     return np.eye(4)
 
@@ -38,7 +50,7 @@ class Camera:
     Attributes:
         projection: (3, 4) from homogeneous points in the camera frame (metres; x right, y down, z forward) to
             homogeneous pixels; pixel centres lie at integer coordinates. A (3, 3) intrinsic matrix K is taken as
-            [K | 0].
+            [K | 0], and a matrix of negative sign, which projects alike, as its negative.
         T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates, column vectors.
         distortion: How the lens departs from a pinhole; nothing by default, as in rectified images. With one,
             `projection` is the intrinsic matrix K of the raw image.
@@ -65,6 +77,7 @@ class Camera:
         _check_not_transposed(projection)
         if projection.shape == (3, 3):
             projection = np.hstack([projection, np.zeros((3, 1))])
+        projection = _depth_forward(projection)
         transform = as_transform("T_camera_lidar", self.T_camera_lidar)
         for name, matrix in (("projection", projection), ("T_camera_lidar", transform)):
             matrix.flags.writeable = False
