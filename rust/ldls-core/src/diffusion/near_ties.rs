@@ -17,8 +17,9 @@ use crate::masks::PixelLabels;
 use crate::{Cancel, Result};
 use std::collections::BTreeMap;
 
-/// What the series leaves out, as a share of the largest value.
-const TOLERANCE: f64 = 1e-16;
+/// What the series of one round after the other leave out, as a share of the largest value: the first tells labels apart that differ,
+/// the next knows equal ones, for which it leaves out less than rounding does. What neither is sure of is left for the products.
+const ROUNDS: [Option<f64>; 3] = [Some(1e-14), Some(1e-19), None];
 /// Points up to which they are a few: what flows to these is diffused in double precision in the time that it takes to look at all
 /// seeds. More are those of masks that lie over one another, most of whose labels are equal.
 const FEW: usize = 1 << 8;
@@ -41,24 +42,25 @@ pub(super) fn decide(
     if contested == 0 {
         return Ok(0);
     }
-    let series = series.and_then(|series| series.within(TOLERANCE, iterations));
-    // what is left for the products, to which many more points flow, are equal labels for the most part
-    let rounds = [(series.as_ref(), FEW), (None, 0)];
-    // endlessly many end where they change little, which says no more
-    let rounds = rounds.iter().take(1 + usize::from(iterations.is_some()));
-    for &(series, few) in rounds {
-        let open: usize = ties.values().map(Vec::len).sum();
-        // endlessly many products take a look at all of the graph for one point as for all
-        if open > few || iterations.is_none() {
+    let rounds = match iterations {
+        Some(_) if contested <= FEW => 0..3,
+        Some(_) => 1..3,
+        // endlessly many end where they change little, which says no more than a series
+        None => 1..2,
+    };
+    for round in rounds {
+        if round > 0 {
             let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
             settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
         }
         if ties.is_empty() {
             break;
         }
+        let within = |tolerance| series?.within(tolerance, iterations);
+        let series = ROUNDS[round].and_then(within);
         let candidates = candidates(&ties);
         let points: Vec<u32> = ties.values().flatten().copied().collect();
-        let products = (series, iterations);
+        let products = (series.as_ref(), iterations);
         let mut leaders = leaders(a, &points, &candidates, products, &exact, cancel)?.into_iter();
         // all of them are asked about in this order
         let mut is_open = |point: &u32| {

@@ -10,7 +10,6 @@ use super::sweep::Step;
 use crate::Real;
 use crate::graph::PointGraph;
 use rayon::prelude::*;
-use std::f64::consts::PI;
 
 /// What the eigenvalues of the graph of a cloud lie above: -0.25 to -0.34 is the least one of frames of 64 beams, where
 /// Gershgorin's theorem says -0.82.
@@ -21,6 +20,9 @@ const MOST_LEFT_OUT: f64 = 1e-4;
 /// The same of those that begin at [`USUAL_LOW`]: in one frame of a hundred some dozen points have more than the others may,
 /// and double precision decides the near-ties among them.
 const MOST_LEFT_OUT_OF_SHORT: f64 = 1e-2;
+
+/// Coefficients below it are left out of a sum that is at least 1: far less than any tolerance, even a hundred thousand times.
+const NOTHING: f64 = 1e-30;
 
 /// `c_0 T_0 + c_1 T_1 + ...` on an interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,8 +53,10 @@ impl Series {
         let Some([low, high]) = ends else {
             return Vec::new();
         };
-        // rounding is divided by the width, and in single precision may lead out of an interval that has next to none
-        let wide = [low.min(USUAL_LOW), high];
+        // rounding is divided by the width, and in single precision may lead out of an interval that has next to none; where the
+        // middle is not negative no coefficient is
+        let low_or_less = low.min(USUAL_LOW);
+        let wide = [low_or_less, high.max(-low_or_less)];
         let long = Self::on(wide, iterations, tolerance);
         let mut series: Vec<Self> = long.into_iter().collect();
         // a matrix that was read is asked for its values, which nothing decides again
@@ -85,39 +89,19 @@ impl Series {
         Some(series).filter(|series| series.degree() + 1 < products)
     }
 
-    /// The series of 1 + x + ... + x^(`terms` - 1).
+    /// The series of 1 + x + ... + x^(`terms` - 1), for an interval whose middle is not negative.
     fn of_geometric_sum(terms: usize, middle: f64, half_width: f64, tolerance: f64) -> Self {
-        // of 1 - x, which keeps its digits where x is near 1 and terms are nearly equal
-        let sum = |complement: f64| {
-            if complement.abs() < f64::MIN_POSITIVE {
-                terms as f64
-            } else if complement < 1.0 {
-                -(terms as f64 * (-complement).ln_1p()).exp_m1() / complement
-            } else {
-                (1.0 - (1.0 - complement).powi(terms as i32)) / complement
-            }
-        };
-        // twice as many as there are terms yield all of them
-        let mut nodes = (2 * terms).next_power_of_two().min(256);
-        loop {
-            let mut coefficients = interpolate(sum, middle, half_width, nodes);
-            // the sum is a polynomial of degree `terms` - 1: beyond it there is rounding and nothing else
-            coefficients.truncate(terms);
-            let all = coefficients.len() == terms;
-            let degree = degree_within(&coefficients, tolerance * sum(1.0 - middle - half_width));
-            // far from the last coefficient: those that were cut off are smaller still
-            if all || 8 * degree < 7 * coefficients.len() || nodes >= 1 << 14 {
-                let (kept, rest) = coefficients.split_at(degree + 1);
-                let tail = rest.iter().map(|c| c.abs()).sum();
-                return Self {
-                    middle,
-                    half_width,
-                    coefficients: kept.to_vec(),
-                    tail,
-                    most_left_out: MOST_LEFT_OUT,
-                };
-            }
-            nodes *= 2;
+        let mut coefficients = geometric_sum(terms, middle, half_width);
+        // all T_k are 1 at the upper end, where the sum is largest
+        let largest: f64 = coefficients.iter().sum();
+        let degree = degree_within(&coefficients, tolerance * largest);
+        let tail = coefficients.drain(degree + 1..).sum();
+        Self {
+            middle,
+            half_width,
+            coefficients,
+            tail,
+            most_left_out: MOST_LEFT_OUT,
         }
     }
 
@@ -187,36 +171,24 @@ fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
     )
 }
 
-/// The lower half of the coefficients of the polynomial that equals `function` at `nodes` Chebyshev nodes, a power of two; the upper
-/// half would be aliases of higher terms. `function` takes 1 - x. Each is off by little more than the rounding of one value, so that
-/// the sum of many that are next to nothing is next to nothing too.
-fn interpolate(
-    function: impl Fn(f64) -> f64,
-    middle: f64,
-    half_width: f64,
-    nodes: usize,
-) -> Vec<f64> {
-    let angle = |quarters: usize| PI / 2.0 * quarters as f64 / nodes as f64;
-    let values: Vec<f64> = (0..nodes)
-        .map(|j| {
-            let below = 2.0 * (angle(2 * j + 1) / 2.0).sin().powi(2);
-            function(1.0 - middle - half_width + half_width * below)
-        })
-        .collect();
-    // T_k at node j is the cosine of k times its angle
-    let cosines: Vec<f64> = (0..4 * nodes)
-        .map(|quarters| angle(quarters).cos())
-        .collect();
-    let coefficient = |k: usize| {
-        let at_nodes = (0..nodes).map(|j| cosines[(k * (2 * j + 1)) & (4 * nodes - 1)]);
-        let sum: f64 = values
-            .iter()
-            .zip(at_nodes)
-            .map(|(value, at)| value * at)
-            .sum();
-        sum * if k == 0 { 1.0 } else { 2.0 } / nodes as f64
-    };
-    (0..nodes / 2).map(coefficient).collect()
+/// The coefficients of 1 + x + ... + x^(`terms` - 1) but for those that are next to nothing. None is negative where `middle` is not, so
+/// that none cancels another and the smallest keep their digits.
+fn geometric_sum(terms: usize, middle: f64, half_width: f64) -> Vec<f64> {
+    // 2 t T_k = T_(k + 1) + T_(k - 1), where T_(-1) is T_1: the first counts twice, as those of an even function do
+    let mut sum = vec![2.0];
+    let mut next = Vec::new();
+    for _ in 1..terms {
+        sum.extend([0.0; 2]);
+        next.clear();
+        next.push(2.0 + middle * sum[0] + half_width * sum[1]);
+        let inner = sum.windows(3);
+        next.extend(inner.map(|c| middle * c[1] + half_width / 2.0 * (c[0] + c[2])));
+        let kept = next.iter().rposition(|c| *c > NOTHING);
+        next.truncate(kept.map_or(1, |last| last + 1));
+        std::mem::swap(&mut sum, &mut next);
+    }
+    sum[0] /= 2.0;
+    sum
 }
 
 /// Least degree behind which the coefficients sum to at most `remainder`.
@@ -319,6 +291,30 @@ mod tests {
                 series.degree()
             );
         }
+    }
+
+    #[test]
+    fn the_smallest_coefficients_keep_their_digits() {
+        // x^n is the sum of C(n, k) T_(n - 2 k) over k from 0 to n, by 2^n, where T_(-m) is T_m
+        let mut expected = vec![0.0; 100];
+        for n in 0..100_usize {
+            let mut term = 0.5_f64.powi(n as i32);
+            for k in 0..=n {
+                expected[n.abs_diff(2 * k)] += term;
+                term *= (n - k) as f64 / (k + 1) as f64;
+            }
+        }
+        let found = geometric_sum(100, 0.0, 1.0);
+        assert_eq!(found.len(), 100, "the last is 2^-98, more than nothing");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!(
+                (found / expected - 1.0).abs() < 1e-13,
+                "{found} for {expected}"
+            );
+        }
+        let many = geometric_sum(1000, 0.0, 1.0);
+        assert!((many.iter().sum::<f64>() - 1000.0).abs() < 1e-9);
+        assert!(many.len() < 400 && many[many.len() - 1] > NOTHING);
     }
 
     #[test]
