@@ -189,7 +189,8 @@ def test_frames_that_fail_are_named_and_passed_over(tmp_path):
     (source / "velodyne/000001.bin").write_bytes(b"123")
     done = run(source, "--rerun", "a.rrd")
     assert done.exit_code == 2
-    assert "000001 failed" in done.output and "2 of 3 frames" in done.output
+    assert done.stderr.startswith("000001 failed") and "2 of 3 frames" in done.stdout
+    assert "failed" not in done.stdout
     assert len(Recorded("a.rrd").each("world/points", "Points3D:positions")) == 2
     for broken in (source / "velodyne").iterdir():
         broken.write_bytes(b"123")

@@ -115,7 +115,7 @@ def view(
             source, indices, label=label, picture=picture, target=target, name=name, diffusion=diffusion
         )
         for failure in failures:
-            console().print(failure, soft_wrap=True)
+            typer.secho(failure, err=True, fg="red")
         message = f"{len(indices) - len(failures):,} of {len(source):,} frames"
         if picture is not None:
             message += f"; wrote {picture.stem}-FRAME{picture.suffix} and others to {picture.parent}"
