@@ -158,8 +158,9 @@ def test_the_table_of_objects_has_tracks(drive, tmp_path, frames):
 
 
 def test_a_map_holds_what_the_tracked_results_leave_standing(drive, tmp_path):
-    run_with_map(drive, tmp_path / "out", tmp_path / "map.ply", track=True)
-    before = (tmp_path / "map.ply").read_bytes()
+    place = tmp_path / "out/map.ply"
+    run_with_map(drive, tmp_path / "out", place, track=True)
+    before = place.read_bytes()
     source, tracker, places = open_source(drive, truth=False), ldls.Tracker(), ldls.LabelledMap()
     for window in ((0, 1, 2), (3, 4, 5), (6, 7)):
         results = [ldls.read_result(tmp_path / f"out/{source.names[index]}.npz") for index in window]
@@ -169,9 +170,9 @@ def test_a_map_holds_what_the_tracked_results_leave_standing(drive, tmp_path):
     assert len(places) > 100
     ldls.save(places, tmp_path / "expected.ply")
     assert before == (tmp_path / "expected.ply").read_bytes()
-    (tmp_path / "map.ply").unlink()
-    run_with_map(drive, tmp_path / "out", tmp_path / "map.ply", track=True)
-    assert (tmp_path / "map.ply").read_bytes() == before, "of what earlier runs did, too"
+    place.unlink()
+    run_with_map(drive, tmp_path / "out", place, track=True)
+    assert place.read_bytes() == before, "of what earlier runs did, too"
 
 
 def test_a_map_without_tracks_or_of_no_format_is_refused_before_anything_is_done(drive, tmp_path):
@@ -179,6 +180,8 @@ def test_a_map_without_tracks_or_of_no_format_is_refused_before_anything_is_done
         run_with_map(drive, tmp_path / "out", tmp_path / "map.ply")
     with pytest.raises(UnsupportedFormatError, match=r"cannot write a map to '\.xyz'"):
         run_with_map(drive, tmp_path / "out", tmp_path / "map.xyz", track=True)
+    with pytest.raises(FileNotFoundError, match="no such folder to write to"):
+        run_with_map(drive, tmp_path / "out", tmp_path / "nowhere/map.ply", track=True)
     assert not (tmp_path / "out").exists()
 
 

@@ -56,6 +56,44 @@ def test_a_command_writes_over_no_input(folder, command, option, output):
     assert outcome.stderr.endswith(f"; give another {option}\n")
 
 
+@pytest.mark.parametrize(
+    ("command", "made"),
+    [
+        pytest.param(f"{SEGMENT} --out new --picture {{}}/a.png", "new", id="picture"),
+        pytest.param(f"{SEGMENT} --out new --objects {{}}/a.json", "new", id="objects"),
+        pytest.param(f"{SEGMENT} --out new --save-masks {{}}/a.npz", None, id="masks saved"),
+        pytest.param(f"{SEGMENT} --out new --rerun {{}}/a.rrd", "new", id="recording"),
+        pytest.param("masks convert masks.npz {}/a.json", None, id="masks converted"),
+        pytest.param("masks make image.png {}/a.json --segmenter boxes:none.txt", None, id="masks made"),
+        pytest.param("masks show masks.npz --picture {}/a.png", None, id="show"),
+        pytest.param("view result.npz --picture {}/a.png", None, id="result"),
+        pytest.param("view result.npz --rerun {}/a.rrd", None, id="recorded"),
+    ],
+)
+def test_a_folder_to_write_to_must_be_there_before_any_work(folder, monkeypatch, command, made):
+    for name in ("ldls.io.read_points", "ldls.io.read_masks", "ldls.io.read_image", "ldls.viewing.save_pictures"):
+        monkeypatch.setattr(name, lambda *_, **__: pytest.fail("work was done"))
+    outcome = run(app, command.format("nowhere").split(), env={"COLUMNS": "500"})
+    assert outcome.exit_code == 1
+    assert outcome.stderr == "error: nowhere: no such folder to write to; make it first\n"
+    monkeypatch.undo()
+    if made is not None:
+        monkeypatch.chdir(folder)
+        assert run(app, command.format(made).split(), env={"COLUMNS": "500"}).exit_code == 0
+        assert list((folder / made).glob("a.*"))
+        shutil.rmtree(folder / made)
+
+
+def test_a_run_makes_its_folder_and_no_other(tmp_path):
+    source = layouts.many_frames(tmp_path / "source", 2)
+    words = ["run", str(source), "--masks", str(source / "masks"), "--out", str(tmp_path / "out")]
+    outcome = run(app, [*words, "--objects", str(tmp_path / "nowhere/a.csv")], env={"COLUMNS": "500"})
+    assert outcome.exit_code == 1 and "nowhere: no such folder to write to" in outcome.stderr
+    assert not (tmp_path / "out").exists()
+    assert run(app, [*words, "--objects", str(tmp_path / "out/a.csv")]).exit_code == 0
+    assert (tmp_path / "out/a.csv").is_file()
+
+
 @pytest.mark.parametrize("command", ["view", "info"])
 def test_pictures_of_a_source_are_none_of_its_files(tmp_path, command):
     source = layouts.many_frames(tmp_path / "source", 2)

@@ -26,7 +26,7 @@ from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, o
 from ldls.batch.window import Frames, Outcome
 from ldls.datasets import Source, open_source
 from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, ParameterError, some
-from ldls.io.files import check_folder, check_outputs, sweep
+from ldls.io.files import check_outputs, sweep
 from ldls.io.objects import objects_writer
 from ldls.segmenters.registry import segmenter_file
 from ldls.viewing.formats import BAG, RESULT, file_name
@@ -111,7 +111,8 @@ def run(
     if begun is not None:
         check_places(folder, opened.names, settings.frame_formats, begun)
     of_all = {"objects": objects, "map": map_file}
-    check_outputs({name: [Path(path)] for name, path in of_all.items() if path is not None}, _inputs(opened, settings))
+    outputs = {name: [Path(path)] for name, path in of_all.items() if path is not None}
+    check_outputs(outputs, _inputs(opened, settings), made=folder)
     tracks = _tracks(settings, folder, names, map_file)
     with_tracks = None if tracks is None else tracks.folder
     bag = RunBag(opened, folder, with_tracks) if BAG in settings.formats else None
@@ -120,8 +121,6 @@ def run(
     poses.check(chosen)
     windows = windows_of(chosen, poses.stamps, settings.sweeps)
     folder.mkdir(parents=True, exist_ok=True)
-    if objects is not None:
-        check_folder(objects)
     with only_run(folder):
         sweep(folder)
         if bag is not None:

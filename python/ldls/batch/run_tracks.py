@@ -31,7 +31,7 @@ from ldls.batch.journal import Record
 from ldls.batch.known_files import is_written, written
 from ldls.errors import LimitError, UnsafePathError
 from ldls.io import read_result, save
-from ldls.io.files import LARGE_BYTES, check_folder, open_file, refuse_link, sweep, whole_file
+from ldls.io.files import LARGE_BYTES, open_file, refuse_link, sweep, whole_file
 from ldls.io.labels.semantic_kitti import MOST_INSTANCES as MOST_TRACKS
 from ldls.io.objects import DECIMALS, FrameObjects
 from ldls.io.results import map_writer
@@ -72,7 +72,6 @@ class RunTracks:
             raise UnsafePathError(f"frame {FOLDER!r}: its files and {TABLE} may be one; rename it, or do not track")
         if map_file is not None:
             map_writer(map_file)
-            check_folder(map_file)
         self._folder, self.folder, self._map = folder, folder / FOLDER, map_file
         self._formats = {"label", *formats}
 

@@ -46,7 +46,7 @@ def annotate(
     from ldls.io.labels import read_kitti_objects, write_annotations
 
     labels = label_paths(training)
-    check_outputs({"OUT": [out / path.name for path in labels]}, labels)
+    check_outputs({"OUT": [out / path.name for path in labels]}, labels, made=out)
     folders = FrameFolders(points=training / "velodyne", calib=training / "calib", images=training / "image_2")
     missing = [path for path in labels if not (out / path.name).exists()]
     out.mkdir(parents=True, exist_ok=True)

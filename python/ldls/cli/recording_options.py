@@ -74,6 +74,15 @@ def check_recording(target: str | None, diffusion: int | None = None) -> None:
     check_target(target)
 
 
+def recording_files(target: str | None) -> list[Path]:
+    """The file that is recorded to, if it is one."""
+    if target is None:
+        return []
+    from ldls.viewing.recording.session import VIEWER
+
+    return [] if target == VIEWER else [Path(target)]
+
+
 def record(
     result: Segmentation,
     target: str,

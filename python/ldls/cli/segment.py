@@ -29,7 +29,14 @@ from ldls.cli.mask_options import (
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.method_options import takes_params
 from ldls.cli.options import CoresOption, FormatsOption, ObjectsOption, OutOption, PictureOption, words
-from ldls.cli.recording_options import ONLY_CAMERA, DiffusionOption, RerunOption, check_recording, record
+from ldls.cli.recording_options import (
+    ONLY_CAMERA,
+    DiffusionOption,
+    RerunOption,
+    check_recording,
+    record,
+    recording_files,
+)
 from ldls.params import Params
 
 
@@ -115,8 +122,9 @@ def segment(
         "--save-masks": [] if save_masks is None else [save_masks],
         "--objects": [] if objects is None else [objects],
         "--picture": [] if picture is None else picture_files(picture),
+        "--rerun": recording_files(rerun),
     }
-    check_outputs(outputs, [points, calib, extrinsic, masks, segmenter_file(segmenter), image])
+    check_outputs(outputs, [points, calib, extrinsic, masks, segmenter_file(segmenter), image], made=out)
     pixels = None if image is None else read_image(image)
     seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
     chosen = masks_of(

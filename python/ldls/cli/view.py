@@ -11,7 +11,14 @@ import typer
 from ldls.cli.mask_options import CategoriesOption, FrameSegmenterOption, MinScoreOption
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import FRAMES_FAILED, PictureOption, refuse
-from ldls.cli.recording_options import DiffusionOption, check_recording, default_target, record, where_recorded
+from ldls.cli.recording_options import (
+    DiffusionOption,
+    check_recording,
+    default_target,
+    record,
+    recording_files,
+    where_recorded,
+)
 from ldls.cli.source_options import DatasetOption, SourceOption, StoredMasksOption
 from ldls.cli.view_source import MOST_FRAMES, chosen_frames, labelled, show_frames
 from ldls.errors import InputError
@@ -88,11 +95,9 @@ def view(
     target = rerun if picture is not None else rerun or default_target(name)
     check_recording(target, diffusion)
     if picture is not None:
-        from ldls.io.files import check_folder
         from ldls.viewing.files import check_picture
 
         check_picture(picture)
-        check_folder(picture)
     failures: list[str] = []
     if path.is_file() and any(path.name.lower().endswith(each.ending) for each in FORMATS.values()):
         of_sources = {"dataset": dataset, "option": option, "frames": frames, "masks": masks, "results": results}
@@ -137,7 +142,8 @@ def view_result(
 
     result = read_result(path)
     files = image_files(images, camera_names(result.views))
-    check_outputs({"--picture": [] if picture is None else picture_files(picture)}, files.values())
+    outputs = {"--picture": [] if picture is None else picture_files(picture), "--rerun": recording_files(target)}
+    check_outputs(outputs, files.values())
     pictures = {camera: read_image(file) for camera, file in files.items()}
     messages = []
     if picture is not None:

@@ -12,7 +12,7 @@ from ldls.cli.mask_options import chosen_categories, say_own_masks
 from ldls.cli.messages import in_options
 from ldls.cli.options import refuse
 from ldls.cli.progress import progress
-from ldls.cli.recording_options import every_of
+from ldls.cli.recording_options import every_of, recording_files
 from ldls.cli.source_options import parse_options
 from ldls.errors import InputError, LdlsError
 
@@ -115,7 +115,8 @@ def show_frames(
     alone = len(indices) == 1
     places = {} if picture is None else {index: _named(picture, source.names[index]) for index in indices}
     pictures = [file for place in places.values() for file in picture_files(place)]
-    check_outputs({"--picture": pictures}, (file for index in indices for file in source.files(index)))
+    outputs = {"--picture": pictures, "--rerun": recording_files(target)}
+    check_outputs(outputs, (file for index in indices for file in source.files(index)))
     failures: list[tuple[str, Exception]] = []
     with nullcontext() if target is None else open_recording(target, name=name) as recording:
         for index in progress(indices, len(indices), "drawing" if recording is None else "recording"):

@@ -207,18 +207,30 @@ def check_folder(path: str | PathLike[str]) -> None:
         raise FileNotFoundError(errno.ENOENT, "no such folder to write to; make it first", str(folder))
 
 
-def check_outputs(outputs: Mapping[str, Iterable[Path]], inputs: Iterable[str | PathLike[str] | None]) -> None:
-    """Refuse, before any work, to write over what is read: an output is never an input.
+def check_outputs(
+    outputs: Mapping[str, Iterable[Path]],
+    inputs: Iterable[str | PathLike[str] | None],
+    *,
+    made: Path | None = None,
+) -> None:
+    """Refuse, before any work, to write where no folder is, or over what is read: an output is never an input.
 
     Links, relative paths and letters of another case name the file that they lead to.
 
     Args:
         outputs: The files that will be written, by the option that names them; they need not be there.
         inputs: The files that are read; of a folder, those in it. None is passed over.
+        made: The folder that is made for them if need be.
 
     Raises:
+        FileNotFoundError: The folder of one of `outputs` is not there.
         InputError: One of `outputs` is one of `inputs`.
     """
+    outputs = {option: [*paths] for option, paths in outputs.items()}
+    to_be = [] if made is None else [made.resolve(), *made.resolve().parents]
+    for folder, path in {path.parent: path for paths in outputs.values() for path in paths}.items():
+        if folder.resolve() not in to_be:
+            check_folder(path)
     there = {_identity(path): (option, path) for option, paths in outputs.items() for path in paths if path.exists()}
     # nearly always nothing is there, and the inputs, which may be many, are not looked at
     given = (Path(path) for path in inputs if path is not None) if there else ()
