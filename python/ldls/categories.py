@@ -90,7 +90,7 @@ def own_name(name: str, own: Iterable[str], wider: Mapping[str, str]) -> str | N
 
 
 def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> list[int]:
-    """Ids of the categories `wanted`, each an id or a name, among `names`.
+    """Ids of the categories `wanted`, each an id or a name, whatever its capitals, among `names`.
 
     Raises:
         ParameterError: There is no such category; the message has the nearest name.
@@ -99,10 +99,13 @@ def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> li
 
 
 def _ids(wanted: int | str, names: Mapping[int, str]) -> list[int]:
-    found = [category for category, name in names.items() if wanted in (category, name)]
+    by_name = {folded(name): name for name in names.values()}
+    asked = folded(wanted) if isinstance(wanted, str) else None
+    found = [category for category, name in names.items() if category == wanted or folded(name) == asked]
     if found:
         return found
-    near = get_close_matches(str(wanted), names.values(), n=1)
+    own = own_name(str(wanted), by_name, {})
+    near = [own] if own is not None else get_close_matches(folded(str(wanted)), by_name, n=1)
     some = ", ".join(list(names.values())[:8]) + (", ..." if len(names) > 8 else "")
-    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {some}"
+    hint = f"did you mean {by_name[near[0]]!r}?" if near else f"expected one of {some}"
     raise ParameterError(f"categories: {wanted!r} is unknown; {hint}")

@@ -48,16 +48,18 @@ def test_faults_of_yolo_are_named(tmp_path, text, options, message):
 def test_shapes_of_labelme(tmp_path):
     corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
     shapes = [
-        {"label": "person", "points": corners, "shape_type": "polygon", "group_id": None},
+        {"label": "Person", "points": corners, "shape_type": "polygon", "group_id": None},
         {"label": "cart", "points": [[20, 15], [30, 30]], "shape_type": "rectangle", "group_id": 7},
-        {"label": "cart", "points": [[40, 30], [30, 15]], "shape_type": "rectangle", "group_id": 7},
+        {"label": "Cart", "points": [[40, 30], [30, 15]], "shape_type": "rectangle", "group_id": 7},
     ]
     content = {"shapes": shapes, "imageHeight": 60, "imageWidth": 80, "imageData": None}
     (tmp_path / "a.json").write_text(json.dumps(content))
     masks = ldls.read_masks(tmp_path / "a.json")
     np.testing.assert_array_equal(pixels(masks), [SQUARE, SQUARE])
-    assert [masks.names[each] for each in masks.categories.tolist()] == ["person", "cart"]
+    assert [masks.names[each] for each in masks.categories.tolist()] == ["person", "cart"], "capitals do not count"
     assert masks.categories[0] == 1
+    named = ldls.read_masks(tmp_path / "a.json", names={7: "CART"})
+    assert named.categories.tolist() == [1, 7] and named.names[7] == "CART"
     content["shapes"][0]["shape_type"] = "linestrip"
     (tmp_path / "a.json").write_text(json.dumps(content))
     with pytest.raises(ldls.MaskError, match=r"a\.json: shape 0: linestrip of 4 points, expected a polygon"):

@@ -298,9 +298,25 @@ def test_a_filter_keeps_what_is_wanted(options, kept):
     assert found.scores.tolist() == masks.scores[kept].tolist()
 
 
-def test_an_unknown_category_is_answered_with_the_nearest():
-    with pytest.raises(ldls.ParameterError, match="'persn' is unknown; did you mean 'person'"):
-        three_masks().filter(categories=["persn"])
+@pytest.mark.parametrize(
+    ("wanted", "nearest"),
+    [
+        pytest.param("persn", "person", id="misspelt"),
+        pytest.param("PERSN", "person", id="in capitals"),
+        pytest.param("Pedestrian", "person", id="the name of another data set"),
+    ],
+)
+def test_an_unknown_category_is_answered_with_the_nearest(wanted, nearest):
+    with pytest.raises(ldls.ParameterError, match=f"'{wanted}' is unknown; did you mean '{nearest}'"):
+        three_masks().filter(categories=[wanted])
+
+
+def test_capitals_of_categories_do_not_count():
+    masks = ldls.InstanceMasks.from_array(
+        np.ones((3, 6, 8), bool), categories=[1, 2, 3], names={1: "Car", 2: "van", 3: "car"}
+    )
+    assert masks.filter(categories=["CAR"]).categories.tolist() == [1, 3]
+    assert masks.filter(categories=["Van ", 3]).categories.tolist() == [2, 3]
 
 
 @pytest.mark.parametrize(
@@ -352,6 +368,6 @@ def test_an_array_with_the_masks_last_is_refused_until_it_says_so():
 
 def test_categories_may_be_names():
     pixels = np.zeros((2, 60, 80), bool)
-    assert ldls.InstanceMasks.from_array(pixels, categories=["car", "person"]).categories.tolist() == [3, 1]
+    assert ldls.InstanceMasks.from_array(pixels, categories=["Car", "person"]).categories.tolist() == [3, 1]
     with pytest.raises(ldls.ParameterError, match="categories: 'caar' is unknown; did you mean 'car'"):
         ldls.InstanceMasks.from_array(pixels, categories=["caar", "person"])

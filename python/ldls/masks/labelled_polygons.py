@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
-from ldls.categories import COCO_NAMES, category_ids
+from ldls.categories import COCO_NAMES, category_ids, folded
 from ldls.errors import CorruptFileError, MaskError, within
 from ldls.masks.pixels import checked_size
 
@@ -41,12 +41,13 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
         CorruptFileError: It is not labelme's.
     """
     size = checked_size((content.get("imageHeight"), content.get("imageWidth")))
-    parts: dict[tuple[str, object], list[list[float]]] = {}
+    parts: dict[tuple[str, object], tuple[str, list[list[float]]]] = {}
     for i, shape in enumerate(_listed(content, "shapes")):
         label, group = str(shape.get("label")), shape.get("group_id")
         with within(f"shape {i}"):
-            parts.setdefault((label, ("alone", i) if group is None else group), []).append(_polygon(shape))
-    return _arguments(size, [label for label, _ in parts], list(parts.values()), names)
+            own = (folded(label), ("alone", i) if group is None else group)
+            parts.setdefault(own, (label, []))[1].append(_polygon(shape))
+    return _arguments(size, [label for label, _ in parts.values()], [part for _, part in parts.values()], names)
 
 
 def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:
@@ -71,7 +72,7 @@ def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None 
         with within(f"object {i}"):
             polygons.append([_polygon({"points": each.get("polygon", ())})])
         plain = [part.replace("-", " ") for part in parts]
-        known = (part for part in reversed(plain) if part in COCO_NAMES.values())
+        known = (part for part in reversed(plain) if folded(part) in COCO_NAMES.values())
         labels.append(next(known, plain[-1]))
     return _arguments(checked_size((height, width)), labels, polygons, names)
 
@@ -89,14 +90,15 @@ def _arguments(
     polygons: Sequence[list[list[float]]],
     names: Mapping[int, str] | None,
 ) -> dict[str, Any]:
-    given = {name: category for category, name in (names or {}).items()}
-    others = sorted({label for label in labels if label not in given})
+    given = {folded(name): category for category, name in (names or {}).items()}
+    spelled = {folded(label): label for label in sorted(labels, reverse=True) if folded(label) not in given}
+    others = sorted(spelled.values())
     ids, own = category_ids(dict(enumerate(others)))
-    of_label = {label: ids[index] for index, label in enumerate(others)} | given
+    of_label = {folded(label): ids[index] for index, label in enumerate(others)} | given
     return {
         "rles": [_ldls.Rle.from_polygons(*size, each) for each in polygons],
         "image_size": size,
-        "categories": np.array([of_label[label] for label in labels], np.int64),
+        "categories": np.array([of_label[folded(label)] for label in labels], np.int64),
         "names": COCO_NAMES | own | dict(names or {}),
     }
 

@@ -23,6 +23,14 @@ BOX = KittiObject(
 CAMERA = ldls.Camera(projection=[[100.0, 0, 50], [0, 100, 40], [0, 0, 1]], image_size=(80, 100))
 
 
+def test_classes_are_spelled_as_kitti_does(tmp_path):
+    names = ("CAR", "dontcare", "person_Sitting", "tractor")
+    (tmp_path / "a.txt").write_text("".join(f"{name} {ROW.partition(' ')[2]}\n" for name in names))
+    found = read_kitti_objects(tmp_path / "a.txt")
+    assert [each.type for each in found] == ["Car", "DontCare", "Person_sitting", "tractor"]
+    assert [each.is_region for each in found] == [False, True, False, False]
+
+
 def test_objects_have_all_fields(tmp_path):
     (tmp_path / "a.txt").write_text(
         f"{ROW}\n{ROW} 0.9\n\nDontCare -1 -1 -10 1 2 3 4 -1 -1 -1 -1000 -1000 -1000 -10\r\n"

@@ -41,6 +41,9 @@ def test_boxes_become_rectangles(tmp_path):
         ("Van", 101, "Van"),
         ("Cyclist", 102, "Cyclist"),
         ("Misc", 103, "Misc"),
+        ("PERSON_SITTING", 1, "person"),
+        ("cyclist", 102, "Cyclist"),
+        ("Traffic_Light", 10, "traffic light"),
     ],
 )
 def test_classes_of_kitti_have_categories(tmp_path, kitti, category, name):
@@ -80,4 +83,6 @@ def test_faults_of_boxes_are_named(tmp_path, text, options, error, message):
 
 def test_classes_of_ones_own_get_ids(tmp_path):
     masks = boxes(tmp_path, f"Crane 0 0 0 0 0 5 5 {REST}", image_size=(6, 10), names={104: "Crane"})
+    assert (masks[0].category, masks[0].name) == (104, "Crane")
+    masks = boxes(tmp_path, f"crane 0 0 0 0 0 5 5 {REST}", image_size=(6, 10), names={104: "Crane"})
     assert (masks[0].category, masks[0].name) == (104, "Crane")

@@ -20,6 +20,12 @@ def test_the_research_layout_is_the_research_codes(tmp_path):
         assert arrays["class_ids"].max() <= 80
 
 
+def test_capitals_do_not_count_in_the_research_layout(tmp_path):
+    masks = ldls.InstanceMasks.from_array(np.ones((1, 4, 5), bool), categories=[3], names={3: "Car"})
+    ldls.save(masks, tmp_path / "masks.npz", layout="research")
+    assert ldls.read_masks(tmp_path / "masks.npz")[0].name == "car"
+
+
 def test_the_research_layout_knows_only_cocos_categories(tmp_path):
     with pytest.raises(ldls.MaskError, match=r"mask \d: category 10\d '.*' is not COCO's"):
         ldls.save(random_masks(1), tmp_path / "masks.npz", layout="research")

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
 from ldls.camera.rigid import transformed
-from ldls.categories import own_name
+from ldls.categories import folded, own_name
 from ldls.cloud import as_points
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
 from ldls.io.files import read_lines, whole_file
@@ -30,6 +30,7 @@ KITTI: tuple[str, ...] = (
     "Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist", "Tram", "Misc", "DontCare",
 )  # fmt: skip
 """Classes of KITTI's object labels."""
+_SPELLINGS = {folded(name): name for name in KITTI}
 N_FIELDS = 15
 DECIMALS = 4
 UNKNOWN_TRUNCATION = -1
@@ -45,7 +46,7 @@ class KittiObject:
     """One row of a label_2 file; unknown fields, such as those of DontCare rows, hold -1, -10 or -1000.
 
     Attributes:
-        type: Class; KITTI's or, in files of anyone's own, another.
+        type: Class; KITTI's, spelled as KITTI does, or, in files of anyone's own, another.
         truncated: Share of the object outside the image, 0 to 1.
         occluded: 0 visible, 1 partly, 2 largely occluded, 3 unknown.
         alpha: Angle of observation in radians.
@@ -236,7 +237,7 @@ def _object(place: str, words: list[str]) -> KittiObject:
         raise CorruptFileError(f"{place}: expected 15 fields, or 16 with a score, got {len(words)}")
     v = [_number(place, word) for word in words[1:]]
     return KittiObject(
-        type=words[0],
+        type=_SPELLINGS.get(folded(words[0]), words[0]),
         truncated=v[0],
         occluded=int(v[1]),
         alpha=v[2],

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 
-from ldls.categories import COCO_NAMES
+from ldls.categories import COCO_NAMES, folded
 from ldls.errors import MaskError, within
 from ldls.io.labels.kitti_objects import KittiObject, read_kitti_objects
 from ldls.masks import InstanceMasks
@@ -50,8 +50,9 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
     """
     objects = [each for each in read_kitti_objects(path) if not each.is_region]
     all_names = KITTI_NAMES | dict(names or {})
+    ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
     # a blank separates fields, so names are written without
-    ids = {name.replace(" ", "_"): category for category, name in all_names.items()} | KITTI_CATEGORIES
+    ids = {folded(name).replace(" ", "_"): category for name, category in ids.items()}
     with within(path):
         return KittiBoxes(
             boxes=[each.bbox for each in objects],
@@ -89,12 +90,12 @@ def read(
 
 
 def _category(index: int, box: KittiObject, ids: Mapping[str, int]) -> int:
-    if box.type not in ids:
+    if folded(box.type) not in ids:
         known = ", ".join(KITTI_CATEGORIES)
         raise MaskError(
             f"box {index}: class {box.type!r} is none of {known}; pass names={{104: {box.type!r}}} to give it an id"
         )
-    return ids[box.type]
+    return ids[folded(box.type)]
 
 
 def _score(index: int, box: KittiObject) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
-from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
+from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, folded
 from ldls.errors import MaskError, ParameterError, UnsupportedFormatError
 from ldls.io.arrays import open_npz, write_npz
 from ldls.masks import InstanceMasks
@@ -106,7 +106,7 @@ def masks_of(arrays: Mapping[str, NDArray[Any]]) -> InstanceMasks:
 
 def _research_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:
     for i, mask in enumerate(masks):
-        if COCO_NAMES.get(mask.category) != mask.name:
+        if COCO_NAMES.get(mask.category) != folded(mask.name):
             raise MaskError(
                 f"mask {i}: category {mask.category} {mask.name!r} is not COCO's, and the research code knows no "
                 "others; filter it out or write the other layout"
