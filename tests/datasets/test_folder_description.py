@@ -33,6 +33,24 @@ def test_a_description_is_read(tmp_path):
             "coefficients: got .*expected a list of finite numbers",
             id="coefficient in text",
         ),
+        pytest.param(
+            layouts.FOLDER_TOML.replace("masks/{frame}.npz", "masks.png"),
+            ldls.ParameterError,
+            r"cameras\.front: masks is 'masks\.png', expected \{frame\} .*, or one \.json of all images",
+            id="masks of one image",
+        ),
+        pytest.param(
+            layouts.FOLDER_TOML.replace("masks/", "{camera}/"),
+            ldls.ParameterError,
+            r"masks is '\{camera\}/\{frame\}\.npz', expected \{frame\} and nothing else in braces",
+            id="camera in braces",
+        ),
+        pytest.param(
+            layouts.FOLDER_TOML + layouts.FOLDER_TOML.partition("\n\n")[2].replace("front", "back"),
+            ldls.ParameterError,
+            r"cameras\.back: masks is 'masks/\{frame\}\.npz', as of cameras\.front, and both would get the masks",
+            id="masks of two cameras",
+        ),
     ],
 )
 def test_what_is_no_description_is_refused(tmp_path, text, error, message):

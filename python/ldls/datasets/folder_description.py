@@ -134,7 +134,7 @@ def read_description(path: Path) -> FolderDescription:
 
     Raises:
         CorruptFileError: It is no TOML.
-        ParameterError: A key is unknown, missing, or of another type.
+        ParameterError: A key is unknown, missing, or of another type, or masks of one image would be several images'.
         CalibrationError: A camera cannot be.
         FileNotFoundError: There is no such file.
     """
@@ -148,6 +148,7 @@ def read_description(path: Path) -> FolderDescription:
         cameras = {name: _camera(f"{path}, cameras.{name}", each) for name, each in content["cameras"].items()}
         if not cameras:
             raise ParameterError("cameras: expected a table [cameras.NAME] or more")
+        _check_masks(str(path), {name: each.masks for name, each in cameras.items() if each.masks is not None})
         return FolderDescription(
             points=content["points"],
             columns=content.get("columns"),
@@ -183,6 +184,26 @@ def _camera(place: str, content: Any) -> CameraDescription:  # noqa: ANN401
         T_camera_lidar=content.get("T_camera_lidar"),
         image_size=size,
     )
+
+
+def _check_masks(path: str, masks: Mapping[str, str]) -> None:
+    """Refuse places of masks, by their cameras, that do not tell frames or cameras apart."""
+    first: dict[str, str] = {}
+    for camera, place in masks.items():
+        named = f"{path}, cameras.{camera}: masks is {place!r}"
+        if "{camera}" in place:
+            raise ParameterError(f"{named}, expected {{frame}} and nothing else in braces; write the camera's name")
+        if "{frame}" not in place:
+            if not place.lower().endswith(".json"):
+                raise ParameterError(
+                    f"{named}, expected {{frame}} where the name of the frame stands, or one .json of all images"
+                )
+        elif place in first:
+            raise ParameterError(
+                f"{named}, as of cameras.{first[place]}, and both would get the masks of one image; name a file of "
+                "each camera, or one .json of all images"
+            )
+        first.setdefault(place, camera)
 
 
 def _matrix(place: str, K: list[Any] | None) -> NDArray[np.float64] | None:
