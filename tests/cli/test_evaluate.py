@@ -58,6 +58,35 @@ def test_tables_are_printed_and_written(frames):
     assert (row["Car precision"], row["Car recall"], row["Pedestrian recall"]) == (100.0, 75.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("words", "read", "out"),
+    [
+        pytest.param("label:mine/semantic.json truth/1.txt", "mine/semantic.json", "mine", id="predictions"),
+        pytest.param("mine/1.npz annotations:truth/tracking.csv", "truth/tracking.csv", "truth", id="truth"),
+        pytest.param(
+            "mine/reliability.npz truth/1.txt --calib . --image mine", "mine/reliability.png", "mine", id="image"
+        ),
+        pytest.param("mine/1.npz truth/1.txt --beside a=label:mine/frames.md", "mine/frames.md", "link", id="beside"),
+    ],
+)
+def test_tables_are_written_over_no_input(frames, monkeypatch, words, read, out):
+    monkeypatch.chdir(frames)
+    (frames / "link").symlink_to("mine")
+    shutil.copy("mine/1.npz", "mine/reliability.npz")
+    (frames / read).write_bytes(b"mine")
+    outcome = run(app, ["evaluate", *words.split(), "--out", out], env={"COLUMNS": "500"})
+    assert outcome.exit_code == 1
+    assert outcome.stderr.startswith(f"error: --out: would write over {out}/"), outcome.stderr
+    assert (frames / read).read_bytes() == b"mine"
+    assert not list((frames / out).glob("panoptic*"))
+
+
+def test_tables_may_lie_with_the_labels_and_be_written_again(frames):
+    for _ in range(2):
+        outcome = evaluate(frames, "--out", frames / "mine")
+        assert outcome.exit_code == 0, outcome.output
+
+
 def test_methods_stand_side_by_side(frames):
     shutil.copytree(frames / "mine", frames / "other")
     outcome = evaluate(frames, "--beside", f"a network={frames / 'other'}", "--out", frames / "t")

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 import ldls
+from batch import runs
 from ldls.cli import app
 from ldls.datasets import KittiObjectSource
 from ldls.errors import LeftOutWarning
@@ -149,9 +150,22 @@ def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
         assert title in ran.output
     written = {path.name for path in out.iterdir()}
     stems = ("comparison", "instances", "panoptic", "ablation", "reliability", "coverage", "range", "iterations")
-    assert {f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")} <= written
-    assert {f"{stem}.png" for stem in ("range", "objects", "iterations", "reliability", "coverage")} <= written
+    assert written == {f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")} | {
+        f"{stem}.png" for stem in ("range", "objects", "iterations", "reliability", "coverage")
+    }
     assert "nan" not in ran.output.lower()
+
+
+def test_tables_are_written_over_no_input(folder, tmp_path):
+    mine = tmp_path / "frames"
+    shutil.copytree(folder, mine)
+    for path in mine.rglob("000000.*"):
+        path.rename(path.with_stem("range"))
+    before = runs.contents(mine)
+    ran = CliRunner().invoke(app, ["reproduce", str(mine), "--out", str(mine / "masks")], env={"COLUMNS": "500"})
+    assert ran.exit_code == 1
+    assert ran.stderr.startswith("error: --out: would write over "), ran.stderr
+    assert runs.contents(mine) == before
 
 
 @pytest.mark.parametrize("arguments", [[], ["FOLDER", "--suite", "tuning"]], ids=["neither", "both"])

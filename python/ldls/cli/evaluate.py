@@ -13,13 +13,17 @@ import typer
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import ScoredOption, refuse, words
 from ldls.cli.progress import progress
-from ldls.cli.reliability_files import draw_reliability
+from ldls.cli.reliability_files import RELIABILITY_FIGURES, draw_reliability
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
+    from ldls.cli.label_pairs import FrameFolders
     from ldls.evaluation import Evaluation
+    from ldls.io.labels.label_formats import LabelFiles
 
 BOXES = "kitti-boxes"
+TABLES = ("semantic", "instances", "panoptic", "reliability", "coverage", "tracking", "frames")
+"""Names of the tables that are written, as far as there is something to tell."""
 FOLDER = {"exists": True, "file_okay": False, "readable": True, "metavar": "FOLDER"}
 
 
@@ -146,6 +150,8 @@ def evaluate(
             "mean the same object in every sweep, such as label"
         )
     folders = FrameFolders(points=points, calib=calib, images=image)
+    if out is not None:
+        _check_out(out, (frame for own in files.values() for frame in own), folders)
     of_methods = {method: {each.name: each.prediction for each in own} for method, own in files.items()}
     counting = Counting(of_methods, folders)
     score = partial(score_pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
@@ -190,6 +196,21 @@ def _check_tracked(paths: Iterable[Path]) -> None:
                 f"--track: files in {path} number the objects of each frame anew; expected files whose numbers mean "
                 f"the same object throughout, which are in {path / FOLDER}"
             )
+
+
+def _check_out(out: Path, files: Iterable[LabelFiles], folders: FrameFolders) -> None:
+    """Refuse, before any work, tables and figures that would be written over labels or files of their frames.
+
+    Raises:
+        InputError: One would be.
+    """
+    from ldls.evaluation.tables import table_files
+    from ldls.io.files import check_outputs
+
+    written = [path for stem in TABLES for path in table_files(out, stem)]
+    written += [out / name for name in RELIABILITY_FIGURES]
+    read = (path for each in files for path in (each.prediction.path, each.truth.path, *folders.files(each.name)))
+    check_outputs({"--out": written}, read, made=out)
 
 
 def _show(by_method: dict[str, Evaluation], left_out_by: set[str], out: Path | None) -> None:

@@ -42,6 +42,13 @@ class FrameFolders:
     calib: Path | None = None
     images: Path | None = None
 
+    def files(self, name: str) -> list[Path]:
+        """The files of the frame `name` that the folders have."""
+        paths = [] if self.points is None else [self.points / f"{name}{ending}" for ending in POINT_ENDINGS]
+        paths += [] if self.calib is None else [self.calib / f"{name}.txt"]
+        paths += [] if self.images is None else [self.images / f"{name}{suffix}" for suffix in IMAGE_SUFFIXES]
+        return [path for path in paths if path.exists()]
+
     def read_points(self, name: str) -> Points:
         """(N, >= 3) points of the frame `name`, in metres.
 

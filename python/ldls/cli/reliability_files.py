@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from ldls.evaluation import Evaluation
 
 
+RELIABILITY_FIGURES = ("reliability.png", "coverage.png")
+
+
 def draw_reliability(evaluations: Mapping[str, Evaluation], out: Path) -> list[Path]:
     """The figures drawn: both if a method tells a confidence and finds an object, else none."""
     from ldls.evaluation import figures
@@ -17,7 +20,7 @@ def draw_reliability(evaluations: Mapping[str, Evaluation], out: Path) -> list[P
     told = {method: one.reliability for method, one in evaluations.items() if one.reliability}
     if not any(each.objects.points.any() for each in told.values()):
         return []
-    paths = [out / "reliability.png", out / "coverage.png"]
+    paths = [out / name for name in RELIABILITY_FIGURES]
     figures.right_against_confidence(told, paths[0])
     figures.precision_against_coverage(told, paths[1])
     return paths

@@ -11,12 +11,16 @@ import typer
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import CoresOption, OutOption, ScoredOption, SuitePart, words
 from ldls.cli.progress import progress
-from ldls.cli.reliability_files import draw_reliability
+from ldls.cli.reliability_files import RELIABILITY_FIGURES, draw_reliability
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
     from ldls.evaluation.paper import Experiment
     from ldls.evaluation.tables import Table
+
+
+TABLES = ("comparison", "instances", "panoptic", "ablation", "reliability", "coverage", "range", "iterations")
+FIGURES = ("range.png", "iterations.png", "objects.png", *RELIABILITY_FIGURES)
 
 
 class Truth(StrEnum):
@@ -66,10 +70,14 @@ def reproduce(
     from ldls.datasets import KittiObjectSource
     from ldls.evaluation import ClassSet
     from ldls.evaluation.paper import label, score
+    from ldls.evaluation.tables import table_files
+    from ldls.io.files import check_outputs
     from ldls.params import Params
 
     frames = KittiObjectSource(_folder(folder, suite), masks="masks", truth=truth.value)
     scored = ClassSet.kitti(words(categories))
+    written = [path for stem in TABLES for path in table_files(out, stem)] + [out / name for name in FIGURES]
+    check_outputs({"--out": written}, (path for k in range(len(frames)) for path in frames.files(k)), made=out)
     labelled = progress(label(frames, classes=scored, params=Params(threads=cores)), len(frames), "labelling")
     experiment = score(list(labelled), classes=scored)
     screen = console()

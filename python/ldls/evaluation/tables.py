@@ -93,15 +93,19 @@ class Table:
         """Write `stem` .md, .csv and .json to `folder`, made if need be; the files written."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        contents = {".md": self.markdown(), ".csv": self.csv(), ".json": self.json()}
-        paths = [folder / f"{stem}{suffix}" for suffix in contents]
-        for path, content in zip(paths, contents.values(), strict=True):
+        paths = table_files(folder, stem)
+        for path, content in zip(paths, (self.markdown(), self.csv(), self.json()), strict=True):
             with whole_file(path) as file:
                 file.write(content.encode())
         return paths
 
     def _is_number(self, column: int) -> bool:
         return bool(self.rows) and not any(isinstance(row[column], str) for row in self.rows)
+
+
+def table_files(folder: Path, stem: str) -> list[Path]:
+    """The files that `Table.write` writes."""
+    return [folder / f"{stem}{suffix}" for suffix in (".md", ".csv", ".json")]
 
 
 @checked
