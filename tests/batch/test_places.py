@@ -2,11 +2,14 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
-from batch import runs
-from ldls import batch
+import ldls.batch.poses as found_poses
+from batch import drives, runs
+from datasets import layouts
+from ldls import batch, read_poses
 from ldls.errors import BatchError, InputError
 from ldls.io import read_masks, save
 
@@ -87,6 +90,55 @@ def test_names_are_one_where_they_are_to_the_file_system(few, tmp_path):
     else:
         assert run(few, out, "npz").n_done == 12
     assert (out / "000001.NPZ").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("file", ["failures.jsonl", "tracks.csv", "tracks/notes.txt"])
+def test_what_a_run_writes_of_all_frames_takes_no_others_place(drive, tmp_path, file):
+    out = tmp_path / "out"
+    layouts.write_text(out / file, "mine")
+    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, track=True)
+    with pytest.raises(BatchError, match=rf"out: holds {file.partition('/')[0]}, {REASON}"):
+        batch.run(drive, out, settings)
+    assert runs.contents(out) == {file: b"mine"}
+
+
+def test_tracks_of_others_are_refused_when_a_run_is_to_be_tracked(drive, tmp_path):
+    out = tmp_path / "out"
+    layouts.write_text(out / "tracks.csv", "mine")
+    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1)
+    assert batch.run(drive, out, settings).n_done == 8
+    with pytest.raises(BatchError, match=rf"out: holds tracks\.csv, {REASON}"):
+        batch.run(drive, out, replace(settings, track=True))
+    assert (out / "tracks.csv").read_text() == "mine"
+    (out / "tracks.csv").unlink()
+    for _ in range(2):
+        assert batch.run(drive, out, replace(settings, track=True)).tracks
+
+
+def test_failures_of_earlier_runs_are_replaced(few, tmp_path):
+    masks = few / "masks/000003.json"
+    content = masks.read_text()
+    masks.write_text("{")
+    assert len(run(few, tmp_path / "out", "npz").failures) == 1
+    masks.write_text(content)
+    assert run(few, tmp_path / "out", "npz").n_done == 12
+    assert not (tmp_path / "out/failures.jsonl").exists()
+
+
+def test_poses_that_sweeps_tell_take_no_others_place(drive, tmp_path, monkeypatch):
+    poses = tmp_path / "out/poses.txt"
+    layouts.write_text(poses, drives.tum_poses(8))
+    monkeypatch.setattr(found_poses, "odometry_of", lambda _: read_poses(tmp_path / "told.txt"))
+    layouts.write_text(tmp_path / "told.txt", drives.tum_poses(8))
+    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, poses="kiss-icp")
+    with pytest.raises(BatchError, match=r"poses\.txt: is there, no run here wrote it, .* by --poses .*poses\.txt, or"):
+        batch.run(drive, tmp_path / "out", settings)
+    assert poses.read_text() == drives.tum_poses(8)
+    poses.unlink()
+    assert batch.run(drive, tmp_path / "out", settings).n_done == 8
+    before = poses.read_bytes()
+    assert batch.run(drive, tmp_path / "out", settings).n_earlier == 8
+    assert poses.read_bytes() == before
 
 
 def test_tables_of_a_run_are_none_of_its_inputs(few, tmp_path):

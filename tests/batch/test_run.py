@@ -22,6 +22,7 @@ from ldls import batch
 from ldls.batch import lock
 from ldls.batch.journal import Journal
 from ldls.batch.plan import check_names, parse_frames
+from ldls.batch.poses import FOUND
 from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import (
@@ -336,7 +337,7 @@ def test_a_run_that_may_have_done_frames_is_kept(few, tmp_path, ending):
 
 def test_poses_that_sweeps_told_belong_to_their_source(few, tmp_path):
     run(few, tmp_path / "out", settings={"categories": ("zebrra",)})
-    (tmp_path / "out/poses.txt").write_text(drives.tum_poses(12))
+    (tmp_path / "out/poses.txt").write_text(f"# {FOUND}\n{drives.tum_poses(12)}")
     other = layouts.many_frames(tmp_path / "other", 12)
     with pytest.raises(BatchError, match=r"source\.path was"):
         run(other, tmp_path / "out")

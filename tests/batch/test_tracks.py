@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import shutil
 import signal
 import sys
 from collections import Counter
@@ -288,8 +289,9 @@ def test_sweeps_in_disorder_are_refused_before_anything_is_done(drive, tmp_path)
 
 
 def test_a_link_in_the_place_of_the_tracks_is_not_followed(drive, tmp_path):
-    (tmp_path / "out").mkdir()
+    run(drive, tmp_path / "out")
     (tmp_path / "elsewhere").mkdir()
+    shutil.rmtree(tmp_path / "out/tracks")
     (tmp_path / "out/tracks").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(UnsafePathError, match="is a link"):
         run(drive, tmp_path / "out")

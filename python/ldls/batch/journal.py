@@ -2,8 +2,9 @@
 
 The first line holds the settings that labels depend on; a run goes on only with the same ones, but may add frames, and
 formats of their files. A journal in which no frame was ever done binds nobody: a run of other settings begins it anew.
-The formats that were begun are there as `written_formats`, before any file is: what lies in their places afterwards is
-the run's own, recorded or not, and a format in whose places others' files lie is not begun.
+The formats that were begun, and "tracks" where objects are numbered, are there as `written_formats`, before any file
+is: what lies in their places afterwards is the run's own, recorded or not, and a format in whose places others' files
+lie is not begun.
 Frames are appended in the order in which they are finished, in groups, so that the disk need not be waited for after
 each; the last line of a frame counts, and one that a crash cut off is dropped. When all is done the lines are put in
 the order of the frames: every run of the same settings, formats and frames ends with the same bytes, whatever was done
@@ -33,13 +34,15 @@ from itertools import accumulate
 from pathlib import Path
 from typing import IO, Any
 
-from ldls.batch.poses import FOUND_POSES
+from ldls.batch.poses import holds_found_poses
 from ldls.errors import BatchError, CorruptFileError
 from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
 from ldls.segmentation.object_rows import COLUMNS
-from ldls.viewing.formats import ENDINGS
+from ldls.viewing.formats import ENDINGS, TRACKS
 
 JOURNAL_NAME = "journal.jsonl"
+WRITTEN = (*ENDINGS, TRACKS)
+"""What a journal notes that files of it were begun, in this order."""
 LONGEST_LINE_BYTES = 1 << 24
 Record = Mapping[str, Any]
 
@@ -48,7 +51,7 @@ class Journal:
     """The journal of a folder. Only where each line stands is kept in memory, for runs may have very many frames.
 
     Attributes:
-        formats: The formats that runs in the folder have begun, this one included.
+        formats: The formats that runs in the folder have begun, this one included, and `TRACKS` if they have.
     """
 
     def __init__(self, folder: Path, header: Record, formats: Collection[str] = ()) -> None:
@@ -64,7 +67,7 @@ class Journal:
         self._settings = header
         self._places: dict[str, int] = {}
         begun = formats_begun(folder) or ()
-        self.formats = tuple(word for word in ENDINGS if word in formats or word in begun)
+        self.formats = tuple(word for word in WRITTEN if word in formats or word in begun)
         self._file = open_to_append(self._path)
         try:
             self._end = self._read()
@@ -193,7 +196,7 @@ class Journal:
         """
         differences = list(_differences({**header, "written_formats": self.formats}, self._header))
         # poses that the sweeps told are true of their source alone
-        binds = (self._folder / FOUND_POSES).is_file() and header.get("source") != self._header["source"]
+        binds = holds_found_poses(self._folder) and header.get("source") != self._header["source"]
         if differences and (binds or not all(map(_is_failure, rest))):
             raise BatchError(
                 f"{self._folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go "
@@ -231,7 +234,7 @@ def formats_begun(folder: Path) -> tuple[str, ...] | None:
     with path.open("rb") as file, suppress(ValueError, RecursionError):
         match json.loads(file.readline(LONGEST_LINE_BYTES)):
             case {"written_formats": [*words]}:
-                return tuple(word for word in ENDINGS if word in words)
+                return tuple(word for word in WRITTEN if word in words)
     return None
 
 

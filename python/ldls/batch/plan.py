@@ -6,13 +6,14 @@ import os
 import re
 import unicodedata
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path, PureWindowsPath
 
 from ldls.batch.window import Frames
 from ldls.datasets import Source
 from ldls.errors import BatchError, ParameterError, UnsafePathError, some
 from ldls.sequences.trajectory import LONGEST_GAP_S
-from ldls.viewing.formats import file_name
+from ldls.viewing.formats import ENDINGS, file_name
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 
@@ -96,7 +97,9 @@ def check_names(names: Sequence[str], formats: Sequence[str]) -> None:
             seen[file] = name
 
 
-def check_places(folder: Path, names: Sequence[str], formats: Sequence[str], begun: Sequence[str]) -> None:
+def check_places(
+    folder: Path, names: Sequence[str], formats: Sequence[str], begun: Sequence[str], others: Sequence[str] = ()
+) -> None:
     """Refuse to begin files where others are: an output is never an input.
 
     Args:
@@ -104,22 +107,23 @@ def check_places(folder: Path, names: Sequence[str], formats: Sequence[str], beg
         names: Names of all frames of the source, for any of them may be added to a run.
         formats: The formats of the run.
         begun: Those that runs there have begun before, whose places are theirs.
+        others: Files and folders of the run that are not a frame's and that no run there has begun.
 
     Raises:
         BatchError: There is a file, or a link, in the place of one.
     """
     added = [word for word in formats if word not in begun]
-    if not added or not folder.is_dir():
+    if not (added or others) or not folder.is_dir():
         return
     there = {_folded(path.name) for path in folder.iterdir()}
-    there -= {_folded(file_name(name, word)) for name in names for word in begun}
-    files = (file_name(name, word) for name in names for word in added)
+    there -= {_folded(file_name(name, word)) for name in names for word in begun if word in ENDINGS}
+    files = chain((file_name(name, word) for name in names for word in added), others)
     # the file system has the last word on which names are one
-    others = [file for file in files if _folded(file) in there and os.path.lexists(folder / file)]
-    if others:
+    foreign = [file for file in files if _folded(file) in there and os.path.lexists(folder / file)]
+    if foreign:
         raise BatchError(
-            f"{folder}: holds {some(others)}, which no run here wrote and the run would write over; an output is never "
-            "written over an input, so give another --out"
+            f"{folder}: holds {some(foreign)}, which no run here wrote and the run would write over; an output is "
+            "never written over an input, so give another --out"
         )
 
 

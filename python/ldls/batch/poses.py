@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -15,7 +16,7 @@ from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames
 from ldls.datasets import Frame, Source, odometry_of
 from ldls.datasets.odometry import PERIOD_S
-from ldls.errors import LdlsError, PoseError, within
+from ldls.errors import BatchError, LdlsError, PoseError, within
 from ldls.io import read_poses
 from ldls.io.files import digest_of
 from ldls.io.poses import tum
@@ -26,23 +27,40 @@ ODOMETRY = "kiss-icp"
 """What stands in the place of a file where the sweeps themselves are to say how the lidar moved."""
 FOUND_POSES = "poses.txt"
 """File in the folder of the run that these poses are kept in, in TUM's format."""
+FOUND = "poses that ldls found by kiss-icp"
+"""First line of this file, a comment."""
 
 
 def with_odometry(source: Source, settings: RunSettings, folder: Path) -> RunSettings:
     """The settings with a file of poses where these are to be found from the sweeps, which is done once a folder.
 
     Raises:
+        BatchError: A file that no run wrote is in their place.
         LdlsError: The sweeps do not say how the lidar moved; see `ldls.datasets.odometry_of`.
         ImportError: `ldls[odometry]` is not installed.
     """
     if settings.poses != ODOMETRY:
         return settings
     path = folder / FOUND_POSES
-    if not path.is_file():
+    if not holds_found_poses(folder):
+        if os.path.lexists(path):
+            raise BatchError(
+                f"{path}: is there, no run here wrote it, and poses by {ODOMETRY} would take its place; take them from "
+                f"it by --poses {path}, or give another --out"
+            )
         trajectory = odometry_of(source)
         folder.mkdir(parents=True, exist_ok=True)
-        tum.write(path, trajectory)
+        tum.write(path, trajectory, comment=FOUND)
     return replace(settings, poses=str(path))
+
+
+def holds_found_poses(folder: Path) -> bool:
+    """True for the folder of a run that keeps poses which its sweeps told."""
+    path, first = folder / FOUND_POSES, f"# {FOUND}\n".encode()
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(first)) == first
 
 
 class Poses:

@@ -20,16 +20,16 @@ from ldls.batch.lock import only_run
 from ldls.batch.plan import check_names, check_places, chosen_of, windows_of
 from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import RunBag
-from ldls.batch.run_tracks import RunTracks
+from ldls.batch.run_tracks import FOLDER, TABLE, RunTracks
 from ldls.batch.settings import RunSettings, source_record
-from ldls.batch.summary import Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
+from ldls.batch.summary import FAILURES_NAME, Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
 from ldls.batch.window import Frames, Outcome
 from ldls.datasets import Source, open_source
 from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, ParameterError, some
 from ldls.io.files import check_outputs, sweep
 from ldls.io.objects import objects_writer
 from ldls.segmenters.registry import segmenter_file
-from ldls.viewing.formats import BAG, RESULT, file_name
+from ldls.viewing.formats import BAG, ENDINGS, RESULT, TRACKS, file_name
 
 GROUP_S = 0.5
 """Frames finished within this time share a wait for the disk."""
@@ -109,7 +109,9 @@ def run(
     begun = formats_begun(folder)
     # a journal that was cut off, or is none, is judged when it is opened
     if begun is not None:
-        check_places(folder, opened.names, settings.frame_formats, begun)
+        tables = [FAILURES_NAME] if not begun else []
+        tables += [FOLDER, TABLE] if settings.track and TRACKS not in begun else []
+        check_places(folder, opened.names, settings.frame_formats, begun, tables)
     of_all = {"objects": objects, "map": map_file}
     outputs = {name: [Path(path)] for name, path in of_all.items() if path is not None}
     check_outputs(outputs, _inputs(opened, settings), made=folder)
@@ -130,9 +132,9 @@ def run(
             "settings": settings.record() | work.digests,
             "source": source_record(opened.kind, str(Path(opened.path).resolve()), options),
         }
-        journal = Journal(folder, header, settings.frame_formats)
+        journal = Journal(folder, header, (*settings.frame_formats, *([TRACKS] if settings.track else [])))
         try:
-            check_names(sorted({*names, *journal.frames}), journal.formats)
+            check_names(sorted({*names, *journal.frames}), [word for word in journal.formats if word in ENDINGS])
             # what an earlier run did must still be there, and of the same input
             pending = _pending(windows, work, journal)
             to_do = [name for window in pending for _, name in window]

@@ -38,9 +38,9 @@ from ldls.io.results import map_writer
 from ldls.segmentation import Segmentation
 from ldls.segmentation.object_rows import Row
 from ldls.sequences import LabelledMap, Sweep, Tracker
-from ldls.viewing.formats import RESULT, file_name
+from ldls.viewing.formats import RESULT, TRACKS, file_name
 
-FOLDER, TABLE, STATE = "tracks", "tracks.csv", "tracks.json"
+FOLDER, TABLE, STATE = TRACKS, "tracks.csv", "tracks.json"
 FORMATS = ("npz", "label", "panoptic", "ply", "pcd", "las", "laz", "parquet", "csv")
 """Formats of results that name instances."""
 COLUMNS = (

@@ -19,6 +19,8 @@ from ldls.viewing.overlay import overlay
 
 BAG = "bag"
 """The labelled ROS bag of a whole run."""
+TRACKS = "tracks"
+"""The objects numbered over a whole run: the folder of their files, and the word that a journal notes them by."""
 PICTURE = "png"
 """The image with masks and points."""
 RESULT = "npz"

@@ -39,9 +39,9 @@ def read(path: Path, *, T_camera_lidar: Extrinsic | None = None) -> Trajectory:
         return Trajectory(rows[:, 0], np.array(poses) @ from_lidar)
 
 
-def write(path: Path, trajectory: Trajectory) -> None:
-    """Write the poses of the lidar, to the last digit."""
-    lines = [f"# {COLUMNS}"]
+def write(path: Path, trajectory: Trajectory, *, comment: str) -> None:
+    """Write the poses of the lidar, to the last digit, after a line that says what they are."""
+    lines = [f"# {comment}", f"# {COLUMNS}"]
     for stamp, pose in zip(trajectory.stamps.tolist(), trajectory.poses, strict=True):
         numbers = [stamp, *pose[:3, 3].tolist(), *np.roll(to_quaternion(pose[:3, :3]), -1).tolist()]
         lines.append(" ".join(map(repr, numbers)))
