@@ -93,6 +93,25 @@ def test_json_is_a_data_set_after_cocos(result, tmp_path):
     assert car["box"]["yaw"] == pytest.approx(found.box.yaw, abs=1e-4)
 
 
+def test_a_class_has_one_id_in_json_whatever_each_frame_calls_it(result, tmp_path):
+    def named(*classes):
+        pairs = zip(result.instances, classes, strict=True)
+        return replace(result, instances=tuple(replace(i, category=c, name=name) for i, (c, name) in pairs))
+
+    frames = {
+        "a": named((100, "cone"), (3, "car")),
+        "b": named((100, "barrel"), (101, "Cone")),
+        "c": named((101, "barrel"), (102, "sign")),
+    }
+    ldls.save_objects(frames, tmp_path / "a.json")
+    content = json.loads((tmp_path / "a.json").read_text())
+    names = {each["id"]: each["name"] for each in content["categories"]}
+    assert [names[each["category_id"]] for each in content["annotations"]] == [
+        "cone", "car", "barrel", "cone", "barrel", "sign",
+    ]  # fmt: skip
+    assert names == {3: "car", 100: "cone", 101: "barrel", 102: "sign"}
+
+
 def test_json_of_several_cameras_has_an_image_of_each(tmp_path):
     points, views = random_ring(3)
     result = ldls.segment(points, as_views(views))
