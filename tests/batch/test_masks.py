@@ -2,12 +2,15 @@
 
 import json
 
+import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from batch import runs
 from datasets import layouts
 from ldls import batch
-from ldls.errors import BatchError, InputError
+from ldls.cli import app
+from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io.masks import data_set as data_set_module
 
 
@@ -133,6 +136,44 @@ def test_cameras_for_which_the_source_names_no_masks_are_left_out(folder, tmp_pa
         layouts.write_image(folder / f"back/{name}.png")
     run(folder, tmp_path / "two")
     assert labels(tmp_path / "one") == labels(tmp_path / "two")
+
+
+def one_file(few):
+    return few, {"masks": str(gather(few, few / "instances.json"))}
+
+
+def boxes_of_each_frame(few):
+    return few, {"segmenter": f"boxes:{few}/label_2/{{frame}}.txt"}
+
+
+def network(few):
+    pytest.importorskip("onnxruntime", reason="the extra onnx is not installed")
+    from segmenters import graphs
+
+    one = np.ones((1, 4), np.float32)
+    model = graphs.constant_detections(one, np.array([3]), one[0, :1], np.ones((1, 1, 9, 9), np.float32))
+    return few, {"segmenter": f"onnx:{graphs.save(model, few / 'model.onnx')}"}
+
+
+def one_file_of_the_source(few):
+    folder = layouts.plain_folder(few / "rig", layouts.FOLDER_TOML.replace("masks/{frame}.npz", "all.json"))
+    gather(few, folder / "all.json", "{}.png", frames=2)
+    for number, name in enumerate("ab"):
+        text = (folder / "all.json").read_text().replace(f"{number:06d}.png", f"{name}.png")
+        layouts.write_text(folder / "all.json", text)
+    return folder, {}
+
+
+@pytest.mark.parametrize("masks", [one_file, boxes_of_each_frame, network, one_file_of_the_source])
+def test_a_category_that_masks_cannot_have_is_refused_before_the_first_frame(few, tmp_path, masks):
+    source, settings = masks(few)
+    with pytest.raises(ParameterError, match=r"categories: 'persn' is unknown; did you mean 'person'"):
+        batch.run(source, tmp_path / "out", batch.RunSettings(categories=("car", "persn"), **settings))
+    assert list((tmp_path / "out").iterdir()) == []
+    words = [f"--{name}={value}" for name, value in settings.items()]
+    shown = CliRunner().invoke(app, ["view", str(source), *words, "--categories=persn", "--rerun", "a.rrd"])
+    assert shown.exit_code == 1
+    assert shown.stderr.endswith("error: --categories: 'persn' is unknown; did you mean 'person'?\n")
 
 
 def test_a_place_without_masks(few, tmp_path):

@@ -13,8 +13,9 @@ from ldls.batch.known_files import KnownFiles, State, is_written, look, written
 from ldls.batch.poses import Poses
 from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames, Outcome, StageError, Window, Work, stage
+from ldls.categories import find_categories
 from ldls.datasets import CameraImage, Frame, Source
-from ldls.datasets.stored_masks import StoredMasks, fill, own_masks
+from ldls.datasets.stored_masks import StoredMasks, fill, own_category_names, own_masks
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_result
 from ldls.io.files import folder_hint
@@ -23,6 +24,7 @@ from ldls.label_diffusion import nothing_in_view
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter
+from ldls.segmenters.registry import OF_ONE_IMAGE
 from ldls.sequences import LabelDiffusion, Sweep, segment_sweeps
 from ldls.view import View
 from ldls.viewing.formats import PICTURE, RESULT, file_name, file_names, write_formats, written_formats
@@ -50,7 +52,8 @@ class FrameWork:
 
         Raises:
             LdlsError: The segmenter, the place of the masks, or the file of poses cannot be used.
-            ParameterError: Neither masks nor a segmenter are given, and the source has no masks itself.
+            ParameterError: Neither masks nor a segmenter are given, and the source has no masks itself; or there is no
+                such category, as far as this is known before masks are made or read.
         """
         self._source = source
         self._settings = settings
@@ -67,7 +70,14 @@ class FrameWork:
         self._stored = None if settings.masks is None else StoredMasks(settings.masks)
         if self._stored is not None:
             self._stored.check_names(source)
-        self._segmenter = None if settings.segmenter is None else _segmenters(settings.segmenter, settings.min_score)
+        self._segmenter: Callable[[str, CameraImage], Segmenter] | None = None
+        tables = own_category_names(source)
+        if self._stored is not None:
+            tables = () if self._stored.data_set is None else (self._stored.data_set.category_names,)
+        elif settings.segmenter is not None:
+            self._segmenter, tables = _segmenters(settings.segmenter, settings.min_score)
+        for names in filter(None, tables):
+            find_categories(settings.categories or (), names)
         self._poses = Poses(source, settings)
         self._reads_images = self._segmenter is not None or PICTURE in settings.frame_formats
         self._known_files = KnownFiles()
@@ -284,14 +294,21 @@ class FrameWork:
         return self._wanted(self._segmenter(work.name, image)(image.read()))
 
 
-def _segmenters(spec: str, min_score: float | None) -> Callable[[str, CameraImage], Segmenter]:
-    """Return a function that gives the segmenter of an image: one for all, or one each where files name frames."""
+def _segmenters(
+    spec: str, min_score: float | None
+) -> tuple[Callable[[str, CameraImage], Segmenter], tuple[Mapping[int, str], ...]]:
+    """Return a function that gives the segmenter of an image, and the names of category ids, as far as they are known.
+
+    There is one segmenter for all images, or one each where files name frames.
+    """
     if "{frame}" in spec or "{camera}" in spec:
-        return lambda frame, image: open_segmenter(fill(spec, frame, image.name), min_score=min_score)
+        names = OF_ONE_IMAGE.get(spec.partition(":")[0], {})
+        return lambda frame, image: open_segmenter(fill(spec, frame, image.name), min_score=min_score), (names,)
     # every worker runs it, each on a core of its own
     options = {"threads": 1} if spec.startswith("onnx:") else {}
     opened = open_segmenter(spec, min_score=min_score, **options)
-    return lambda frame, image: opened
+    # segmenters of others may have no such attribute
+    return lambda frame, image: opened, (getattr(opened, "names", None) or {},)
 
 
 def _inputs(work: Work) -> dict[str, State]:

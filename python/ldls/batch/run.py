@@ -86,8 +86,8 @@ def run(
         BatchError: Another run is at work in `out`, or `out` holds frames done by one of other settings, source or
             version, or files that no run wrote in the places of results, as inputs.
         CorruptFileError: The journal in `out` is none.
-        ParameterError: The source has none of the `frames`, masks of one image are given for several, or a map is
-            asked for, and no tracks.
+        ParameterError: The source has none of the `frames`, masks of one image are given for several, a map is asked
+            for, and no tracks, or a segmenter or a file of all masks has no such category.
         InputError: `objects` or `map_file` is an input.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.

@@ -39,6 +39,7 @@ class FolderSource(FileSource):
         stamps: Times of the sweeps in seconds; None for each without a file of stamps.
         left_out: Parts that incomplete frames lack, by name of the frame.
         stored_masks: Place of the masks of each camera that has them, as the description names it.
+        category_names: Name of each category id of each file of all masks.
     """
 
     kind = "folder"
@@ -75,6 +76,7 @@ class FolderSource(FileSource):
         self._data_sets = {
             place: MaskDataSet(self._safe(place)) for place in set(self.stored_masks.values()) if FRAME not in place
         }
+        self.category_names = tuple(data_set.category_names for data_set in self._data_sets.values())
         for key in self._cameras:
             self._camera(key, self.names[0])
 

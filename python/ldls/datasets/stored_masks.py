@@ -101,6 +101,12 @@ class StoredMasks:
         raise InputError(f"masks: no file {frame} with one of {' '.join(SUFFIXES)} in {looked}")
 
 
+def own_category_names(source: Source) -> tuple[Mapping[int, str], ...]:
+    """Name of each category id of each file of all masks that a source has itself."""
+    names: tuple[Mapping[int, str], ...] = getattr(source, "category_names", ())
+    return names
+
+
 def fill(pattern: str, frame: str, camera: str) -> str:
     """The pattern with the names of a frame and a camera in the places of {frame} and {camera}."""
     return pattern.replace("{frame}", frame).replace("{camera}", camera)

@@ -86,8 +86,17 @@ def _parts(content: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, A
         raise CorruptFileError("expected COCO's object with images, annotations and categories, or a list of results")
     annotations = _records("annotations", content["annotations"])
     images = by_id("images", content.get("images", []), (int, str))
+    return annotations, images, category_names(content)
+
+
+def category_names(content: Mapping[str, Any]) -> dict[int, str]:
+    """Name of each category id of a data set; none where it has no table of them.
+
+    Raises:
+        CorruptFileError: The table is none.
+    """
     categories = by_id("categories", content.get("categories", []), (int,))
-    return annotations, images, {i: str(c.get("name", i)) for i, c in categories.items()}
+    return {i: str(c.get("name", i)) for i, c in categories.items()}
 
 
 def by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[str, Any]]:

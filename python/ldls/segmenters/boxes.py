@@ -25,6 +25,7 @@ class BoxSegmenter:
         boxes: (n, 4) float64 left, top, right, bottom in pixels, whose centres lie at whole coordinates.
         min_score: Lowest score that is kept.
         grabcut: Whether GrabCut draws the outlines.
+        names: Name of each category id that masks can have.
     """
 
     def __init__(
@@ -55,7 +56,8 @@ class BoxSegmenter:
         self.min_score = check_min_score(min_score)
         self.grabcut = grabcut
         self._categories, self._scores, self._names = categories, scores, names
-        self._rectangles((1, 1))  # refuses what cannot be before an image is there
+        # refuses what cannot be before an image is there
+        self.names = self._rectangles((1, 1)).names
         self.boxes.flags.writeable = False
 
     @classmethod

@@ -31,6 +31,11 @@ class Family(Protocol):
         """Names of the outputs that `masks` takes, in its order."""
         ...
 
+    @property
+    def classes(self) -> Classes | None:
+        """Its classes; None until an output tells their number."""
+        ...
+
     def tensor(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         """(3, h, w) input for an image (H, W, 3), uint8 RGB."""
         ...
@@ -57,6 +62,7 @@ class OnnxSegmenter:
     Attributes:
         kind: Key of `KINDS`.
         min_score: Lowest score that is kept.
+        names: Name of each category id that masks can have; None where only an output tells.
     """
 
     def __init__(
@@ -92,6 +98,8 @@ class OnnxSegmenter:
         self._image = image_input(signature)
         self.kind = _kind(signature) if kind is None else _named_kind(kind)
         self._family = KINDS[self.kind].family(signature, _by_class(names))
+        classes = self._family.classes
+        self.names = None if classes is None else classes.names
         self._source = signature.source
         self._session = _session(file, providers, threads)
 

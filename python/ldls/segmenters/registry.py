@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ldls.errors import ParameterError
+from ldls.io.masks.kitti_boxes import KITTI_NAMES
 from ldls.segmenters.boxes import BoxSegmenter
 from ldls.segmenters.onnx import OnnxSegmenter
 from ldls.segmenters.segmenter import Segmenter
@@ -33,8 +34,8 @@ EXAMPLES = {
     "grabcut": "grabcut:label_2/000001.txt",
 }
 WITHOUT_ARGUMENT = frozenset({"torchvision"})
-OF_ONE_IMAGE = frozenset({"boxes", "grabcut"})
-"""Those whose file is of one image."""
+OF_ONE_IMAGE: dict[str, Mapping[int, str]] = {"boxes": KITTI_NAMES, "grabcut": KITTI_NAMES}
+"""Those whose file is of one image, and the name of each category id that their masks can have."""
 
 
 def segmenter_file(spec: str | None) -> Path | None:

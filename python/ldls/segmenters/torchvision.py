@@ -27,6 +27,7 @@ class TorchvisionSegmenter:
         model: The PyTorch module.
         device: Where it runs.
         min_score: Lowest score that is kept.
+        names: Name of each category id that masks can have.
     """
 
     def __init__(
@@ -52,6 +53,8 @@ class TorchvisionSegmenter:
         """
         self.min_score = check_min_score(min_score)
         self.name = name
+        self._classes = coco_classes()
+        self.names = self._classes.names
         self._torch = require("torch", "torch")
         models = require("torchvision", "torch").models
         _check_name(name, mask_models())
@@ -71,18 +74,17 @@ class TorchvisionSegmenter:
         pixels = check_image(image)
         output = self._output(pixels)
         scores = check_scores(output["scores"].cpu().numpy())
-        classes = coco_classes()
         crops = (
             Crop(
                 output["masks"][i, 0].ge(0.5).cpu().numpy(),
                 0,
                 0,
-                classes.id(i, int(output["labels"][i])),
+                self._classes.id(i, int(output["labels"][i])),
                 float(scores[i]),
             )
             for i in np.flatnonzero(scores >= np.float32(self.min_score)).tolist()
         )
-        return assemble(crops, (pixels.shape[0], pixels.shape[1]), classes)
+        return assemble(crops, (pixels.shape[0], pixels.shape[1]), self._classes)
 
     def __repr__(self) -> str:
         return f"TorchvisionSegmenter({self.name!r}, device={self.device!r}, min_score={self.min_score})"

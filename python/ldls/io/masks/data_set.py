@@ -21,7 +21,7 @@ from ldls.io.masks import json_file
 from ldls.io.masks.coco_json import MAX_FILE_BYTES
 from ldls.io.masks.image_name import ImageName
 from ldls.masks import InstanceMasks
-from ldls.masks.coco import by_id
+from ldls.masks.coco import by_id, category_names
 from ldls.masks.pixels import check_same_size
 
 BLANK = re.compile(r"[ \t\n\r]*")
@@ -36,6 +36,7 @@ class MaskDataSet:
         path: The file.
         sha256: Digest of its bytes, in hexadecimal digits.
         names: Name of each image as the file has it, by image id; the id itself in a bare list of results.
+        category_names: Name of each category id; none where the file has no table of them.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -60,6 +61,7 @@ class MaskDataSet:
             del content
             self._scan()
             self._images: dict[int | str, dict[str, Any]] = by_id("images", self._head.get("images", []), (int, str))
+            self.category_names = category_names(self._head)
             self._name()
         self._named: defaultdict[str, list[tuple[ImageName, int | str]]] = defaultdict(list)
         for image_id, name in self.names.items():
