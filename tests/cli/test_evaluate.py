@@ -401,6 +401,19 @@ def test_names_of_ones_own_can_be_background(frames):
     assert scores(frames / "t")["Car precision"] == 100.0
 
 
+def test_a_scored_name_that_occurs_nowhere_is_refused(frames):
+    (frames / "truth/1.txt").write_text("1 Car\n1 gnome\n0 background\n0 background\n")
+    outcome = evaluate(frames, "--categories", "car,persn", "--background", "gnome", "--out", frames / "t")
+    assert outcome.exit_code == 1
+    assert outcome.stderr.endswith("error: --categories: 'persn' is unknown; did you mean 'person'?\n")
+    outcome = evaluate(frames, "--categories", "car,gnom", "--background", "gnome")
+    assert outcome.stderr.endswith("error: --categories: 'gnom' is unknown; did you mean 'gnome'?\n")
+    assert not (frames / "t").exists()
+    # of one's own, and of a vocabulary though no frame has it
+    assert evaluate(frames, "--categories", "Gnome,zebra,Car", "--out", frames / "t").exit_code == 0
+    assert scores(frames / "t")["Gnome recall"] == 0.0
+
+
 @pytest.fixture
 def drive(tmp_path):
     """Four sweeps with two cars and a person; `switching` gives one car another number at half time."""

@@ -156,6 +156,14 @@ def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
     assert "nan" not in ran.output.lower()
 
 
+def test_a_scored_name_that_occurs_nowhere_is_refused(folder, tmp_path):
+    words = ["reproduce", str(folder), "--categories", "car,persn", "--out", str(tmp_path / "out")]
+    ran = CliRunner().invoke(app, words)
+    assert ran.exit_code == 1
+    assert ran.stderr.endswith("error: --categories: 'persn' is unknown; did you mean 'person'?\n")
+    assert not (tmp_path / "out").exists()
+
+
 def test_tables_are_written_over_no_input(folder, tmp_path):
     mine = tmp_path / "frames"
     shutil.copytree(folder, mine)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from ldls.errors import ParameterError
 if TYPE_CHECKING:
     from ldls.cli.label_pairs import FrameFolders
     from ldls.evaluation import Evaluation
+    from ldls.evaluation.pair import Pair
     from ldls.io.labels.label_formats import LabelFiles
 
 BOXES = "kitti-boxes"
@@ -122,6 +123,7 @@ def evaluate(
     """
     from ldls.cli.label_pairs import Counting, FrameFolders, have_masks, parse_place, read_bounds, read_pairs
     from ldls.evaluation import ClassSet, evaluate as score_pairs
+    from ldls.evaluation.classes import check_occur
     from ldls.evaluation.methods import BOUND
     from ldls.io.labels.label_formats import pair_files
 
@@ -155,10 +157,13 @@ def evaluate(
     of_methods = {method: {each.name: each.prediction for each in own} for method, own in files.items()}
     counting = Counting(of_methods, folders)
     score = partial(score_pairs, classes=scored, max_range_m=max_range, minimum_points=min_points)
+    seen: set[str] = set()
     by_method = {
-        method: score(progress(read_pairs(own, counting), len(own), "scoring"), track=track)
+        method: score(progress(_noted(read_pairs(own, counting), seen), len(own), "scoring"), track=track)
         for method, own in files.items()
     }
+    # names of one's own are known by the labels alone
+    check_occur(scored.names, seen)
     # labels alone have no masks
     whole = next((own for own in files.values() if have_masks(own)), None)
     if whole is not None and BOUND not in by_method:
@@ -196,6 +201,13 @@ def _check_tracked(paths: Iterable[Path]) -> None:
                 f"--track: files in {path} number the objects of each frame anew; expected files whose numbers mean "
                 f"the same object throughout, which are in {path / FOLDER}"
             )
+
+
+def _noted(pairs: Iterable[Pair], seen: set[str]) -> Iterator[Pair]:
+    """The pairs; the names that they have are added to `seen`."""
+    for pair in pairs:
+        seen.update(pair.truth.names, pair.prediction.names)
+        yield pair
 
 
 def _check_out(out: Path, files: Iterable[LabelFiles], folders: FrameFolders) -> None:

@@ -69,6 +69,7 @@ def reproduce(
     """
     from ldls.datasets import KittiObjectSource
     from ldls.evaluation import ClassSet
+    from ldls.evaluation.classes import check_occur
     from ldls.evaluation.paper import label, score
     from ldls.evaluation.tables import table_files
     from ldls.io.files import check_outputs
@@ -79,7 +80,10 @@ def reproduce(
     written = [path for stem in TABLES for path in table_files(out, stem)] + [out / name for name in FIGURES]
     check_outputs({"--out": written}, (path for k in range(len(frames)) for path in frames.files(k)), made=out)
     labelled = progress(label(frames, classes=scored, params=Params(threads=cores)), len(frames), "labelling")
-    experiment = score(list(labelled), classes=scored)
+    pairs = list(labelled)
+    every = (side for one in pairs for pair in one.methods.values() for side in (pair.truth, pair.prediction))
+    check_occur(scored.names, (name for side in every for name in side.names))
+    experiment = score(pairs, classes=scored)
     screen = console()
     tables = _tables(experiment)
     for stem, table in tables.items():

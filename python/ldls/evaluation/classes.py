@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.categories import COCO_NAMES, folded, synonyms
+from ldls.categories import COCO_NAMES, find_categories, folded, synonyms
 from ldls.checks import checked
 from ldls.errors import InputError, ParameterError
 from ldls.io.labels.kitti_objects import KITTI
@@ -156,6 +156,20 @@ class ClassSet:
                 f"truth has points of {unknown}, which the class set {self.names} does not know; "
                 "name them in its aliases, left_out or background"
             )
+
+
+def check_occur(names: Iterable[str], seen: Iterable[str]) -> None:
+    """Refuse scored names that neither a vocabulary nor any label has.
+
+    Args:
+        names: The scored classes.
+        seen: The names of classes that truth or predictions have.
+
+    Raises:
+        ParameterError: There is one; the message has the nearest name.
+    """
+    every = dict.fromkeys([*sorted({*seen} - {BACKGROUND}), *sorted(_known_names())])
+    find_categories(names, dict(enumerate(every)))
 
 
 def _distinct_instances(labeling: Labeling, classes: NDArray[np.int32]) -> NDArray[np.int32]:
