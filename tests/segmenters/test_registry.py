@@ -26,6 +26,7 @@ def test_onnx_files_are_opened(name, tmp_path):
     segmenter = open_segmenter(f"onnx:{path}", min_score=0.25, threads=1)
     assert isinstance(segmenter, OnnxSegmenter)
     assert segmenter.min_score == 0.25
+    assert segmenter.names[3] == "car"
 
 
 @pytest.mark.parametrize(("name", "grabcut"), [("boxes", False), ("grabcut", True)])
@@ -35,12 +36,14 @@ def test_label_files_are_opened(name, grabcut, tmp_path):
     segmenter = open_segmenter(f"{name}:{path}")
     assert isinstance(segmenter, BoxSegmenter)
     assert (len(segmenter.boxes), segmenter.grabcut, segmenter.min_score) == (1, grabcut, 0)
+    assert (segmenter.names[3], segmenter.names[102]) == ("car", "Cyclist")
 
 
 def test_torchvision_is_opened():
     pytest.importorskip("torchvision")
     segmenter = open_segmenter("torchvision:maskrcnn_resnet50_fpn", weights=None, device="cpu")
     assert isinstance(segmenter, TorchvisionSegmenter)
+    assert segmenter.names[3] == "car"
 
 
 @pytest.mark.parametrize(
