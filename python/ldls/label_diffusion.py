@@ -13,7 +13,7 @@ import ldls._ldls as _ldls
 from ldls.camera import Camera
 from ldls.camera.rigid import transformed
 from ldls.checks import checked
-from ldls.cloud import Points, as_points
+from ldls.cloud import Points, as_points, finite_rows
 from ldls.errors import (
     DuplicateWarning,
     InputError,
@@ -172,13 +172,15 @@ def result_of(
 
 
 def nothing_in_view(result: Segmentation) -> str | None:
-    """Why nothing of a cloud is labelled, if no point is in view, or none of them on a mask; None otherwise.
+    """Why nothing of a cloud is labelled, if no point is finite, in view, or on a mask; None otherwise.
 
     The text has no numbers, so that those of many frames are few.
     """
     n_in_view = result.report.n_in_view
     if not result.views or (result.labels > 0).any():
         return None
+    if len(result.points) and not len(finite_rows(result.points)):
+        return "points: no row is finite; nothing is labelled; are they read as they were written?"
     usable, behind = _usable_and_behind(result)
     if usable == 0:
         return None

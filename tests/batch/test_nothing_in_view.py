@@ -96,11 +96,29 @@ def test_the_cause_of_a_sweep_is_that_of_its_own_points(other, keep_origin):
 
 @pytest.mark.parametrize(
     "nothing",
-    [pytest.param(EMPTY, id="no points"), pytest.param(NAN, id="NaN"), pytest.param(ORIGIN, id="no returns")],
+    [pytest.param(EMPTY, id="no points"), pytest.param(ORIGIN, id="no returns")],
 )
 def test_a_sweep_without_a_usable_point_among_others_has_no_cause(nothing):
     for other in (AHEAD, -AHEAD, np.concatenate([-AHEAD, NAN, ORIGIN]), EMPTY):
         assert causes(nothing, other)[0] is None
+
+
+def test_the_cause_of_a_sweep_of_nan_among_others_is_that():
+    for other in (AHEAD, -AHEAD, NAN, EMPTY):
+        assert causes(NAN, other)[0].startswith("points: no row is finite; nothing is labelled")
+
+
+@pytest.mark.parametrize("sweeps", [0, 1])
+def test_a_run_names_the_frames_of_nan_whether_sweeps_are_joined_or_not(drive, tmp_path, sweeps):
+    for number in (2, 4):
+        layouts.write_points(drive / f"velodyne/{number:06d}.bin", np.full((200, 4), np.nan, "<f4"))
+    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=sweeps)
+    for _ in "ab":
+        with pytest.warns(NothingInView) as caught:
+            summary = batch.run(drive, tmp_path / "out", settings)
+        (warning,) = caught
+        assert str(warning.message).startswith("2 of 8 frames (000002, 000004): points: no row is finite")
+        assert summary.n_nothing_in_view == 2
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import FAILURES_NAME, Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
 from ldls.batch.window import Frames, Outcome
 from ldls.datasets import Source, open_source
-from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, ParameterError, some
+from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, NoUsablePoints, ParameterError, some
 from ldls.io.files import check_outputs, sweep
 from ldls.io.objects import objects_writer
 from ldls.segmenters.registry import segmenter_file
@@ -146,6 +146,7 @@ def run(
             with warnings.catch_warnings(), closing(_recorded(runner(work, pending), journal)) as outcomes:
                 # said of all frames at once, below
                 warnings.simplefilter("ignore", NothingInView)
+                warnings.simplefilter("ignore", NoUsablePoints)
                 for outcome in outcomes:
                     seconds.update(outcome.seconds)
                     n_finished += len(outcome.records)

@@ -38,7 +38,7 @@ class Summary:
         n_frames: Frames wanted.
         n_done: Frames whose files are written.
         n_earlier: Of these, those of earlier runs that were interrupted.
-        n_nothing_in_view: Of those done, frames without a point in view, or on a mask.
+        n_nothing_in_view: Of those done, frames without a finite point, one in view, or one on a mask.
         failures: Frames that failed, in their order.
         objects: Objects with points, each counted in every frame, by category name.
         tracks: Objects over the drive where they are numbered, by the name that each had last.
