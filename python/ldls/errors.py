@@ -168,7 +168,7 @@ class RecoveredFileWarning(LdlsWarning):
 
 
 class LeftOutWarning(LdlsWarning):
-    """Sweeps that no frame is made of, or annotations without a mask, for something that belongs to them is missing."""
+    """Sweeps that no frame or pose is made of, or annotations without a mask, for what belongs to them is missing."""
 
 
 class ChangedFileWarning(LdlsWarning):

@@ -9,6 +9,7 @@ import pytest
 
 import ldls
 from batch import drives, runs
+from datasets import layouts
 from ldls import batch
 from ldls.batch import frame_work
 from ldls.batch.frame_work import FrameWork
@@ -17,7 +18,7 @@ from ldls.batch.plan import windows_of
 from ldls.batch.ray_engine import _noted
 from ldls.batch.ray_worker import RayWorker
 from ldls.datasets import odometry_of, open_source
-from ldls.errors import BatchError, InputError, ParameterError, PoseError
+from ldls.errors import BatchError, InputError, LeftOutWarning, NothingInView, ParameterError, PoseError
 
 N_FRAMES = 8
 
@@ -326,6 +327,27 @@ def test_odometry_stands_for_poses_and_is_kept(simulated, tmp_path):
     before = (tmp_path / "out/poses.txt").stat().st_mtime_ns
     assert run(drive, tmp_path / "out", **settings).n_earlier == 5
     assert (tmp_path / "out/poses.txt").stat().st_mtime_ns == before
+
+
+def test_a_sweep_that_odometry_cannot_use_fails_alone_or_is_between_the_others(simulated, tmp_path):
+    pytest.importorskip("kiss_icp", reason="the extra odometry is not installed")
+    drive = shutil.copytree(simulated.parent, tmp_path / simulated.parent.name) / simulated.name
+    name = open_source(drive).names[3]
+    settings = {"masks": str(drive / "masks_02"), "poses": "kiss-icp"}
+    path = drive / f"velodyne_points/data/{name}.bin"
+    said = rf"1 of 5 frames \({name}\) are left out of the way of the lidar; {name}: "
+    path.write_bytes(b"x")
+    with pytest.warns(LeftOutWarning, match=said):
+        summary = run(drive, tmp_path / "out", **settings)
+    assert [failure.frame for failure in summary.failures] == [name] and summary.n_done == 4
+    layouts.write_points(path, np.full((9, 4), np.nan, "<f4"))
+    with pytest.warns() as caught:
+        summary = run(drive, tmp_path / "other", **settings)
+    assert {warning.category for warning in caught} == {LeftOutWarning, NothingInView}
+    assert summary.n_done == 5
+    placed = {frame: np.array(record["pose"]) for frame, record in records(tmp_path / "other").items()}
+    before, after = (placed[frame][:3, 3] for frame in open_source(drive).names[2::2])
+    np.testing.assert_allclose(placed[name][:3, 3], (before + after) / 2, atol=1e-6)
 
 
 def test_a_file_of_poses_needs_no_first_sweep(drive, tmp_path):

@@ -136,9 +136,19 @@ def test_without_the_library_the_extra_is_named(monkeypatch):
 
 
 class Frames(list):
-    """A source of so many frames, of which one is asked for at a time."""
+    """A source of so many frames, of which one is asked for at a time; one that is an error cannot be read."""
 
     path = "drive"
+
+    @property
+    def names(self):
+        return tuple(map(str, range(len(self))))
+
+    def __getitem__(self, index):
+        frame = super().__getitem__(index)
+        if isinstance(frame, Exception):
+            raise frame
+        return frame
 
 
 def frames(stamps):
@@ -158,18 +168,15 @@ def test_a_source_without_stamps_has_ten_sweeps_a_second():
 def test_frames_of_a_source_are_not_kept():
     read = []
 
-    class Source:
-        path = "drive"
-
-        def __iter__(self):
-            for number in range(6):
-                frame = frames([0.1 * number])[0]
-                read.append(weakref.ref(frame.points))
-                alive.append(sum(each() is not None for each in read))
-                yield frame
+    class Source(Frames):
+        def __getitem__(self, number):
+            frame = frames([0.1 * number])[0]
+            read.append(weakref.ref(frame.points))
+            alive.append(sum(each() is not None for each in read))
+            return frame
 
     alive = []
-    assert len(odometry_of(Source())) == 6
+    assert len(odometry_of(Source(range(6)))) == 6
     assert max(alive) <= 2
 
 
@@ -182,3 +189,57 @@ def test_stamps_are_those_of_all_frames_or_of_none(stamps):
 def test_faults_of_a_frame_name_the_source():
     with pytest.raises(ldls.InputError, match="^drive: sweeps: got 1"):
         odometry_of(frames([0.0]))
+
+
+BROKEN = ldls.InputError("points: broken")
+
+
+def spoilt(drive, faults):
+    """The drive with frames that have no points, come too early, or cannot be read: 0, -1 or an error by number."""
+    for number, fault in faults.items():
+        if fault == 0:
+            drive[number].points = np.zeros((0, 3))
+        elif fault == -1:
+            drive[number].stamp = drive[number - 1].stamp
+        else:
+            drive[number] = fault
+    return drive
+
+
+@pytest.mark.parametrize(
+    ("faults", "lacks", "reason"),
+    [
+        pytest.param({4: BROKEN}, [4], "4: points: broken", id="one that cannot be read"),
+        pytest.param({4: OSError("no disk")}, [4], "4: no disk", id="one whose file cannot be read"),
+        pytest.param({4: 0}, [4], "4: of 0 points 0 are finite", id="one without points"),
+        pytest.param({4: -1}, [4], "4: its stamp 0.3", id="one of the stamp before"),
+        pytest.param({4: BROKEN, 5: 0}, [4, 5], "4: points: broken", id="two in a row"),
+        pytest.param({3: 0, 5: BROKEN}, [3, 5], "3: of 0 points", id="two"),
+        pytest.param({0: 0, 1: 0, 2: BROKEN}, [0, 1, 2], "0: of 0 points", id="three at the beginning"),
+        pytest.param({5: 0, 6: 0, 7: BROKEN}, [5, 6, 7], "5: of 0 points", id="three at the end"),
+        pytest.param({1: BROKEN}, [0, 1], "1: points: broken", id="the second, before motion is known"),
+        pytest.param({2: BROKEN, 3: 0}, [0, 1, 2, 3], "2: points: broken", id="the third, before motion is known"),
+    ],
+)
+def test_frames_that_say_nothing_are_left_out(faults, lacks, reason):
+    drive = spoilt(frames([0.1 * k for k in range(8)]), faults)
+    with pytest.warns(ldls.errors.LeftOutWarning) as caught:
+        way = odometry_of(drive)
+    (warning,) = caught
+    listed = ", ".join(map(str, lacks))
+    said = f"drive: {len(lacks)} of 8 frames ({listed}) are left out of the way of the lidar; {reason}"
+    assert str(warning.message).startswith(said) and warning.filename == __file__
+    left = [k for k in range(8) if k not in lacks]
+    np.testing.assert_allclose(way.stamps, [0.1 * k for k in left])
+    np.testing.assert_allclose(way.poses[:, 0, 3], 0.3 * (np.array(left) - left[0]), atol=0.1)
+
+
+def test_past_more_than_two_frames_the_way_is_lost():
+    drive = spoilt(frames([0.1 * k for k in range(8)]), {3: 0, 4: BROKEN, 5: 0})
+    with pytest.raises(ldls.PoseError, match=r"^drive: 3 frames in a row \(3, 4, 5\) .*; frame 3: of 0 points 0 are"):
+        odometry_of(drive)
+
+
+def test_where_no_frame_is_left_the_first_says_why():
+    with pytest.raises(ldls.InputError, match="^drive: sweeps: got 0, expected 2 or more; frame 0: points: broken"):
+        odometry_of(Frames([BROKEN] * 3))

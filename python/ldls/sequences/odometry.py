@@ -36,6 +36,11 @@ PLACE_M = 1.0
 LEAST_SHARE = 0.1
 """Share of the cubes of `PLACE_M` of a sweep, that of fewer cubes, that the next has points in, or the way is lost."""
 
+Parts = tuple[float, Points, NDArray[np.float64] | None]
+"""Stamp of a sweep, its points, and when each was measured, where that is known."""
+Usable = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Points of a sweep that stand, and those that lie low."""
+
 
 @checked
 def odometry(sweeps: Iterable[tuple[float, Points] | tuple[float, Points, NDArray[np.float64]]]) -> Trajectory:
@@ -58,21 +63,46 @@ def odometry(sweeps: Iterable[tuple[float, Points] | tuple[float, Points, NDArra
         InputError: There are fewer than two sweeps, or one has too few finite points that stand on the ground.
         ImportError: `ldls[odometry]` is not installed.
     """
-    way, first = _Way(), []
+    way = Way()
     for number, sweep in enumerate(sweeps):
         parts = _parts(number, sweep)
         with within(f"sweep {number}"):
-            way.go_on(*parts)
-        if number < 2:
-            first.append(parts)
-        if number == 1:
-            way, first = _begun(way, first), []
-    if len(way.stamps) < 2:
-        raise InputError(f"sweeps: got {len(way.stamps)}, expected 2 or more")
-    return Trajectory(np.array(way.stamps), np.array(way.poses))
+            way.lay(parts, way.usable(*parts))
+    return way.trajectory()
 
 
-class _Way:
+class Way:
+    """The way of a lidar, sweep by sweep; errors are those of `odometry`."""
+
+    def __init__(self) -> None:
+        """A way without a sweep."""
+        self._laid = _Laid()
+        self._first: list[Parts] = []
+
+    def __len__(self) -> int:
+        """Number of sweeps that are laid."""
+        return len(self._laid.stamps)
+
+    def usable(self, stamp: float, points: Points, times: NDArray[np.float64] | None) -> Usable:
+        """What of a sweep says how the lidar moved: where that fails the way stays what it was."""
+        return self._laid.usable(stamp, points, times)
+
+    def lay(self, sweep: Parts, usable: Usable) -> None:
+        """Take the way to the next sweep, of which so much is usable; no more can be laid after an error."""
+        self._laid.lay(sweep[0], usable)
+        if len(self) <= 2:
+            self._first.append(sweep)
+        if len(self) == 2:
+            self._laid, self._first = _begun(self._laid, self._first), []
+
+    def trajectory(self) -> Trajectory:
+        """Return the poses at the sweeps."""
+        if len(self) < 2:
+            raise InputError(f"sweeps: got {len(self)}, expected 2 or more")
+        return Trajectory(np.array(self._laid.stamps), np.array(self._laid.poses))
+
+
+class _Laid:
     """Stamps and poses so far, and what is known of the last sweep."""
 
     def __init__(self, begin: Trajectory | None = None) -> None:
@@ -85,8 +115,8 @@ class _Way:
         self._low = np.zeros((0, 3))
         self._places = np.zeros(0, np.int64)
 
-    def go_on(self, stamp: float, points: Points, times: NDArray[np.float64] | None) -> None:
-        """Take the way to the next sweep."""
+    def usable(self, stamp: float, points: Points, times: NDArray[np.float64] | None) -> Usable:
+        """What of the next sweep says how the lidar moved."""
         points = as_points(points)
         if self.stamps and not stamp > self.stamps[-1]:
             raise PoseError(f"its stamp {stamp:.6f} s is not after that before it, {self.stamps[-1]:.6f} s; sort them")
@@ -100,6 +130,11 @@ class _Way:
                 f"of {len(points):,} points {len(standing)} are finite, nearer than {FARTHEST_M:g} m and stand, "
                 f"expected {LEAST_POINTS} or more; leave this sweep out, or turn points so that z is up"
             )
+        return standing, low
+
+    def lay(self, stamp: float, usable: Usable) -> None:
+        """Take the way to the next sweep."""
+        standing, low = usable
         before: NDArray[np.float64] = self._registration.last_pose
         self._registration.register_frame(standing, np.zeros(0))
         pose: NDArray[np.float64] = self._registration.last_pose
@@ -131,15 +166,15 @@ class _Way:
         self._places = places
 
 
-def _begun(way: _Way, first: Sequence[tuple[float, Points, NDArray[np.float64] | None]]) -> _Way:
-    """A way of its first two sweeps, which know each other's motion."""
+def _begun(laid: _Laid, first: Sequence[Parts]) -> _Laid:
+    """The first two sweeps, laid again so that they know each other's motion."""
     if all(times is None for _, _, times in first):
-        return way
+        return laid
     for _ in range(BEGINNINGS):
-        way = _Way(way.motion(0.0))
+        laid = _Laid(laid.motion(0.0))
         for parts in first:
-            way.go_on(*parts)
-    return way
+            laid.lay(parts[0], laid.usable(*parts))
+    return laid
 
 
 def _registration() -> Any:  # noqa: ANN401
@@ -156,7 +191,7 @@ def _registration() -> Any:  # noqa: ANN401
     return require("kiss_icp.kiss_icp", "odometry").KissICP(config)
 
 
-def _parts(number: int, sweep: object) -> tuple[float, Points, NDArray[np.float64] | None]:
+def _parts(number: int, sweep: object) -> Parts:
     if not (isinstance(sweep, tuple | list) and len(sweep) in (2, 3)):
         raise InputError(
             f"sweeps: sweep {number} is {shown(sweep)}, expected (stamp, points) or (stamp, points, times)"
