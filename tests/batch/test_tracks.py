@@ -288,6 +288,20 @@ def test_sweeps_in_disorder_are_refused_before_anything_is_done(drive, tmp_path)
     assert not (tmp_path / "out").exists()
 
 
+def test_two_frames_of_one_stamp_are_not_tracked_and_begin_a_window_without_tracks(drive, tmp_path):
+    stamps = [0, 0.1, 0.2, 0.3, 0.3, 0.5, 0.6, 0.7]
+    (drive / "times.txt").write_text("".join(f"{stamp:e}\n" for stamp in stamps))
+    with pytest.raises(PoseError, match=r"poses\.txt: line 4 is the pose at 0\.3.* line 5 that at 0\.3.*; mend these"):
+        run(drive, tmp_path / "out")
+    (drive / "poses.txt").unlink()
+    (tmp_path / "poses.txt").write_text(drives.tum_poses(8))
+    said = r"frames 000003 and 000004 have one stamp \(0\.3.* mend the stamps of the source, or take one"
+    with pytest.raises(PoseError, match=said):
+        run(drive, tmp_path / "out", poses=str(tmp_path / "poses.txt"))
+    settings = {"masks": str(drive / "masks"), "sweeps": 2, "poses": str(tmp_path / "poses.txt")}
+    assert batch.run(drive, tmp_path / "out", batch.RunSettings(**settings)).n_done == 8
+
+
 def test_a_link_in_the_place_of_the_tracks_is_not_followed(drive, tmp_path):
     run(drive, tmp_path / "out")
     (tmp_path / "elsewhere").mkdir()

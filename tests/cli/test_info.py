@@ -56,6 +56,8 @@ def test_a_sound_drive_is_described(tmp_path):
                      id="a camera that sees nothing"),
         pytest.param(lambda d: _stamps(d, "velodyne_points", ["25.0", "26.0", "25.5"]), 1, "0.500 s before that of",
                      id="a step back"),
+        pytest.param(lambda d: _stamps(d, "velodyne_points", ["25.0", "25.1", "25.1"]), 1, "its stamp is that of",
+                     id="a stamp twice"),
         pytest.param(lambda d: _stamps(d, "image_02", ["25.0", "25.1", "25.2"]), 0, "taken -1.851 s from the sweep",
                      id="images of another time"),
     ],

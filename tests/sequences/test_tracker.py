@@ -496,7 +496,7 @@ def test_misuse_is_named():
     with pytest.raises(ldls.ShapeError, match="result: has 125 points, the sweep 250; give its own"):
         tracker.track([sweep_at(0.5, [((6, 0), True), ((6, 2), True)])], results)
     tracker.track([sweep], results)
-    with pytest.raises(ldls.InputError, match=r"one of 0\.5 s comes after one of 0\.5 s"):
+    with pytest.raises(ldls.InputError, match=r"two have the stamp 0\.5 s"):
         tracker.track([sweep], results)
 
 

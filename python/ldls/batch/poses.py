@@ -132,6 +132,12 @@ class Poses:
         unordered = (pair for pair in pairwise(known) if not pair[0][1] < pair[1][1])
         if self._settings.track and (pair := next(unordered, None)) is not None:
             (one, before), (other, after) = pair
+            if before == after:
+                raise PoseError(
+                    f"{self._source.path}: frames {one} and {other} have one stamp ({before:.6f} s), expected "
+                    "ascending stamps to track objects; mend the stamps of the source, or take one of these frames out "
+                    "of it"
+                )
             raise PoseError(
                 f"{self._source.path}: frame {other} ({after:.6f} s) comes after {one} ({before:.6f} s), expected "
                 "ascending stamps to track objects; take one drive, as by --option scene=NAME"

@@ -107,7 +107,9 @@ def check_stamps(names: Sequence[str], stamps: Sequence[float | None]) -> list[F
     usual = float(np.median(steps)) if len(steps) else 0.0
     findings = []
     for (before, _), (name, _), step in zip(known, known[1:], steps.tolist(), strict=False):
-        if not step > 0:
+        if step == 0:
+            findings.append(Finding(name, f"its stamp is that of {before}", broken=True))
+        elif not step > 0:
             findings.append(Finding(name, f"its stamp is {-step:.3f} s before that of {before}", broken=True))
         elif step > LARGEST_GAP * usual:
             findings.append(Finding(name, f"{step:.3f} s after {before}, frames are {usual:.3f} s apart", broken=False))

@@ -119,7 +119,10 @@ class _Laid:
         """What of the next sweep says how the lidar moved."""
         points = as_points(points)
         if self.stamps and not stamp > self.stamps[-1]:
-            raise PoseError(f"its stamp {stamp:.6f} s is not after that before it, {self.stamps[-1]:.6f} s; sort them")
+            raise PoseError(
+                f"its stamp {stamp:.6f} s is not after that before it, {self.stamps[-1]:.6f} s; sort them, and leave "
+                "out one of two with the same"
+            )
         if times is not None:
             points = self.motion(stamp).deskew(points, times, stamp)
         xyz = points[finite_rows(points), :3].astype(np.float64)

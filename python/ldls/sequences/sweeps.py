@@ -145,6 +145,8 @@ def check_order(sweeps: Sequence[Sweep], after: float = -math.inf) -> None:
         InputError: One is not later.
     """
     for before, stamp in pairwise([after, *(sweep.stamp for sweep in sweeps)]):
+        if stamp == before:
+            raise InputError(f"sweeps: two have the stamp {stamp} s; leave one of them out, or give each its own")
         if not stamp > before:
             raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ldls.camera.rigid import inverse, rigid
+from ldls.checks import numbers
 from ldls.errors import CorruptFileError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
 from ldls.io.files import MAX_TEXT_BYTES, open_file
@@ -44,5 +45,13 @@ def read(path: Path, *, stamps: ArrayLike | None = None, T_camera_lidar: Extrins
         raise PoseError(
             f"{path}: has {len(rows)} poses for {np.size(stamps)} stamps, expected a line for each sweep of the drive"
         )
+    times = numbers("stamps", stamps, np.float64, ("n",))
+    back = np.flatnonzero(np.diff(times) <= 0)
+    if len(back):
+        at = int(back[0])
+        raise PoseError(
+            f"{path}: line {at + 1} is the pose at {times[at]:.6f} s, and line {at + 2} that at {times[at + 1]:.6f} s, "
+            "expected ascending times; mend these, which stand in another file"
+        )
     with within(path), np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
-        return Trajectory(np.asarray(stamps), inverse(from_lidar) @ poses @ from_lidar)
+        return Trajectory(times, inverse(from_lidar) @ poses @ from_lidar)
