@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,6 +125,14 @@ def test_whole_results_tell_what_their_masks_allow_and_how_sure_they_are(results
     assert rows[0]["confidence"] == pytest.approx(100 * mean, rel=1e-6)  # all points are in view
     assert {"coverage.md", "coverage.png", "reliability.png"} <= {path.name for path in (results / "t").iterdir()}
     assert "reliability.png, coverage.png to" in outcome.output
+
+
+def test_of_labels_of_several_sweeps_the_bound_is_said_to_be_of_each_alone(results):
+    said = "bound: of the masks of each sweep alone; labels of 1 frame come from those of other sweeps, too"
+    assert "bound: of" not in evaluate(results).output
+    result = ldls.read_result(results / "mine/2.npz")
+    ldls.save(replace(result, report=replace(result.report, n_sweeps=5)), results / "mine/2.npz")
+    assert said in evaluate(results).output
 
 
 def test_where_one_result_is_not_whole_there_is_no_bound(results):

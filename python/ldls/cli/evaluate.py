@@ -164,11 +164,19 @@ def evaluate(
     }
     # names of one's own are known by the labels alone
     check_occur(scored.names, seen)
+    joined: set[str] = set()
     # labels alone have no masks
     whole = next((own for own in files.values() if have_masks(own)), None)
     if whole is not None and BOUND not in by_method:
-        by_method[BOUND] = score(progress(read_bounds(whole, counting, classes=scored), len(whole), "bound"))
+        bounds = read_bounds(whole, counting, classes=scored, joined=joined)
+        by_method[BOUND] = score(progress(bounds, len(whole), "bound"))
     _show(by_method, counting.by, out)
+    if joined:
+        console().print(
+            f"{BOUND}: of the masks of each sweep alone; labels of {_frames(len(joined))} come from those of other "
+            "sweeps, too, and may go beyond it",
+            soft_wrap=True,
+        )
 
 
 def _places(predictions: str, name: str | None, beside: list[str]) -> dict[str, tuple[Path, str | None]]:

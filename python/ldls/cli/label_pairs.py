@@ -195,8 +195,12 @@ def have_masks(files: Iterable[LabelFiles]) -> bool:
     return all(frame.prediction.format == "npz" and holds_result(frame.prediction.path) for frame in files)
 
 
-def read_bounds(files: Sequence[LabelFiles], counting: Counting, *, classes: ClassSet) -> Iterator[Pair]:
+def read_bounds(
+    files: Sequence[LabelFiles], counting: Counting, *, classes: ClassSet, joined: set[str]
+) -> Iterator[Pair]:
     """The best labels that the masks of each frame's result allow, beside its truth.
+
+    Names of frames whose labels come from masks of other sweeps, too, go to `joined`: a result has its own alone.
 
     Raises:
         UnsupportedFormatError: A prediction is no whole result of ldls, of which alone the masks are known.
@@ -204,6 +208,8 @@ def read_bounds(files: Sequence[LabelFiles], counting: Counting, *, classes: Cla
     """
     for frame, pair in zip(files, read_pairs(files, counting), strict=True):
         result = read_result(frame.prediction.path)
+        if result.report.n_sweeps > 1:
+            joined.add(frame.name)
         names = [instance.name for instance in result.instances]
         labels = Labeling.from_instance_labels(bound_labels(result, pair.truth, classes), names)
         yield replace(pair, prediction=labels, confidence=None)
