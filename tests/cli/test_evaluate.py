@@ -507,3 +507,18 @@ def test_boxes_are_no_truth_of_a_drive(seen):
     outcome = run(app, ["evaluate", str(seen / "theirs"), f"kitti-boxes:{seen / 'boxes'}", "--track"])
     assert outcome.exit_code == 1
     assert "--track: TRUTH is kitti-boxes, which numbers the objects of each frame anew" in outcome.stderr
+
+
+def test_the_classes_of_nuscenes_are_scored_together(tmp_path):
+    for side, codes in (("mine", [17, 2, 0, 17, 7]), ("truth", [17, 2, 2, 7, 7])):
+        (tmp_path / side).mkdir()
+        np.array(codes, np.uint8).tofile(tmp_path / side / "1_lidarseg.bin")
+    outcome = evaluate(tmp_path, "--categories", "nuscenes", "--out", tmp_path / "t")
+    assert outcome.exit_code == 0, outcome.output
+    # the strollers do not count
+    assert "1 frame, 3 of 5 points counted" in outcome.output
+    row = scores(tmp_path / "t")
+    assert (row["car IoU"], row["pedestrian IoU"], row["barrier IoU"]) == (100.0, 50.0, None)
+    outcome = evaluate(tmp_path, "--categories", "nuscenes", "--leave-out", "Van")
+    assert outcome.exit_code == 1
+    assert "--leave-out: the 16 classes of nuScenes have their own; leave it out" in outcome.output

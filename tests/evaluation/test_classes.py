@@ -3,6 +3,7 @@ import pytest
 
 from ldls.errors import ParameterError
 from ldls.evaluation import ClassSet
+from ldls.io.labels.nuscenes_labels import NUSCENES
 from ldls.io.labels.semantic_kitti import SEMANTIC_KITTI
 from ldls.labeling import Labeling
 
@@ -103,3 +104,29 @@ def test_capitals_do_not_count():
 def test_contradictions_are_refused(make, message):
     with pytest.raises(ParameterError, match=message):
         make()
+
+
+OF_CHALLENGE = (0, 0, 7, 7, 7, 0, 7, 0, 0, 1, 0, 0, 8, 0, 2, 3, 3, 4, 5, 0, 0, 6, 9, 10, 11, 12, 13, 14, 15, 0, 16, 0)
+"""Class of nuScenes' lidarseg challenge of each of the 32 general ones; 0 does not count."""
+
+
+def test_the_classes_of_nuscenes_are_those_of_its_challenge():
+    truth = Labeling.from_codes(np.arange(32), NUSCENES)
+    mapped = ClassSet.nuscenes().map(truth, truth=True)
+    assert mapped.classes.tolist() == list(OF_CHALLENGE)
+    assert mapped.ignored.tolist() == [number == 0 for number in OF_CHALLENGE]
+    assert mapped.names[:3] == ("background", "barrier", "bicycle") and len(mapped.names) == 17
+
+
+@pytest.mark.parametrize(
+    ("name", "index"),
+    [
+        pytest.param("person", 7, id="COCO person"),
+        pytest.param("Car", 4, id="KITTI car"),
+        pytest.param("pedestrian", 7, id="as in the challenge"),
+        pytest.param("human.pedestrian.stroller", 0, id="not as in KITTI"),
+        pytest.param("train", 0, id="another class"),
+    ],
+)
+def test_predictions_of_nuscenes_may_have_names_of_others(name, index):
+    assert ClassSet.nuscenes().index(name) == index

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import ScoredOption, refuse, words
+from ldls.cli.options import refuse, words
 from ldls.cli.progress import progress
 from ldls.cli.reliability_files import RELIABILITY_FIGURES, draw_reliability
 from ldls.errors import ParameterError
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from ldls.io.labels.label_formats import LabelFiles
 
 BOXES = "kitti-boxes"
+NUSCENES = "nuscenes"
+"""What stands in the place of categories for all of nuScenes' lidarseg challenge."""
 TABLES = ("semantic", "instances", "panoptic", "reliability", "coverage", "tracking", "frames")
 """Names of the tables that are written, as far as there is something to tell."""
 FOLDER = {"exists": True, "file_okay": False, "readable": True, "metavar": "FOLDER"}
@@ -58,7 +60,13 @@ def evaluate(
         str | None,
         typer.Option(metavar="NAME", help="Name of the method of PREDICTIONS.", show_default="that of its folder"),
     ] = None,
-    categories: ScoredOption = "Car,Pedestrian",
+    categories: Annotated[
+        str,
+        typer.Option(
+            metavar="WORDS",
+            help="Categories to score: Car,Pedestrian; or nuscenes, for the 16 of its lidarseg challenge.",
+        ),
+    ] = "Car,Pedestrian",
     missing: Annotated[
         Missing, typer.Option(metavar="|".join(Missing), help="What becomes of a frame without its pair.")
     ] = Missing.ERROR,
@@ -129,12 +137,16 @@ def evaluate(
 
     if calib is None:
         refuse({"image": image}, "its images say what a camera of --calib sees, and there is none")
-    scored = ClassSet.kitti(
-        words(categories),
-        merge_sitting=merge_sitting,
-        leave_out=None if leave_out is None else words(leave_out),
-        background=words(background),
-    )
+    if words(categories) == (NUSCENES,):
+        refuse({"leave-out": leave_out, "background": background or None}, "the 16 classes of nuScenes have their own")
+        scored = ClassSet.nuscenes()
+    else:
+        scored = ClassSet.kitti(
+            words(categories),
+            merge_sitting=merge_sitting,
+            leave_out=None if leave_out is None else words(leave_out),
+            background=words(background),
+        )
     places = _places(predictions, name, beside or [])
     if track:
         _check_tracked(path for path, _ in places.values())

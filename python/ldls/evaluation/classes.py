@@ -15,7 +15,7 @@ from ldls.categories import COCO_NAMES, find_categories, folded, synonyms
 from ldls.checks import checked
 from ldls.errors import InputError, ParameterError
 from ldls.io.labels.kitti_objects import KITTI
-from ldls.io.labels.nuscenes_labels import NUSCENES
+from ldls.io.labels.nuscenes_labels import LIDARSEG, NUSCENES
 from ldls.io.labels.semantic_kitti import SEMANTIC_KITTI
 from ldls.io.labels.squeezeseg import SQUEEZESEG
 from ldls.labeling import BACKGROUND, Labeling
@@ -106,6 +106,22 @@ class ClassSet:
             left_out=tuple(left_out),
             background=tuple(_without([*known, *background], [*names, *aliases, *left_out])),
         )
+
+    @classmethod
+    @checked
+    def nuscenes(cls) -> Self:
+        """The 16 classes of nuScenes' lidarseg challenge; points of its other classes do not count, as there.
+
+        Predictions may call the classes by what KITTI, COCO, SqueezeSeg and SemanticKITTI do, as "person".
+        """
+        own, names = {*NUSCENES.values()}, tuple(LIDARSEG)
+        aliases = {
+            alias: name
+            for name, held in LIDARSEG.items()
+            for one in held
+            for alias in _without(synonyms(one), [*names, *(own - {*held})])
+        }
+        return cls(names=names, aliases=aliases, left_out=tuple(_without([*own, *VOID], [*names, *aliases])))
 
     @property
     def vocabulary(self) -> tuple[str, ...]:

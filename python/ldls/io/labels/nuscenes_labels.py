@@ -35,6 +35,30 @@ CLASS_NAMES: tuple[str, ...] = (
 """The 32 general classes by their numbers."""
 NUSCENES: dict[int, str] = dict(enumerate(CLASS_NAMES))
 
+LIDARSEG: dict[str, tuple[str, ...]] = {
+    "barrier": ("movable_object.barrier",),
+    "bicycle": ("vehicle.bicycle",),
+    "bus": ("vehicle.bus.bendy", "vehicle.bus.rigid"),
+    "car": ("vehicle.car",),
+    "construction_vehicle": ("vehicle.construction",),
+    "motorcycle": ("vehicle.motorcycle",),
+    "pedestrian": ("human.pedestrian.adult", "human.pedestrian.child", "human.pedestrian.construction_worker",
+                   "human.pedestrian.police_officer"),
+    "traffic_cone": ("movable_object.trafficcone",),
+    "trailer": ("vehicle.trailer",),
+    "truck": ("vehicle.truck",),
+    "driveable_surface": ("flat.driveable_surface",),
+    "other_flat": ("flat.other",),
+    "sidewalk": ("flat.sidewalk",),
+    "terrain": ("flat.terrain",),
+    "manmade": ("static.manmade",),
+    "vegetation": ("static.vegetation",),
+}  # fmt: skip
+"""The 16 classes of the lidarseg challenge, numbered there from 1, and the general ones that each holds; what is of
+none does not count.
+
+Source: nuscenes-devkit, python-sdk/nuscenes/eval/lidarseg/utils.py."""
+
 OTHER_OBJECT = "static.other"
 WIDER: dict[str, str] = {
     "Person_sitting": "human.pedestrian.adult",
