@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -24,6 +24,7 @@ from ldls.errors import (
     PrecisionWarning,
     ScaleWarning,
     UprightWarning,
+    some,
 )
 from ldls.masks import InstanceMasks
 from ldls.params import Params
@@ -38,6 +39,7 @@ EXPECTED_ON_MASKS = 20.0
 """Points that masks of this area would have on them by chance, from which on none at all is no chance."""
 ALONG_Z = 0.7
 """Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
+NOT_FINITE = "points: no row is finite; nothing is labelled; are they read as they were written?"
 SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
@@ -108,7 +110,8 @@ def segment_views(
         check_finite(cloud)
     arrays = diffuse_labels(cloud, views, None, params, keep_origin=keep_origin, same_object=same_object)
     result = result_of(arrays, views, cloud, params)
-    _warn(result, arrays.report)
+    # names the line that calls the caller, which is checked
+    warn_of([result], arrays.report, stacklevel=5)
     return result
 
 
@@ -177,10 +180,12 @@ def nothing_in_view(result: Segmentation) -> str | None:
     The text has no numbers, so that those of many frames are few.
     """
     n_in_view = result.report.n_in_view
-    if not result.views or (result.labels > 0).any():
+    if (result.labels > 0).any():
         return None
     if len(result.points) and not len(finite_rows(result.points)):
-        return "points: no row is finite; nothing is labelled; are they read as they were written?"
+        return NOT_FINITE
+    if not result.views:
+        return None
     usable, behind = _usable_and_behind(result)
     if usable == 0:
         return None
@@ -265,33 +270,52 @@ def check_finite(cloud: Points) -> None:
         )
 
 
-def _warn(result: Segmentation, report: Mapping[str, Any]) -> None:
-    cloud = result.points
-    if len(cloud) and report["n_nonfinite"] == len(cloud):
-        _warning(f"points: 0 of {len(cloud)} rows are finite; nothing is labelled", NoUsablePoints)
-        return
+def warn_of(results: Sequence[Segmentation], report: Mapping[str, Any], *, stacklevel: int) -> None:
+    """Warn of what is odd about points, cameras and masks of some sweeps that were labelled together.
+
+    Args:
+        results: Those of the sweeps to warn of.
+        report: What the core says of all of them.
+        stacklevel: Of `warnings.warn`, from here.
+    """
+    for message, category in (*_oddities(results, report), *_doubts(results)):
+        warnings.warn(message, category, stacklevel=stacklevel)
+
+
+def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Iterator[tuple[str, type[Warning]]]:
     low, high = report["bounds"]
-    farthest = max(abs(bound) for bound in (*low, *high)) if len(cloud) else 0.0
-    step = float(np.spacing(np.float32(farthest)))
-    if cloud.dtype == np.float32 and step > COARSEST_STEP_M:
-        message = f"points: float32 spacing at {farthest:.1e} is {step:.2g} m; pass float64 or subtract an origin"
-        _warning(message, PrecisionWarning)
-    extent = max(most - least for least, most in zip(low, high, strict=True)) if len(cloud) else 0.0
-    if extent > WIDEST_CLOUD_M:
-        _warning(f"points: extent is {extent:.3g} m, over 10 km; are they in metres?", ScaleWarning)
-    if report["only_islands"]:
-        message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
-        _warning(message, DuplicateWarning)
-    leaning = [name for name, seen in zip(camera_names(result.views), result.views, strict=True) if _leans(seen)]
-    if leaning:
-        _warning(
-            f"T_camera_lidar of {', '.join(leaning)}: z of the lidar does not point up in the image; is it the "
-            "inverse, or is the turn to the optical frame missing (x right, y down, z forward)?",
-            UprightWarning,
-        )
-    doubt = nothing_in_view(result)
-    if doubt is not None:
-        _warning(doubt, NothingInView)
+    if low[0] <= high[0]:  # there is a finite point
+        farthest = max(abs(bound) for bound in (*low, *high))
+        step = float(np.spacing(np.float32(farthest)))
+        if any(result.points.dtype == np.float32 for result in results) and step > COARSEST_STEP_M:
+            message = f"points: float32 spacing at {farthest:.1e} is {step:.2g} m; pass float64 or subtract an origin"
+            yield message, PrecisionWarning
+        extent = max(most - least for least, most in zip(low, high, strict=True))
+        if extent > WIDEST_CLOUD_M:
+            yield f"points: extent is {extent:.3g} m, over 10 km; are they in metres?", ScaleWarning
+        if report["only_islands"]:
+            message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
+            yield message, DuplicateWarning
+        named = [pair for each in results for pair in zip(camera_names(each.views), each.views, strict=True)]
+        leaning = dict.fromkeys(name for name, seen in named if _leans(seen))
+        if leaning:
+            message = (
+                f"T_camera_lidar of {', '.join(leaning)}: z of the lidar does not point up in the image; is it the "
+                "inverse, or is the turn to the optical frame missing (x right, y down, z forward)?"
+            )
+            yield message, UprightWarning
+
+
+def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning]]]:
+    """Why nothing is labelled, once for all sweeps with the same cause."""
+    doubts: dict[str, list[str]] = {}
+    for number, result in enumerate(results):
+        doubt = nothing_in_view(result)
+        if doubt is not None:
+            doubts.setdefault(doubt, []).append(f"sweep {number}")
+    for doubt, sweeps in doubts.items():
+        place = f"{some(sweeps)}: " if len(results) > 1 else ""
+        yield f"{place}{doubt}", NoUsablePoints if doubt == NOT_FINITE else NothingInView
 
 
 def _leans(seen: SeenView) -> bool:
@@ -301,11 +325,6 @@ def _leans(seen: SeenView) -> bool:
     """
     x, y, z = seen.view.camera.T_camera_lidar[:3, 2]
     return bool(abs(z) < ALONG_Z and -y < 0.5 * np.hypot(x, y))
-
-
-def _warning(message: str, category: type[Warning]) -> None:
-    # the warning names the line that calls segment, five calls up
-    warnings.warn(message, category, stacklevel=6)
 
 
 def _report(

@@ -10,7 +10,7 @@ import ldls
 from batch import runs
 from datasets import layouts
 from ldls import batch
-from ldls.errors import NothingInView, NoUsablePoints
+from ldls.errors import LdlsWarning, NothingInView, NoUsablePoints
 from ldls.label_diffusion import nothing_in_view
 
 CAMERA = ldls.Camera(projection=[[50, 0, 40], [0, 50, 30], [0, 0, 1]])
@@ -75,7 +75,9 @@ def causes(*clouds, keep_origin=False):
     """Why nothing is labelled of each of some sweeps from one place, which are labelled together."""
     views = [ldls.View(mask(slice(20)), CAMERA)]
     sweeps = [ldls.Sweep(cloud, views, np.eye(4), 0.1 * at) for at, cloud in enumerate(clouds)]
-    return [nothing_in_view(result) for result in ldls.segment_sweeps(sweeps, keep_origin=keep_origin)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LdlsWarning)
+        return [nothing_in_view(result) for result in ldls.segment_sweeps(sweeps, keep_origin=keep_origin)]
 
 
 @pytest.mark.parametrize(

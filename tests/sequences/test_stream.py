@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import ldls
+from ldls.errors import NoUsablePoints
 from ldls.simulation import Drive, drive_frame
 
 PARAMS = replace(ldls.Params(), threads=1)
@@ -115,3 +116,12 @@ def test_misuse_is_named_and_forgotten(frames):
         stream.segment(one.points, image.masks, pose=one.pose, stamp=one.stamp)
     latest = stream.segment(two.points, two.images[0].masks, pose=two.pose, stamp=two.stamp)
     assert latest.report.n_sweeps == 2
+
+
+def test_a_sweep_is_warned_of_when_it_comes_and_never_again(frames):
+    stream = ldls.LabelDiffusion(frames[0].images[0].camera, PARAMS)
+    one, two, *_ = frames
+    with pytest.warns(NoUsablePoints, match="^points: no row is finite") as caught:
+        stream.segment(one.points * np.float32(np.nan), one.images[0].masks, pose=one.pose, stamp=one.stamp)
+    assert caught[0].filename == __file__
+    assert stream.segment(two.points, two.images[0].masks, pose=two.pose, stamp=two.stamp).report.n_sweeps == 2

@@ -11,9 +11,12 @@ from scipy.spatial.transform import Rotation
 import ldls
 import oracle
 from ldls.camera.rigid import from_parts, inverse
+from ldls.errors import NothingInView, NoUsablePoints, ScaleWarning
 from ldls.io.labels.kitti_objects import read_kitti_objects
 from ring_samples import random_ring
 
+turned = pytest.mark.filterwarnings("ignore:T_camera_lidar:ldls.errors.UprightWarning")
+"""Of lidars that were turned over."""
 PLAIN = {"neighbors": 6, "sigma": 0.3, "pixel_weight": 0.01, "iterations": 40}
 
 
@@ -96,6 +99,7 @@ def test_some_of_these_points_take_pixels_of_another_moment():
     assert lent > 50
 
 
+@turned
 @pytest.mark.parametrize("seed", range(5))
 def test_where_the_lidar_stood_does_not_matter(seed):
     still = ldls.segment_sweeps(sweeps_of(seed), params=ldls.Params.paper())
@@ -137,6 +141,7 @@ def test_one_sweep_gives_what_it_gives_alone():
     assert together.report == alone.report
 
 
+@turned
 def test_each_sweep_has_its_own_points_views_and_files(tmp_path):
     sweeps = sweeps_of(3, world_from_lidar=poses(3))
     results = ldls.segment_sweeps(sweeps)
@@ -234,3 +239,31 @@ def test_sweeps_in_another_order_than_their_stamps_are_refused():
         ldls.segment_sweeps([first, third, second])
     with pytest.raises(ldls.InputError, match=r"sweeps: two have the stamp 0.0 s; leave one of them out"):
         ldls.segment_sweeps([first, replace(second, stamp=0.0)])
+
+
+@pytest.mark.parametrize(
+    ("change", "category", "message"),
+    [
+        pytest.param(lambda points: points * 1e4, ScaleWarning, "points: extent is", id="tenths of a millimetre"),
+        pytest.param(lambda points: points * np.nan, NoUsablePoints, "sweep 1: points: no row is finite", id="NaN"),
+        pytest.param(lambda points: -points, NothingInView, "sweep 1: points: every point lies behind", id="behind"),
+    ],
+)
+def test_what_is_odd_about_a_sweep_is_warned_of_as_of_a_single_cloud(change, category, message):
+    camera = ldls.Camera(projection=[[50, 0, 40], [0, 50, 30], [0, 0, 1]])
+    masks = ldls.InstanceMasks.from_array(np.ones((1, 60, 80), bool))
+    points = np.random.default_rng(0).uniform([-1, -1, 8], [1, 1, 12], (100, 3))
+    views = [ldls.View(masks, camera)]
+    sweeps = [ldls.Sweep(points, views, np.eye(4), 0.0), ldls.Sweep(change(points), views, np.eye(4), 0.1)]
+    with pytest.warns(category, match=f"^{message}") as caught:
+        ldls.segment_sweeps(sweeps)
+    assert caught[0].filename == __file__
+
+
+def test_the_cause_of_several_sweeps_is_warned_of_once():
+    camera = ldls.Camera(projection=[[50, 0, 40], [0, 50, 30], [0, 0, 1]])
+    views = [ldls.View(ldls.InstanceMasks.from_array(np.ones((1, 60, 80), bool)), camera)]
+    behind = np.random.default_rng(0).uniform([-1, -1, -12], [1, 1, -8], (100, 3))
+    with pytest.warns(NothingInView, match="^sweep 0, sweep 1: points: every point lies behind") as caught:
+        ldls.segment_sweeps([ldls.Sweep(behind, views, np.eye(4), 0.1 * at) for at in range(2)])
+    assert len(caught) == 1

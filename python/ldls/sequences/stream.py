@@ -12,11 +12,11 @@ from ldls.camera import Camera
 from ldls.checks import checked
 from ldls.cloud import as_points
 from ldls.errors import InputError, ParameterError
-from ldls.label_diffusion import SAME_OBJECT, segment_views
+from ldls.label_diffusion import SAME_OBJECT, segment_views, warn_of
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Segmentation
-from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, check_order, segment_sweeps
+from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, check_order, label_sweeps
 from ldls.sequences.tracker import Tracker
 from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory
 from ldls.view import View
@@ -110,7 +110,7 @@ class LabelDiffusion:
         check_order(recent)
         # refuses a pose that jumps
         Trajectory(np.array([each.stamp for each in recent]), np.array([each.pose for each in recent]))
-        results = segment_sweeps(
+        results, report = label_sweeps(
             recent,
             params=self.params,
             nonfinite=nonfinite,
@@ -120,6 +120,8 @@ class LabelDiffusion:
         self._tracker = self._tracker or Tracker()
         (result,) = self._tracker.track([sweep], results[-1:])
         self._recent = recent
+        # of those before it was warned when they came
+        warn_of(results[-1:], report, stacklevel=4)
         return result
 
     def _views(self, masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View]) -> tuple[View, ...]:

@@ -9,10 +9,10 @@ still nearly all of them do, and of what moves enough from one sweep to the next
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from ldls.checks import checked
 from ldls.checks.values import as_seconds
 from ldls.cloud import Points, as_points
 from ldls.errors import InputError, ShapeError
-from ldls.label_diffusion import check_finite, diffuse_labels, result_of
+from ldls.label_diffusion import check_finite, diffuse_labels, result_of, warn_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
 from ldls.view import View, check_names
@@ -103,6 +103,22 @@ def segment_sweeps(
             subclasses.
         LimitError: The sweeps together have more points than the graph can index.
     """
+    results, report = label_sweeps(
+        sweeps, params=params, nonfinite=nonfinite, keep_origin=keep_origin, same_object=same_object
+    )
+    warn_of(results, report, stacklevel=4)
+    return results
+
+
+def label_sweeps(
+    sweeps: Sequence[Sweep],
+    *,
+    params: Params | None,
+    nonfinite: str,
+    keep_origin: bool,
+    same_object: float,
+) -> tuple[tuple[Segmentation, ...], Mapping[str, Any]]:
+    """What `segment_sweeps` does without its warnings, and what the core reports of all sweeps together."""
     if not sweeps:
         raise InputError("sweeps: got none, expected one or more")
     check_order(sweeps)
@@ -135,7 +151,7 @@ def segment_sweeps(
         given = zip(result.views, sweep.views, strict=True)
         seen = tuple(replace(seen, view=view) for seen, view in given)
         results.append(replace(result, views=seen, report=replace(result.report, n_sweeps=len(sweeps))))
-    return tuple(results)
+    return tuple(results), arrays.report
 
 
 def check_order(sweeps: Sequence[Sweep], after: float = -math.inf) -> None:
