@@ -10,7 +10,7 @@ import ldls.batch.poses as found_poses
 from batch import drives, runs
 from datasets import layouts
 from ldls import batch, read_poses
-from ldls.errors import BatchError, InputError
+from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_masks, save
 
 REASON = "which no run here wrote and the run would write over; an output is never written over an input"
@@ -150,3 +150,25 @@ def test_tables_of_a_run_are_none_of_its_inputs(few, tmp_path):
     with pytest.raises(InputError, match=r"map: would write over .*map\.ply, which is an input"):
         run(few, tmp_path / "out", "npz", map_file=few / "map.ply")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param({"objects": "000003.csv"}, id="objects in the place of a frame"),
+        pytest.param({"objects": "TRACKS.csv"}, id="objects in that of the table of tracks"),
+        pytest.param({"map_file": "000003.ply"}, id="a map in the place of a frame"),
+        pytest.param({"map_file": "tracks/000003.ply"}, id="a map in the place of a tracked frame"),
+        pytest.param({"objects": "tracks/tracks.json"}, id="objects in that of the note of tracks"),
+    ],
+)
+def test_files_of_all_frames_are_not_written_over_those_of_one(drive, tmp_path, options):
+    settings = batch.RunSettings(masks=str(drive / "masks"), formats=("npz", "ply"), track=True)
+    batch.run(drive, tmp_path / "out", settings)
+    before = runs.contents(tmp_path / "out")
+    ((name, file),) = options.items()
+    said = rf"{name.partition('_')[0]}: .*{file} is the name of a file that the run itself writes there; give another"
+    with pytest.raises(ParameterError, match=said):
+        batch.run(drive, tmp_path / "out", settings, **{name: tmp_path / "out" / file})
+    assert runs.contents(tmp_path / "out") == before
+    batch.run(drive, tmp_path / "out", settings, **{name: tmp_path / "out" / f"other-{file[-6:]}"})

@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path, PureWindowsPath
 
+from ldls.batch.run_tracks import FOLDER, STATE, TABLE
 from ldls.batch.window import Frames
 from ldls.datasets import Source
 from ldls.errors import BatchError, ParameterError, UnsafePathError, some
 from ldls.sequences.trajectory import LONGEST_GAP_S
-from ldls.viewing.formats import ENDINGS, file_name
+from ldls.viewing.formats import ENDINGS, file_name, file_names
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 
@@ -125,6 +126,26 @@ def check_places(
             f"{folder}: holds {some(foreign)}, which no run here wrote and the run would write over; an output is "
             "never written over an input, so give another --out"
         )
+
+
+def check_apart(files: Mapping[str, Path], folder: Path, names: Sequence[str]) -> None:
+    """Refuse a file of all frames in the place of one that the run has itself, which one of them would be lost to.
+
+    Args:
+        files: The files of all frames, by the options that name them.
+        folder: Folder of the results.
+        names: Names of all frames of the source.
+
+    Raises:
+        ParameterError: There is one.
+    """
+    of_frames = {_folded(file) for name in names for file in file_names(name)} if files else set()
+    own = {folder.resolve(): {*of_frames, TABLE}, (folder / FOLDER).resolve(): {*of_frames, STATE}}
+    for option, path in files.items():
+        if _folded(path.name) in own.get(path.parent.resolve(), ()):
+            raise ParameterError(
+                f"{option}: {path} is the name of a file that the run itself writes there; give another"
+            )
 
 
 def _folded(file: str) -> str:

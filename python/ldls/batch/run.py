@@ -17,7 +17,7 @@ from ldls.batch.engines import Engine, EngineOptions, open_engine
 from ldls.batch.frame_work import Earlier, FrameWork
 from ldls.batch.journal import Journal, Record, formats_begun
 from ldls.batch.lock import only_run
-from ldls.batch.plan import check_names, check_places, chosen_of, windows_of
+from ldls.batch.plan import check_apart, check_names, check_places, chosen_of, windows_of
 from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import RunBag
 from ldls.batch.run_tracks import FOLDER, TABLE, RunTracks
@@ -87,7 +87,8 @@ def run(
             version, or files that no run wrote in the places of results, as inputs.
         CorruptFileError: The journal in `out` is none.
         ParameterError: The source has none of the `frames`, masks of one image are given for several, a map is asked
-            for, and no tracks, or a segmenter or a file of all masks has no such category.
+            for, and no tracks, `objects` or `map_file` is the name of a file of the run, or a segmenter or a file of
+            all masks has no such category.
         InputError: `objects` or `map_file` is an input.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
@@ -112,9 +113,9 @@ def run(
         tables = [FAILURES_NAME] if not begun else []
         tables += [FOLDER, TABLE] if settings.track and TRACKS not in begun else []
         check_places(folder, opened.names, settings.frame_formats, begun, tables)
-    of_all = {"objects": objects, "map": map_file}
-    outputs = {name: [Path(path)] for name, path in of_all.items() if path is not None}
-    check_outputs(outputs, _inputs(opened, settings), made=folder)
+    of_all = {name: Path(path) for name, path in (("objects", objects), ("map", map_file)) if path is not None}
+    check_outputs({name: [path] for name, path in of_all.items()}, _inputs(opened, settings), made=folder)
+    check_apart(of_all, folder, opened.names)
     tracks = _tracks(settings, folder, names, map_file)
     with_tracks = None if tracks is None else tracks.folder
     bag = RunBag(opened, folder, with_tracks) if BAG in settings.formats else None
