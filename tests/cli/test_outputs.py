@@ -94,6 +94,20 @@ def test_a_run_makes_its_folder_and_no_other(tmp_path):
     assert (tmp_path / "out/a.csv").is_file()
 
 
+@pytest.mark.parametrize(
+    ("option", "output"),
+    [
+        pytest.param("--save-masks", "out/points.npz", id="masks"),
+        pytest.param("--objects", "out/../out/points.csv", id="objects"),
+    ],
+)
+def test_two_options_do_not_write_one_file(folder, option, output):
+    command = f"{SEGMENT} --out out --formats npz,csv {option} {output}"
+    outcome = run(app, command.split(), env={"COLUMNS": "500"})
+    assert outcome.exit_code == 1
+    assert outcome.stderr == f"error: {option}: {output} is what --out writes, too; give another {option}\n"
+
+
 @pytest.mark.parametrize("command", ["view", "info"])
 def test_pictures_of_a_source_are_none_of_its_files(tmp_path, command):
     source = layouts.many_frames(tmp_path / "source", 2)

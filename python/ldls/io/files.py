@@ -213,7 +213,9 @@ def check_outputs(
     *,
     made: Path | None = None,
 ) -> None:
-    """Refuse, before any work, to write where no folder is, or over what is read: an output is never an input.
+    """Refuse, before any work, to write where no folder is, over what is read, or one output over another.
+
+    An output is never an input.
 
     Links, relative paths and letters of another case name the file that they lead to.
 
@@ -224,14 +226,19 @@ def check_outputs(
 
     Raises:
         FileNotFoundError: The folder of one of `outputs` is not there.
-        InputError: One of `outputs` is one of `inputs`.
+        InputError: One of `outputs` is one of `inputs`, or that of two options.
     """
-    outputs = {option: [*paths] for option, paths in outputs.items()}
+    written = [(option, path) for option, paths in outputs.items() for path in paths]
     to_be = [] if made is None else [made.resolve(), *made.resolve().parents]
-    for folder, path in {path.parent: path for paths in outputs.values() for path in paths}.items():
+    for folder, path in {path.parent: path for _, path in written}.items():
         if folder.resolve() not in to_be:
             check_folder(path)
-    there = {_identity(path): (option, path) for option, paths in outputs.items() for path in paths if path.exists()}
+    options: dict[Path, str] = {}
+    for option, path in written:
+        other = options.setdefault(path.resolve(), option)
+        if other != option:
+            raise InputError(f"{option}: {path} is what {other} writes, too; give another {option}")
+    there = {_identity(path): (option, path) for option, path in written if path.exists()}
     # nearly always nothing is there, and the inputs, which may be many, are not looked at
     given = (Path(path) for path in inputs if path is not None) if there else ()
     for path in (path for each in given for path in (each.iterdir() if each.is_dir() else [each]) if path.exists()):
