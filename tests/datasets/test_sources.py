@@ -469,6 +469,8 @@ def test_links_out_of_a_folder_are_refused_unless_they_are_allowed(tmp_path):
     [
         pytest.param(lambda p: None, {}, ldls.SourceError,
                      "is no source of frames; `ldls init` describes .*; looked for .*ldls.toml", id="empty folder"),
+        pytest.param(layouts.kitti_raw, {}, ldls.SourceError, "is no source of frames; perhaps .*/2011_09_26\\?; `ldls",
+                     id="the folder above one"),
         pytest.param(lambda p: (layouts.kitti_object(p), layouts.plain_folder(p)), {}, ldls.SourceError,
                      "may be kitti-object .* folder .*say which by kind=", id="two kinds in one folder"),
         pytest.param(layouts.kitti_object, {"kind": "kitti"}, ldls.ParameterError, "did you mean kitti-",

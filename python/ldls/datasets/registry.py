@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
@@ -49,6 +50,8 @@ SOURCES: dict[str, SourceClass] = {
     "rosbag": RosBag,
 }
 """Classes of sources by kind."""
+MOST_LOOKED_AT = 100
+"""Files and folders of one that is no source which are asked whether they are."""
 
 
 def open_source(
@@ -97,4 +100,13 @@ def guess_kind(path: Path) -> str:
         what = "; ".join(f"{kind} ({SOURCES[kind].looks_for})" for kind in fitting)
         raise SourceError(f"{path}: may be {what}; say which by kind=")
     what = "; ".join(f"{kind} ({source.looks_for})" for kind, source in SOURCES.items())
-    raise SourceError(f"{path}: is no source of frames; `ldls init` describes files of your own; looked for {what}")
+    raise SourceError(
+        f"{path}: is no source of frames{_hint(path)}; `ldls init` describes files of your own; looked for {what}"
+    )
+
+
+def _hint(folder: Path) -> str:
+    """Which of the first things in a folder may be meant; empty where none is a source."""
+    inside = islice(sorted(folder.iterdir()) if folder.is_dir() else [], MOST_LOOKED_AT)
+    likely = next((path for path in inside if any(source.recognises(path) for source in SOURCES.values())), None)
+    return "" if likely is None else f"; perhaps {likely}?"
