@@ -364,6 +364,10 @@ def test_a_file_of_poses_of_another_drive_is_refused(drive, tmp_path):
     (tmp_path / "given.txt").write_text("1 2 3\n")
     with pytest.raises((InputError, ValueError), match=r"given\.txt"):
         run(drive, tmp_path / "out", poses=str(tmp_path / "given.txt"))
+    with pytest.raises(FileNotFoundError, match=r"kissicp: no such file, expected a file of poses by .*, or kiss-icp"):
+        run(drive, tmp_path / "out", poses="kissicp")
+    with pytest.raises(FileNotFoundError, match=r": a folder, expected a file of poses by TUM or KITTI"):
+        run(drive, tmp_path / "out", poses=str(tmp_path))
     assert not (tmp_path / "out").exists()
 
 

@@ -77,7 +77,7 @@ class Poses:
 
         Raises:
             LdlsError: The file is broken, or is of another drive.
-            FileNotFoundError: There is no such file.
+            FileNotFoundError: There is no such file, or a folder.
         """
         self._source, self._settings = source, settings
         self.stamps = _stamps(source, settings)
@@ -85,6 +85,9 @@ class Poses:
         self.sha256: str | None = None
         if settings.poses is not None:
             path = Path(settings.poses)
+            if path.is_dir() or not path.exists():
+                found = "a folder" if path.is_dir() else "no such file"
+                raise FileNotFoundError(f"{path}: {found}, expected a file of poses by TUM or KITTI, or {ODOMETRY}")
             self.sha256 = digest_of(path)
             self._trajectory = _trajectory(path, source, self.stamps)
 
