@@ -29,8 +29,8 @@ def _check_not_transposed(projection: NDArray[np.float64]) -> None:
 def _depth_forward(projection: NDArray[np.float64]) -> NDArray[np.float64]:
     """Of P and -P, which project alike, the one whose third row is the depth, positive before the camera.
 
-    That is the one of positive determinant (Hartley and Zisserman 2004, section 6.2.3), but for the camera of a mirrored
-    image, whose third row points forward.
+    That is the one of positive determinant (Hartley and Zisserman 2004, section 6.2.3), but for the camera of a
+    mirrored image, whose third row points forward.
     """
     third = projection[2, :3]
     points_forward = third[2] > np.linalg.norm(third) / 2

@@ -215,9 +215,7 @@ def check_outputs(
 ) -> None:
     """Refuse, before any work, to write where no folder is, over what is read, or one output over another.
 
-    An output is never an input.
-
-    Links, relative paths and letters of another case name the file that they lead to.
+    An output is never an input. Links, relative paths and letters of another case name the file that they lead to.
 
     Args:
         outputs: The files that will be written, by the option that names them; they need not be there.
