@@ -32,9 +32,8 @@ def _depth_forward(projection: NDArray[np.float64]) -> NDArray[np.float64]:
     That is the one of positive determinant (Hartley and Zisserman 2004, section 6.2.3), but for the camera of a
     mirrored image, whose third row points forward.
     """
-    third = projection[2, :3]
-    points_forward = third[2] > np.linalg.norm(third) / 2
-    is_negated = not points_forward and np.linalg.det(projection[:, :3]) < 0
+    points_forward = projection[2, 2] > np.abs(projection[2, :2]).max()
+    is_negated = not points_forward and np.linalg.slogdet(projection[:, :3])[0] < 0
     return -projection if is_negated else projection
 
 
