@@ -321,7 +321,7 @@ def test_nothing_near_is_said_so():
         chosen_point("3,4", behind)
     with pytest.raises(ldls.InputError, match="there is no camera"):
         chosen_point("3,4", ldls.segment(np.array([[0, 0, 9.0]]), []))
-    with pytest.warns(UserWarning, match="0 of 1 rows"):
+    with pytest.warns(UserWarning, match="no row is finite"):
         lost = ldls.segment(np.array([[0, 0, np.nan]]), masks, camera)
     with pytest.raises(ldls.InputError, match="no point of the cloud is finite"):
         chosen_point("3,4,5", lost)

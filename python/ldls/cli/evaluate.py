@@ -131,7 +131,6 @@ def evaluate(
     """
     from ldls.cli.label_pairs import Counting, FrameFolders, have_masks, parse_place, read_bounds, read_pairs
     from ldls.evaluation import ClassSet, evaluate as score_pairs
-    from ldls.evaluation.classes import check_occur
     from ldls.evaluation.methods import BOUND
     from ldls.io.labels.label_formats import pair_files
 
@@ -175,7 +174,7 @@ def evaluate(
         for method, own in files.items()
     }
     # names of one's own are known by the labels alone
-    check_occur(scored.names, seen)
+    scored.check_occur(seen)
     joined: set[str] = set()
     # labels alone have no masks
     whole = next((own for own in files.values() if have_masks(own)), None)

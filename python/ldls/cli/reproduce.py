@@ -69,7 +69,6 @@ def reproduce(
     """
     from ldls.datasets import KittiObjectSource
     from ldls.evaluation import ClassSet
-    from ldls.evaluation.classes import check_occur
     from ldls.evaluation.paper import label, score
     from ldls.evaluation.tables import table_files
     from ldls.io.files import check_outputs
@@ -82,7 +81,7 @@ def reproduce(
     labelled = progress(label(frames, classes=scored, params=Params(threads=cores)), len(frames), "labelling")
     pairs = list(labelled)
     every = (side for one in pairs for pair in one.methods.values() for side in (pair.truth, pair.prediction))
-    check_occur(scored.names, (name for side in every for name in side.names))
+    scored.check_occur(name for side in every for name in side.names)
     experiment = score(pairs, classes=scored)
     screen = console()
     tables = _tables(experiment)

@@ -165,6 +165,19 @@ class ClassSet:
         every = places | {alias: places[name] for alias, name in self.aliases.items()}
         return {folded(name): number for name, number in every.items()}
 
+    def check_occur(self, seen: Iterable[str]) -> None:
+        """Refuse scored names that neither a vocabulary nor any label has, and that nothing else counts as.
+
+        Args:
+            seen: The names of classes that truth or predictions have.
+
+        Raises:
+            ParameterError: There is one; the message has the nearest name.
+        """
+        every = dict.fromkeys([*sorted({*seen} - {BACKGROUND}), *sorted(_known_names())])
+        alone = (name for name in self.names if name not in self.aliases.values())
+        find_categories(alone, dict(enumerate(every)))
+
     def _check_known(self, truth: Labeling) -> None:
         unknown = [name for name, count in truth.counts().items() if count and not self.knows(name)]
         if unknown:
@@ -172,20 +185,6 @@ class ClassSet:
                 f"truth has points of {unknown}, which the class set {self.names} does not know; "
                 "name them in its aliases, left_out or background"
             )
-
-
-def check_occur(names: Iterable[str], seen: Iterable[str]) -> None:
-    """Refuse scored names that neither a vocabulary nor any label has.
-
-    Args:
-        names: The scored classes.
-        seen: The names of classes that truth or predictions have.
-
-    Raises:
-        ParameterError: There is one; the message has the nearest name.
-    """
-    every = dict.fromkeys([*sorted({*seen} - {BACKGROUND}), *sorted(_known_names())])
-    find_categories(names, dict(enumerate(every)))
 
 
 def _distinct_instances(labeling: Labeling, classes: NDArray[np.int32]) -> NDArray[np.int32]:
