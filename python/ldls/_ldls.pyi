@@ -13,6 +13,7 @@ _Points: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
 
 __all__ = [
     "GROUND_M",
+    "NEGLIGIBLE",
     "Camera",
     "Masks",
     "Products",
@@ -43,6 +44,7 @@ __all__ = [
 
 __version__: str
 GROUND_M: list[float]
+NEGLIGIBLE: float
 
 @final
 class Rle:

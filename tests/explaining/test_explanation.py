@@ -9,6 +9,8 @@ import pytest
 
 import ldls
 from ldls.explaining import Explanation
+from ldls.explaining.rebuilt import rebuild
+from ldls.simulation import Drive, drive_frame
 from ring_samples import as_views, random_ring
 
 PARAMS = replace(ldls.Params.paper(), neighbors=6, sigma=0.3, pixel_weight=0.01, iterations=40)
@@ -437,6 +439,23 @@ def test_a_real_frame_explains_its_labels(frame_571):
         values[[each.label for each in found.likelihoods]] = [each.value for each in found.likelihoods]
         np.testing.assert_allclose(values, z[row], atol=1e-5)
         assert found.likelihoods[0].label == found.diffused_label
+
+
+def test_what_next_to_nothing_comes_to_is_background_in_the_explanation_too():
+    # the lines of this lidar are metres apart far away
+    frame = drive_frame(Drive(n_frames=1, seed=7003, lidar="vlp-16"), 0)
+    result = ldls.segment(frame.points, frame.images[0].masks, frame.images[0].camera)
+    system = rebuild(result)
+    A, b = system.A.astype(np.float64), system.b.astype(np.float64).toarray()
+    z = np.zeros_like(b)
+    for _ in range(result.params.iterations):
+        z = A @ z + b
+    faint = np.flatnonzero((z.max(axis=1) > 0) & (z.max(axis=1) < 1e-15))
+    assert len(faint) > 10 and z[faint].argmax(axis=1).any()
+    for row in faint:
+        found = ldls.explain(result, int(system.in_graph[row]))
+        assert (found.label, found.diffused_label) == (0, 0)
+        assert [(each.label, each.value) for each in found.likelihoods] == [(0, 0.0)]
 
 
 def test_clouds_next_to_nothing_can_be_explained():

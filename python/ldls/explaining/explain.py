@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+import ldls._ldls as _ldls
 import ldls.stages as stages
 from ldls._optional import require
 from ldls.checks import checked, shown
@@ -30,7 +31,7 @@ def explain(result: Segmentation, point: int) -> Explanation:
     """Explain the label of the point in row `point` of the cloud of `result`. Needs the extra `eval`.
 
     The graph of the result is built again, and the likelihoods of this point are those of plain products in double
-    precision.
+    precision. Where all are less than 1e-12 of the largest seed they count as zero, as in the diffusion.
 
     Raises:
         ParameterError: `point` is no row of the cloud.
@@ -89,13 +90,16 @@ def _in_the_graph(result: Segmentation, system: Rebuilt, row: int) -> dict[str, 
     distances = np.linalg.norm(xyz - xyz[row], axis=1)
     diffused = result.diffused_labels[system.in_graph]
     weights = influences(system.A, row, result.params.iterations)
+    z = weights @ system.b.astype(np.float64)
+    if z.max() < _ldls.NEGLIGIBLE * system.b.data.max(initial=0):
+        z[:] = 0
     neighbors = _neighbors(result, system, row, distances)
     own = float(_entries(system.A, row)[row])
     flowing = sum(each.share for each in neighbors)
     return {
         "edges": Edges(own=own, neighbors=flowing, pixels=max(0.0, 1.0 - own - flowing)),
         "neighbors": neighbors,
-        "likelihoods": _likelihoods(weights @ system.b.astype(np.float64), int(diffused[row])),
+        "likelihoods": _likelihoods(z, int(diffused[row])),
         "provenance": _provenance(weights * _column(system.b, int(diffused[row])), distances, row),
         "components": _components(system, result, row) if diffused[row] else None,
         "island": _island(system.graph, row),

@@ -50,6 +50,7 @@ mod _ldls {
         crate::call::remember_panics();
         crate::allocator::keep_for_a_while();
         module.add("GROUND_M", ldls_core::GROUND_M)?;
+        module.add("NEGLIGIBLE", <f32 as ldls_core::Real>::NEGLIGIBLE)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
