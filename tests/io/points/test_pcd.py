@@ -118,6 +118,12 @@ def test_a_cloud_without_points(tmp_path):
         pytest.param(header(DATA="ascii") + b"1 2 3 4\n" * 39, ldls.TruncatedFileError, "has 39", id="cut, ascii"),
         pytest.param(header(DATA="ascii") + b"1 2 3 4\n" * 41, ldls.CorruptFileError, "has 41", id="more, ascii"),
         pytest.param(
+            header(DATA="ascii") + b"1 2 3 4\n" * 39 + b"1 2 3 4 5\n",
+            ldls.CorruptFileError,
+            "line 50: expected 4 cells, got 5",
+            id="a long row",
+        ),
+        pytest.param(
             header(DATA="ascii") + b"1 2 3 4\n" * 39 + b"1 2 oops 4",
             ldls.CorruptFileError,
             "line 50: .*oops",

@@ -47,6 +47,17 @@ FACES = ("element face 1", "property list uchar int vertex_indices")
             header("ascii", before=("element camera 1", "property double f")) + b"7\n" + ascii_body(ROWS),
             id="another element before, ascii",
         ),
+        pytest.param(header("ascii") + ascii_body(ROWS) + b"\n \n", id="blank lines at the end"),
+        pytest.param(
+            header("binary_little_endian") + ROWS.tobytes() + b"\r\n" * 20, id="white space at the end, binary"
+        ),
+        pytest.param(header("ascii", after=FACES) + ascii_body(ROWS) + b"3 0 1 2\n", id="faces after, ascii"),
+        pytest.param(
+            header("binary_little_endian", after=("element edge 2", "property int a", "property int b"))
+            + ROWS.tobytes()
+            + bytes(16),
+            id="another element after, binary",
+        ),
         pytest.param(
             header(
                 "binary_little_endian",
@@ -95,6 +106,48 @@ def test_a_file_of_results_reads_back(small_scene, tmp_path):
         ),
         pytest.param(
             header("ascii", 1) + b"1 2", ldls.TruncatedFileError, "line 10: expected at least 4 cells", id="in a row"
+        ),
+        pytest.param(
+            header("ascii", 2) + ascii_body(ROWS),
+            ldls.CorruptFileError,
+            "line 12: the elements of the header have 2 lines, the file has 3; mend the header",
+            id="fewer in ascii",
+        ),
+        pytest.param(
+            header("ascii", 2, after=FACES) + ascii_body(ROWS) + b"3 0 1 2\n",
+            ldls.CorruptFileError,
+            "header have 3 lines, the file has 4",
+            id="fewer before faces, ascii",
+        ),
+        pytest.param(
+            header("binary_big_endian", 2) + ROWS.astype(">f4").tobytes(),
+            ldls.CorruptFileError,
+            "header need 32 bytes after it, the file has 48; mend the header",
+            id="fewer in binary",
+        ),
+        pytest.param(
+            header("binary_little_endian", 2, after=("element edge 2", "property int a")) + ROWS.tobytes() + bytes(8),
+            ldls.CorruptFileError,
+            "need 40 bytes after it, the file has 56",
+            id="fewer before another element, binary",
+        ),
+        pytest.param(
+            header("ascii", 2) + b"1 2 3 4\n5 6 7 8 9\n",
+            ldls.CorruptFileError,
+            "line 11: expected 4 cells, got 5: '5 6 7 8 9'",
+            id="a long row",
+        ),
+        pytest.param(
+            header("ascii", 2) + b"1 2 3 4 5\n5 6 7 8 9\n",
+            ldls.CorruptFileError,
+            "line 10: expected 4 cells, got 5",
+            id="long rows",
+        ),
+        pytest.param(
+            header("ascii", 1, ("float x", "float y", "float z", "uchar red")) + b"1 2 3 4 5\n",
+            ldls.CorruptFileError,
+            "line 10: expected 4 cells, got 5",
+            id="a long row with columns that are not wanted",
         ),
         pytest.param(header("ascii", 1) + b"1 2 a 4", ldls.CorruptFileError, "line 10: .*'a'", id="word"),
         pytest.param(

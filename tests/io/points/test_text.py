@@ -26,6 +26,8 @@ ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
         pytest.param('"x","y","z"\n"1.5","-2","3e-3"\n4,5,6\n', ROWS, id="quotes"),
         pytest.param("intensity x y z ring\n9 1 2 3 7\n", [[1, 2, 3, 9]], id="intensity comes fourth"),
         pytest.param("1 2 3 0.5 7\n", [[1, 2, 3, 0.5, 7]], id="more columns without names"),
+        pytest.param("x,y,z\n1.5,-2,3e-3,\n4,5,6\n", ROWS, id="a comma behind the last cell"),
+        pytest.param('name,x,y,z\n"a,b",1.5,-2,3e-3\n,4,5,6\n', ROWS, id="a comma in quotes"),
         pytest.param("nan 2 inf\n", [[np.nan, 2, np.inf]], id="not finite"),
         pytest.param("x,y,z\n", np.zeros((0, 3)), id="header alone"),
         pytest.param("500000.123456 5000000.654321 1\n", [[500000.123456, 5000000.654321, 1]], id="UTM"),
@@ -48,6 +50,16 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
         ),
         pytest.param("1 2 3\n4 5", ldls.TruncatedFileError, "line 2: expected at least 3 cells, got 2", id="cut"),
         pytest.param("1,5;2;3\n", ldls.CorruptFileError, "line 1: .* decimal point .* '1,5'", id="decimal comma"),
+        pytest.param("1,2,3\n1,5,2,3\n", ldls.CorruptFileError, "line 2: expected 3 cells, got 4.* decimal", id="long"),
+        pytest.param(
+            "1 2 3\n4 5 6\n7 8 9 10\n", ldls.CorruptFileError, "line 3: expected 3 cells, got 4", id="long, blanks"
+        ),
+        pytest.param(
+            "x,y,z\n1,2,3\n4,5,6,7\n", ldls.CorruptFileError, "line 3: expected 3 cells, got 4", id="header, long"
+        ),
+        pytest.param(
+            "x y z r\n1 2 3 4 5\n", ldls.CorruptFileError, "line 2: expected 4 cells, got 5", id="header, blanks"
+        ),
         pytest.param("1,,3\n", ldls.CorruptFileError, "line 1: .* column 2, got ''", id="empty cell"),
         pytest.param(
             "17\n1 2 3\n", ldls.CorruptFileError, "line 1: expected x y z or their names, got '17'", id="count"

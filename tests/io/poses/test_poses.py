@@ -95,7 +95,7 @@ KITTI_LINE = "1 0 0 0 0 1 0 0 0 0 1 0\n"
         pytest.param(LINE + "1.1 0 0 0 0 0 0\n" + LINE, ldls.CorruptFileError,
                      "line 2: expected at least 8 cells, got 7",
                      id="too few"),
-        pytest.param(LINE + "1.1 0 0 0 0 0 0 1 5\n", ldls.CorruptFileError, "line 2: expected 8 numbers",
+        pytest.param(LINE + "1.1 0 0 0 0 0 0 1 5\n", ldls.CorruptFileError, "line 2: expected 8 cells, got 9",
                      id="too many"),
         pytest.param(LINE + "1.1 0 0 0 0 0", ldls.TruncatedFileError, "line 2: expected at least 8", id="cut line"),
         pytest.param(LINE + "1.1 0 0 0 0 0 0 1", ldls.TruncatedFileError, "digits may be missing", id="cut number"),

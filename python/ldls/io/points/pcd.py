@@ -98,7 +98,8 @@ def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines
     _check_amount(header, "lines", header.n_points, len(rows), slack=0)
     first_cells = np.cumsum([0, *(field.count for field in header.fields)])
     delimiter = "," if rows and "," in rows[0][1] else None
-    cells = read_rows(rows, [int(first_cells[position]) for position in columns.positions], delimiter)
+    positions = [int(first_cells[position]) for position in columns.positions]
+    cells = read_rows(rows, positions, int(first_cells[-1]), delimiter)
     fields = [header.fields[position] for position in columns.positions]
     stacked = [of_kind(f.name, column, f.kind) for f, column in zip(fields, cells.T, strict=True)]
     if any(_lost_m(cells[:, axis], stacked[axis]) > MOST_LOST_M for axis in range(3)):

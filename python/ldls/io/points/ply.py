@@ -49,6 +49,7 @@ class Header:
     encoding: str
     before: list[Element]
     vertex: Element
+    after: list[Element]
 
 
 def read(path: Path) -> Points:
@@ -57,7 +58,8 @@ def read(path: Path) -> Points:
     Raises:
         TruncatedFileError: The file ends before the vertices that the header says, or, in ascii, with the last number
             of them, without a line end: that number may be cut short.
-        CorruptFileError: The header contradicts itself, or a number is none; the message names the line.
+        CorruptFileError: The header contradicts itself or what follows it, or a number is none; the message names the
+            line. In binary, what follows lists is not known, and nothing is said of it.
         UnsupportedFormatError: The vertices, or an element before them, have a list property.
     """
     with open_file(path, "PLY file") as file:
@@ -89,8 +91,21 @@ def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
             f"element vertex {count} needs {needed} bytes after the header, the file has {len(body)}; "
             f"last whole vertex is {max(0, len(body) - start) // kind.itemsize}"
         )
+    _refuse_more(header, body, needed)
     vertices = np.frombuffer(body, kind, count, start)
     return columns.stack([vertices[f"f{position}"] for position in columns.positions])
+
+
+def _refuse_more(header: Header, body: bytes, needed: int) -> None:
+    """Refuse a binary body with room for a further vertex behind what the header says, save white space."""
+    if any(element.list_properties for element in header.after):
+        return  # nobody knows how long lists are but who walks through them all
+    order = BYTE_ORDERS[header.encoding]
+    end = needed + sum(element.count * element.dtype(order).itemsize for element in header.after)
+    if len(body) - end >= header.vertex.dtype(order).itemsize and body[end:].strip():
+        raise CorruptFileError(
+            f"the elements of the header need {end} bytes after it, the file has {len(body)}; mend the header"
+        )
 
 
 def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines: int) -> Points:
@@ -101,7 +116,13 @@ def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines
         raise TruncatedFileError(
             f"element vertex {count} needs as many lines, the file ends after {max(0, len(rows) - start)}"
         )
-    cells = read_rows(rows[start : start + count], columns.positions)
+    n_lines = start + count + sum(element.count for element in header.after)
+    if n_lines < len(rows):
+        raise CorruptFileError(
+            f"line {rows[n_lines][0]}: the elements of the header have {n_lines} lines, the file has {len(rows)}; "
+            "mend the header"
+        )
+    cells = read_rows(rows[start : start + count], columns.positions, len(vertex.properties))
     names, kinds = ([each[position] for position in columns.positions] for each in (vertex.properties, vertex.types))
     return columns.stack([of_kind(*each) for each in zip(names, cells.T, map(np.dtype, kinds), strict=True)])
 
@@ -128,7 +149,7 @@ def _parse(lines: list[Row]) -> Header:
     at = [i for i, element in enumerate(elements) if element.name == "vertex"]
     if len(at) != 1:
         raise CorruptFileError(f"expected one element vertex, found {len(at)}")
-    return Header(encoding, elements[: at[0]], elements[at[0]])
+    return Header(encoding, elements[: at[0]], elements[at[0]], elements[at[0] + 1 :])
 
 
 def _add_property(place: str, element: Element, words: list[str]) -> None:

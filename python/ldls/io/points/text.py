@@ -28,7 +28,8 @@ def read(path: Path) -> NDArray[np.float64]:
     Raises:
         TruncatedFileError: The file is empty, its last line has too few cells, or it ends with its last number, without
             a line end: that number may be cut short.
-        CorruptFileError: Another line has too few cells, or a cell is no number; the message names it.
+        CorruptFileError: Another line has too few cells, one has more than the first, or a cell is no number; the
+            message names it.
         UnsupportedFormatError: There are more columns than clouds have.
     """
     with open_file(path, "text file of points") as file:
@@ -44,7 +45,7 @@ def _parse(text: str) -> NDArray[np.float64]:
     if names is None:
         return _parse_nameless(rows)
     delimiter = _delimiter(rows[0][1]) if rows else None
-    return read_rows(rows, NamedColumns.find("line 1", names).positions, delimiter)
+    return read_rows(rows, NamedColumns.find("line 1", names).positions, len(names), delimiter)
 
 
 def _names(line: str) -> list[str] | None:
@@ -63,7 +64,7 @@ def _parse_nameless(rows: list[Row]) -> NDArray[np.float64]:
         raise CorruptFileError(f"line {number}: expected x y z or their names, got {first.strip()[:80]!r}")
     if n_columns > MAX_COLUMNS:
         raise UnsupportedFormatError(f"line {number}: {n_columns} columns, expected at most {MAX_COLUMNS}")
-    return _without_colours(read_rows(rows, range(n_columns), delimiter))
+    return _without_colours(read_rows(rows, range(n_columns), n_columns, delimiter))
 
 
 def _without_colours(columns: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 
 import numpy as np
@@ -67,27 +68,39 @@ def whole_number(place: str, word: str) -> int:
     return int(word)
 
 
-def read_rows(rows: Sequence[Row], positions: Sequence[int], delimiter: str | None = None) -> NDArray[np.float64]:
+def read_rows(
+    rows: Sequence[Row], positions: Sequence[int], n_cells: int, delimiter: str | None = None
+) -> NDArray[np.float64]:
     """(N, len(positions)) float64: the cells at `positions`, from 0, of every row.
 
     Args:
         rows: Lines that hold cells. What follows the last cell that is wanted of the last line, be it a blank or the
             line's end, says that it is whole: 12.3 at the very end of a file may be what is left of 12.345.
         positions: Columns wanted.
+        n_cells: Most cells that a row may have.
         delimiter: What stands between cells; None for any blanks.
 
     Raises:
         TruncatedFileError: The last row has too few cells, or nothing follows its last one.
-        CorruptFileError: Another row has too few cells, or a cell is no number; the message names the line.
+        CorruptFileError: Another row has too few cells, one has too many, or a cell is no number; the message names
+            the line.
     """
     if not rows:
         return np.zeros((0, len(positions)))
     lines = [line for _, line in rows]
+    # where all cells between blanks are wanted, NumPy counts them as it goes
+    counted = delimiter is None and list(positions) == list(range(n_cells))
+    if not counted:
+        _refuse_long_row(rows, n_cells, delimiter)
+    wanted = None if counted else list(positions)
     try:
         numbers = np.loadtxt(
-            lines, np.float64, comments=None, delimiter=delimiter, usecols=list(positions), ndmin=2, quotechar='"'
+            lines, np.float64, comments=None, delimiter=delimiter, usecols=wanted, ndmin=2, quotechar='"'
         )
+        if numbers.shape[1] != len(positions):
+            raise ValueError(f"{numbers.shape[1]} columns")
     except ValueError as error:
+        _refuse_long_row(rows, n_cells, delimiter)
         _refuse_wrong_cell(rows, positions, delimiter)
         raise CorruptFileError(f"not rows of numbers ({error})") from None
     number, last = rows[-1]
@@ -117,6 +130,27 @@ def of_kind(name: str, column: NDArray[np.float64], kind: np.dtype[np.number]) -
             f"{name} of point {at} is {column[at]}, expected whole numbers {limits.min} to {limits.max}"
         )
     return column.astype(kind)
+
+
+def _refuse_long_row(rows: Sequence[Row], n_cells: int, delimiter: str | None) -> None:
+    for number, line in rows:
+        # counting what stands between cells is the cheaper half
+        if delimiter is not None and line.count(delimiter) < n_cells:
+            continue
+        found = _n_cells(line, delimiter)
+        if found > n_cells:
+            raise CorruptFileError(
+                f"line {number}: expected {n_cells} cells, got {found}: {line.strip()[:80]!r}; numbers need a decimal "
+                "point, and every row as many cells as the columns that the file says"
+            )
+
+
+def _n_cells(line: str, delimiter: str | None) -> int:
+    if delimiter is None:
+        return len(line.split())
+    cells = next(csv.reader([line.strip()], delimiter=delimiter))
+    # what ends its last cell as it ends the others makes no further one
+    return len(cells) - (cells[-1].strip() == "")
 
 
 def _refuse_wrong_cell(rows: Sequence[Row], positions: Sequence[int], delimiter: str | None) -> None:

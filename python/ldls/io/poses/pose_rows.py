@@ -32,11 +32,7 @@ def read_pose_rows(text: str, names: str) -> tuple[list[int], NDArray[np.float64
     rows, n_columns = pose_rows(text), len(names.split())
     if not rows:
         raise TruncatedFileError(f"no pose, expected lines {names}")
-    for number, line in rows:
-        cells = line.split()
-        if len(cells) > n_columns:
-            raise CorruptFileError(f"line {number}: expected {n_columns} numbers {names}, got {len(cells)}")
-    numbers = read_rows(rows, range(n_columns))
+    numbers = read_rows(rows, range(n_columns), n_columns)
     finite = np.isfinite(numbers).all(axis=1)
     if not finite.all():
         number, line = rows[int(np.argmin(finite))]
