@@ -69,7 +69,8 @@ def _parse_nameless(rows: list[Row]) -> NDArray[np.float64]:
 
 def _without_colours(columns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Columns up to colours or normals, which are no intensity: three side by side behind x y z, or behind a fourth."""
-    for start in (4, 3):
+    # behind x y z first, for red before green, blue and an intensity of whole numbers would be one
+    for start in (3, 4):
         beside = columns[:, start : start + 3]
         if beside.shape[1] == 3 and len(beside) and (_are_colours(beside) or _are_normals(beside)):
             return columns[:, :start]
