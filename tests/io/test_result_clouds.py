@@ -86,6 +86,33 @@ def test_las_keeps_larger_intensities_as_they_are(result, tmp_path, largest):
     np.testing.assert_array_equal(laspy.read(tmp_path / "a.las").intensity, points[:, 3])
 
 
+@pytest.mark.parametrize(
+    ("intensities", "error", "message"),
+    [
+        pytest.param([0.05, 0.5, 1.0001], ldls.LimitError, "up to 1.0001 lose 0.5 .*divide them", id="above 1"),
+        pytest.param([0, 70_000], ldls.LimitError, "intensities 0 to 70000, expected 0 to 65535", id="above 65535"),
+        pytest.param([-1, 5], ldls.LimitError, "intensities -1 to 5, expected 0", id="below 0"),
+        pytest.param([0.5, np.nan], ldls.NonFiniteError, "250 of 501 .*intensities, are not finite", id="NaN"),
+        pytest.param([1, np.inf], ldls.NonFiniteError, "intensities, are not finite", id="infinite"),
+    ],
+)
+def test_las_refuses_intensities_that_it_cannot_hold(result, tmp_path, intensities, error, message):
+    pytest.importorskip("laspy", reason="the extra las is not installed")
+    points = result.points.copy()
+    points[:, 3] = np.resize(intensities, len(points))
+    with pytest.raises(error, match=f"a.las: .*{message}"):
+        ldls.save(replace(result, points=points), tmp_path / "a.las")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_las_rounds_fractions_of_large_intensities(result, tmp_path):
+    laspy = pytest.importorskip("laspy", reason="the extra las is not installed")
+    points = result.points.copy()
+    points[:, 3] = np.linspace(0, 255, len(points))
+    ldls.save(replace(result, points=points), tmp_path / "a.las")
+    np.testing.assert_array_equal(laspy.read(tmp_path / "a.las").intensity, points[:, 3].round())
+
+
 def test_las_says_what_it_cannot_hold(result, tmp_path):
     pytest.importorskip("laspy", reason="the extra las is not installed")
     points = result.points.copy()

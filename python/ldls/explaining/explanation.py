@@ -177,7 +177,7 @@ class Explanation:
 
     @property
     def cleared(self) -> bool:
-        """True if the point is background for it is nearer to the ground than the clearance."""
+        """True if the point is background for it is a point of the ground that is lower than the clearance."""
         if self.label != 0 or self.height_m is None:
             return False
         return self.clearance_m > 0 and LOWEST_M < self.height_m < self.clearance_m
@@ -189,8 +189,8 @@ class Explanation:
         if self.label < 0:
             return f"{point} is out of view: {_why_unseen(self.sights)}."
         if self.cleared:
-            near = f"{_height(self.height_m)}, nearer than {100 * self.clearance_m:g} cm"
-            return f"{point} is background: it is {near}."
+            low = f"{_height(self.height_m)}, lower than {100 * self.clearance_m:g} cm above it"
+            return f"{point} is background: it is {low}."
         components = self.components
         if components is not None and components.removed:
             given = named(self, components.label)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
 from ldls._optional import require
+from ldls.cloud import Points
 from ldls.errors import CorruptFileError, LimitError, NonFiniteError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import InputFile, open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances
@@ -38,6 +39,8 @@ MAX_CATEGORY = 2**16 - 1
 MAX_COLOR = 257
 """A byte times this fills the sixteen bits that LAS has for a colour."""
 MAX_INTENSITY = 2**16 - 1
+MOST_LOST = 0.01
+"""What intensities may lose in whole numbers, as a part of the largest."""
 
 
 @dataclass(frozen=True)
@@ -165,23 +168,27 @@ def _check(header: Header, file_bytes: int) -> None:
 def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z to 0.1 mm, intensity, colour, and `instance`, `category` and `confidence` of their own.
 
-    `.laz` is packed. Intensities of 0 to 1 are spread over the 16 bits that LAS has; larger ones are rounded.
+    `.laz` is packed. Intensities of 0 to 1 are spread over the 16 bits that LAS has; where one is larger, all are
+    rounded.
     Of a map or a tracked result, `instance` is the track. Points out of view have instance and category 0, as the
     background has.
 
     Raises:
-        NonFiniteError: A point is not finite, which LAS cannot say.
-        LimitError: The cloud is wider than the coordinates of LAS, or a category id is above 65,535.
+        NonFiniteError: A coordinate or intensity is not finite, which LAS cannot say.
+        LimitError: The cloud is wider than the coordinates of LAS, a category id is above 65,535, or intensities are
+            not within 0 to 65,535 or lose more than a hundredth of the largest where they are rounded.
         ImportError: The extra `las` is not installed.
     """
     laspy = require("laspy", "las")
     require("lazrs", "las")
     xyz = result.points[:, :3].astype(np.float64)
-    _check_writable(path, xyz, result.categories)
+    _check_writable(path, result.points[:, :4], result.categories)
+    intensities = _intensities(path, result.points)
     header = laspy.LasHeader(point_format=COLOR_FORMAT, version="1.4")
     header.scales, header.offsets = np.full(3, SCALE_M), _middle(xyz)
     header.add_extra_dims([laspy.ExtraBytesParams(name, kind) for name, kind in DIMENSIONS.items()])
     las = laspy.LasData(header, laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header))
+    las.intensity = intensities
     _fill(las, xyz, result)
     with whole_file(path) as file:
         las.write(file, do_compress=path.suffix.lower() == ".laz")
@@ -189,8 +196,6 @@ def write(path: Path, result: Labelled) -> None:
 
 def _fill(las: Any, xyz: NDArray[np.float64], result: Labelled) -> None:  # noqa: ANN401
     las.x, las.y, las.z = xyz.T
-    if result.points.shape[1] > 3:
-        las.intensity = _sixteen_bits(result.points[:, 3])
     for channel, column in zip(CHANNELS, colors(result).T, strict=True):
         las[channel] = column.astype(np.uint16) * MAX_COLOR
     las["instance"] = instances(result)
@@ -198,13 +203,15 @@ def _fill(las: Any, xyz: NDArray[np.float64], result: Labelled) -> None:  # noqa
     las["confidence"] = result.confidence
 
 
-def _check_writable(path: Path, xyz: NDArray[np.float64], categories: NDArray[np.int32]) -> None:
-    finite = np.isfinite(xyz).all(axis=1)
+def _check_writable(path: Path, points: Points, categories: NDArray[np.int32]) -> None:
+    finite = np.isfinite(points).all(axis=1)
     if not finite.all():
+        what = "points" if np.isfinite(points[:, 3:]).all() else "points, or their intensities,"
         raise NonFiniteError(
-            f"{path}: {(~finite).sum()} of {len(xyz)} points are not finite, the first in row {np.argmin(finite)}; "
+            f"{path}: {(~finite).sum()} of {len(points)} {what} are not finite, the first in row {np.argmin(finite)}; "
             "LAS has no such numbers, save .ply or .npz instead"
         )
+    xyz = points[:, :3].astype(np.float64)
     if len(xyz) and (np.ptp(xyz, axis=0) / 2 > MAX_STEPS * SCALE_M).any():
         raise LimitError(f"{path}: the cloud is {np.ptp(xyz, axis=0).max():.0f} m wide, expected at most 429,000 m")
     if len(categories) and not 0 <= categories.min() <= categories.max() <= MAX_CATEGORY:
@@ -218,7 +225,23 @@ def _middle(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.round((xyz.min(axis=0) + xyz.max(axis=0)) / 2) if len(xyz) else np.zeros(3)
 
 
-def _sixteen_bits(intensity: NDArray[np.floating]) -> NDArray[np.uint16]:
-    known = np.nan_to_num(intensity.astype(np.float64), nan=0.0)
-    spread = MAX_INTENSITY if known.max(initial=0.0) <= 1 else 1
-    return np.round(known * spread).clip(0, MAX_INTENSITY).astype(np.uint16)
+def _intensities(path: Path, points: Points) -> NDArray[np.uint16]:
+    if points.shape[1] == 3:
+        return np.zeros(len(points), np.uint16)
+    known = points[:, 3].astype(np.float64)
+    low, high = known.min(initial=0), known.max(initial=0)
+    if low < 0 or high > MAX_INTENSITY:
+        raise LimitError(
+            f"{path}: intensities {low:g} to {high:g}, expected 0 to {MAX_INTENSITY}; scale them, or save .ply or .npz "
+            "instead"
+        )
+    if high <= 1:
+        return np.round(known * MAX_INTENSITY).astype(np.uint16)
+    whole = np.round(known)
+    lost = np.abs(whole - known).max()
+    if lost > MOST_LOST * high:
+        raise LimitError(
+            f"{path}: intensities up to {high:g} lose {lost:.2g} in the whole numbers of LAS; divide them by the "
+            "largest, for those of 0 to 1 are spread over its 16 bits, or save .ply or .npz instead"
+        )
+    return whole.astype(np.uint16)
