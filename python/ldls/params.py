@@ -23,8 +23,8 @@ class Params:
         ground_edges: Factor on the weight of an edge between a point of the ground and one that is not, 0 to 1: labels
             leak along the ground, whose points lie close together along a scan line. 1 for none of it. Needs the
             ground, which takes about 1 ms for 20,000 points in view.
-        ground_clearance: Points nearer to the ground than this, in metres, are background and have no part in the
-            graph: what touches the ground cannot be told from it, and labels would run along it; 0 to 1, 0 for none
+        ground_clearance: Points of the ground lower than this above it, in metres, are background and have no part in
+            the graph: what touches the ground cannot be told from it, and labels would run along it; 0 to 1, 0 for none
             of it. Saves the time of those points, a third to two thirds of all in view.
         local_ground: Whether the ground follows kerbs and lawns where enough of it is seen, and not a smooth surface
             only. Costs about as much again as the surface.

@@ -105,7 +105,7 @@ def test_a_point_near_the_ground_says_how_near(street):
     found = next(each for each in explanations if each.cleared)
     verdict, place, course, *_ = explain(found.point, path).output.splitlines()
     assert verdict.startswith(f"Point {found.point} is background: it is ")
-    assert verdict.endswith(" the ground, nearer than 2 cm.")
+    assert verdict.endswith(" the ground, lower than 2 cm above it.")
     assert f"{abs(found.height_m):.2f} m {'above' if found.height_m >= 0 else 'below'} the ground." in place
     assert course.startswith("Direct projection: ")
     assert course.endswith(". Near the ground: background.")

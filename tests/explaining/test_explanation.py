@@ -357,12 +357,12 @@ def likelihoods(*values):
         ),
         pytest.param(
             {"label": 0, "diffused_label": 0, "components": None, "height_m": 0.0396, "clearance_m": 0.04},
-            "Point 7 is background: it is 3.9 cm above the ground, nearer than 4 cm.",
+            "Point 7 is background: it is 3.9 cm above the ground, lower than 4 cm above it.",
             id="near the ground",
         ),
         pytest.param(
             {"label": 0, "diffused_label": 0, "components": None, "height_m": -0.12, "clearance_m": 0.055},
-            "Point 7 is background: it is 12 cm below the ground, nearer than 5.5 cm.",
+            "Point 7 is background: it is 12 cm below the ground, lower than 5.5 cm above it.",
             id="below the ground",
         ),
         pytest.param(
@@ -490,6 +490,13 @@ def test_an_empty_cloud_has_no_point_to_explain():
     masks = ldls.InstanceMasks.from_array(np.ones((1, 40, 60), bool))
     with pytest.raises(ldls.ParameterError, match="the cloud is empty"):
         ldls.explain(ldls.segment(np.zeros((0, 3)), masks, pinhole()), 0)
+
+
+def test_explanations_are_equal_and_have_one_hash_where_all_they_say_is(ring):
+    _, _, result = ring
+    points = result.in_view[:20].tolist()
+    found = {ldls.explain(result, point) for point in points + points}
+    assert sorted(each.point for each in found) == sorted(points)
 
 
 def test_plain_values_go_through_json(ring):

@@ -52,7 +52,7 @@ def test_every_lost_label_has_a_reason_and_no_other_point_has_one(street):
             assert result.labels[point] == result.diffused_labels[point] == 0
             assert found.confidence == 1
             assert not found.neighbors and not found.likelihoods
-            assert found.verdict.endswith("the ground, nearer than 2 cm.")
+            assert found.verdict.endswith("the ground, lower than 2 cm above it.")
         reasons.add("removed" if removed else "cleared" if found.cleared else "")
     assert reasons == {"removed", "cleared", ""}
 

@@ -23,7 +23,7 @@ HELP = {
     "iterations": "Diffusion steps.",
     "remove_outliers": "Take an object's label from points off its main part and parts near it?",
     "ground_edges": "Factor on edges between the ground and what stands on it; 1 for none of it.",
-    "ground_clearance": "Points nearer to the ground than so many metres are background from the start; 0 for none.",
+    "ground_clearance": "Points of the ground lower than so many metres above it are background at once; 0 for none.",
     "local_ground": "Does the ground follow kerbs and lawns, or is it smooth?",
     "depth_gap": "Gap in metres before and behind the object of a mask; 0 for no depth groups.",
     "bridged_gap": "Gap in metres within an object that does not go on beside its mask; 0 for none of it.",

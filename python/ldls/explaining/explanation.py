@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from ldls.explaining.sight import Sight
@@ -152,7 +152,7 @@ class Explanation:
     xyz: tuple[float, float, float]
     label: int
     diffused_label: int
-    names: dict[int, str]
+    names: dict[int, str] = field(hash=False)
     sights: tuple[Sight, ...]
     edges: Edges | None = None
     neighbors: tuple[Neighbor, ...] = ()
