@@ -101,10 +101,11 @@ def save(thing: Segmentation | InstanceMasks | LabelledMap, path: str | PathLike
         return
     if not isinstance(thing, Segmentation):
         raise InputError(f"save: expected a Segmentation, LabelledMap or InstanceMasks, got {type(thing).__name__}")
-    fitting = [each for each in FORMATS.values() if path.name.lower().endswith(each.ending)]
+    # a name that is an ending has none
+    fitting = [each for each in FORMATS.values() if path.suffix and path.name.lower().endswith(each.ending)]
     if not fitting:
         known = ", ".join(each.ending for each in FORMATS.values())
-        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} files, expected {known}")
+        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} files, expected a name and {known}")
     writer = max(fitting, key=lambda each: len(each.ending)).write
     check_options(f"{path.suffix} results ({path})", writer, options)
     writer(path, thing)
