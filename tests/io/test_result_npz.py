@@ -98,7 +98,25 @@ def test_no_points_and_no_masks(scene, tmp_path):
         pytest.param({"report": np.array("{}")}, "empty_masks", id="report without fields"),
         pytest.param({"camera": np.array('{"projection": 1}')}, "image_size", id="camera without fields"),
         pytest.param({"masks_runs": np.zeros(1, np.uint32)}, "run_counts sum to", id="masks cut off"),
-        pytest.param({"object_name": np.array(["person"])}, "zip", id="an instance without a name"),
+        pytest.param(
+            {"object_name": np.array(["person"])}, r"object_category: expected \(1,\)", id="a name is missing"
+        ),
+        pytest.param(
+            {"object_name": np.zeros(2)}, r"object_name: expected \(M,\) text, got \(2,\) float", id="no names"
+        ),
+        pytest.param(
+            {"object_name": np.array([["a"], ["b"]])}, r"object_name: .* got \(2, 1\)", id="names of two axes"
+        ),
+        pytest.param({"object_score": np.ones((1, 2), np.float32)}, "object_score: expected", id="scores of two axes"),
+        pytest.param({"object_score": np.full(2, np.nan, np.float32)}, "object_score: expected 0 to 1", id="score NaN"),
+        pytest.param({"object_category": np.ones((1, 2), np.int32)}, "object_category: expected", id="categories"),
+        pytest.param({"object_category": np.array(["1", "2"])}, "object_category: expected", id="categories in text"),
+        pytest.param({"object_track": np.array([1.5, 2])}, "object_track: expected", id="broken tracks"),
+        pytest.param(
+            {"object_track": np.arange(2), "object_velocity": np.full((2, 2), np.nan)},
+            "object_velocity: expected",
+            id="velocity NaN",
+        ),
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(scene, tmp_path, spoil, message):
@@ -108,6 +126,26 @@ def test_arrays_that_do_not_fit_are_refused(scene, tmp_path, spoil, message):
     with pytest.raises(ldls.LdlsError, match=message) as error:
         ldls.read_result(path)
     assert str(error.value).startswith(str(path))
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        pytest.param([-0.6, 5], "u of pixels: expected -0.5 to 79.5, got -0.6", id="left"),
+        pytest.param([1e6, 5], "u of pixels: expected -0.5 to 79.5", id="right"),
+        pytest.param([5, -0.6], "v of pixels: expected -0.5 to 59.5, got -0.6", id="above"),
+        pytest.param([5, 60], "v of pixels: expected -0.5 to 59.5, .* 60.0", id="below"),
+        pytest.param([np.nan, 5], "pixels: expected", id="nan"),
+    ],
+)
+def test_pixels_outside_of_the_image_are_refused(scene, tmp_path, row, message):
+    path = tmp_path / "a.npz"
+    ldls.save(ldls.segment(*scene), path)
+    arrays = dict(np.load(path))
+    arrays["pixels"][3] = row
+    write_npz(path, arrays)
+    with pytest.raises(ldls.CorruptFileError, match=message):
+        ldls.read_result(path)
 
 
 def test_a_missing_array_is_named(scene, tmp_path):

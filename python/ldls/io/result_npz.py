@@ -135,6 +135,7 @@ def _result(arrays: Arrays) -> Segmentation:
 
 
 def _instances(arrays: Arrays, views: tuple[SeenView, ...]) -> tuple[Instance, ...]:
+    _check_objects(arrays)
     names = arrays["object_name"].tolist()
     sources: list[list[tuple[int, int]]] = [[] for _ in names]
     for number, seen in enumerate(views):
@@ -186,6 +187,23 @@ def _camera(parts: dict[str, Any]) -> Camera:
     )
 
 
+def _check_objects(arrays: Arrays) -> None:
+    """Refuse arrays of objects that do not fit one another.
+
+    Raises:
+        InputError: They do not.
+    """
+    names = arrays["object_name"]
+    if names.ndim != 1 or (len(names) and names.dtype.kind != "U"):
+        raise InputError(f"object_name: expected (M,) text, got {names.shape} {names.dtype}")
+    n, most = len(names), np.iinfo(np.int32).max
+    _expect("object_category", arrays["object_category"], np.int32, (n,), 1, most)
+    _expect("object_score", arrays["object_score"], np.float32, (n,), 0, 1)
+    if "object_track" in arrays:
+        _expect("object_track", arrays["object_track"], np.int64, (n,), 0, most)
+        _expect("object_velocity", arrays["object_velocity"], np.float64, (n, 2), -np.inf, np.inf)
+
+
 def _check(result: Segmentation) -> None:
     """Refuse arrays that do not fit one another.
 
@@ -200,6 +218,8 @@ def _check(result: Segmentation) -> None:
     for seen in result.views:
         _expect("in_view of a view", seen.in_view, np.int64, (len(seen.in_view),), 0, n - 1)
         _expect("pixels", seen.pixels, np.float64, (len(seen.in_view), 2), -np.inf, np.inf)
+        for axis, pixels, size in zip("uv", seen.pixels.T, seen.view.masks.image_size[::-1], strict=True):
+            _expect(f"{axis} of pixels", pixels, np.float64, pixels.shape, -0.5, size - 0.5)
         _expect("labels of a view", seen.labels, np.int32, (len(seen.view.masks),), 1, most)
 
 
