@@ -81,6 +81,17 @@ def test_labels_equal_those_of_plain_double_precision(seed, base):
         assert list(result.sources) == own
 
 
+@pytest.mark.parametrize("neighbors", [171, 255])
+def test_no_more_neighbours_are_asked_for_than_the_core_takes(neighbors):
+    most, more = (
+        ldls.segment_sweeps(sweeps_of(3), params=replace(ldls.Params(**PLAIN), neighbors=each))
+        for each in (170, neighbors)
+    )
+    for one, other in zip(most, more, strict=True):
+        np.testing.assert_array_equal(one.labels, other.labels)
+        assert other.params.neighbors == neighbors
+
+
 def test_some_of_these_points_take_pixels_of_another_moment():
     # the oracle above would not see a rule that is never asked for
     lent = 0

@@ -35,6 +35,8 @@ FARTHEST_M = 1e7
 SHARE_OF_NEIGHBORS = 0.5
 """Neighbours that a sweep adds, as a share of those of one alone: of the nearest many are of the same line at other
 times, and only farther ones join lines."""
+MOST_NEIGHBORS = 255
+"""Neighbours of a point that the core takes."""
 
 
 @checked
@@ -84,7 +86,7 @@ def segment_sweeps(
     """Instance labels of the points of a few sweeps in a row, by label diffusion over all of them together.
 
     A point that no image of its own sweep sees has a label too, if an image of another sees its place. With S sweeps
-    the graph has S / 2 times the `neighbors` of the parameters, and at least these.
+    the graph has S / 2 times the `neighbors` of the parameters, at least these and at most 255.
 
     Args:
         sweeps: Some tenths of a second of a drive, in the order of their stamps; five are a good number.
@@ -134,7 +136,7 @@ def label_sweeps(
         for sweep, transform in zip(sweeps, to_here, strict=True)
         for view in sweep.views
     ]
-    neighbors = round(params.neighbors * max(1.0, SHARE_OF_NEIGHBORS * len(sweeps)))
+    neighbors = min(round(params.neighbors * max(1.0, SHARE_OF_NEIGHBORS * len(sweeps))), MOST_NEIGHBORS)
     arrays = diffuse_labels(
         brought_together([sweep.points for sweep in sweeps], to_here, keep_origin=keep_origin),
         views,
