@@ -63,6 +63,10 @@ def test_a_doubtful_label_is_left_out_for_its_doubt():
     changed = np.flatnonzero(doubtful.labels != sure.labels)
     assert len(changed) and (doubtful.labels[changed] == 0).all()
     assert doubtful.abstained[changed].all()
+    # what was background anyway, however doubtful, lost no label
+    removed = (sure.labels == 0) & (sure.diffused_labels > 0)
+    assert not np.any(np.delete(doubtful.abstained & ~removed, changed))
+    assert np.any((doubtful.labels == 0) & (doubtful.diffused_labels == 0) & (doubtful.confidence < 0.9))
     found = ldls.explain(doubtful, int(changed[0]))
     assert found.verdict.endswith("only, less than 90.0 %.")
     assert not found.cleared

@@ -442,6 +442,19 @@ def test_an_overlooked_object_has_its_label_of_the_nearest_moment(together):
                 ldls.explain(result, int(np.argmax(result.labels == 1)))
 
 
+@pytest.mark.parametrize(("abstain", "given"), [(0.8, True), (0.9, False)])
+def test_an_overlooked_object_has_no_label_where_one_must_be_surer(abstain, given):
+    params = replace(PARAMS, calibrated=True, abstain=abstain)
+    tracker = ldls.Tracker()
+    for k in range(ENOUGH_IMAGES + 1):
+        sweep = sweep_at(0.1 * k, [((6, -2), k < ENOUGH_IMAGES), ((6, 2), True)])
+        (result,) = tracker.track([sweep], ldls.segment_sweeps([sweep], params=params))
+    overlooked, shown = result.labels.reshape(-1, 125)
+    assert np.any(shown > 0) and np.any(overlooked > 0) == given
+    assert len(result.instances) == 1 + given
+    assert not np.any(result.abstained & (result.labels > 0))
+
+
 def test_an_object_has_all_of_its_points_after_a_mask_of_a_part_of_it():
     whole, part = (*LEFT, 2, *RIGHT), LEFT
     sweeps = [car_at(k, 0, whole) for k in range(ENOUGH_IMAGES)]

@@ -155,8 +155,12 @@ class Segmentation:
 
     @property
     def abstained(self) -> NDArray[np.bool_]:
-        """(N,) bool: whether a point in view is too doubtful for a label and left at 0 (`Params.abstain`)."""
-        doubtful: NDArray[np.bool_] = (self.labels >= 0) & (self.confidence < self.params.abstain)
+        """(N,) bool: whether a label that diffusion gave is left out, for it is too doubtful (`Params.abstain`).
+
+        Those that outlier removal left out are among them where they are as doubtful.
+        """
+        lost = (self.labels == 0) & (self.diffused_labels > 0)
+        doubtful: NDArray[np.bool_] = lost & (self.confidence < self.params.abstain)
         return doubtful
 
     @cached_property

@@ -65,7 +65,8 @@ class Tracker:
 
         An object that images overlook has points where it was, or went by its velocity, within two seconds of a sweep
         that shows it: if five images did before, or three where the images of the sweep show nothing at all. Confidence
-        there is 0.82, and `diffused_labels` stay; objects without a label among these sweeps are added to the
+        there is 0.82, and where the parameters `abstain` from labels of no more, there are none; `diffused_labels`
+        stay; objects without a label among these sweeps are added to the
         instances. A point around which earlier points are of another object that stands has the label of that. Two
         instances in one place are one object, and so is one of three points or fewer with that on which they lie, or
         near another of so few, by the length of their category: they have one number, and the points of both the label
@@ -99,7 +100,11 @@ class Tracker:
         self._moments = known + moments
         # of points with a label, and of those without
         others = mistaken(moments, known, self._tracks)
-        found = [overlooked(m, self._moments, self._tracks) + other for m, other in zip(moments, others, strict=True)]
+        found = others
+        if results[0].params.abstain <= CONFIDENCE:
+            found = [
+                overlooked(m, self._moments, self._tracks) + other for m, other in zip(moments, others, strict=True)
+            ]
         new = np.unique(np.concatenate([each[each > 0] for each in found]))
         added = self._added(new, of_number, len(results[0].instances))
         tracked = []
