@@ -29,6 +29,7 @@ from ldls.errors import (
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Instance, Report, Segmentation
+from ldls.stages import GROUND_M, ground
 from ldls.view import SeenView, View, camera_names, check_names
 
 COARSEST_STEP_M = 0.01
@@ -40,6 +41,8 @@ EXPECTED_ON_MASKS = 20.0
 ALONG_Z = 0.7
 """Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
 NOT_FINITE = "points: no row is finite; nothing is labelled; are they read as they were written?"
+GROUND_SHARE = 0.2
+"""Share of the points in view that the ground must have to tell where up is."""
 SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
@@ -296,12 +299,17 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
         if report["only_islands"]:
             message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
             yield message, DuplicateWarning
-        named = [pair for each in results for pair in zip(camera_names(each.views), each.views, strict=True)]
-        leaning = dict.fromkeys(name for name, seen in named if _leans(seen))
+        leaning = dict.fromkeys(
+            name
+            for each in results
+            for name, seen in zip(camera_names(each.views), each.views, strict=True)
+            if _leans(seen, each)
+        )
         if leaning:
             message = (
                 f"T_camera_lidar of {', '.join(leaning)}: z of the lidar does not point up in the image; is it the "
-                "inverse, or is the turn to the optical frame missing (x right, y down, z forward)?"
+                "inverse, or is the turn to the optical frame missing (x right, y down, z forward)? If another axis of "
+                "the lidar points up, turn points and T_camera_lidar until z does"
             )
             yield message, UprightWarning
 
@@ -318,13 +326,29 @@ def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning
         yield f"{place}{doubt}", NoUsablePoints if doubt == NOT_FINITE else NothingInView
 
 
-def _leans(seen: SeenView) -> bool:
+def _leans(seen: SeenView, result: Segmentation) -> bool:
     """True if z of the lidar points down or to the side in an image, by over 60 degrees.
 
-    It tells nothing where the camera looks along it: up or down, or in clouds that are in the camera's own frame.
+    Where the camera looks along it, the ground must tell: what a drone sees lies below z, and in other frames below
+    what is up in the image. It is left alone in clouds that are in the camera's own frame, where up is -y.
     """
-    x, y, z = seen.view.camera.T_camera_lidar[:3, 2]
-    return bool(abs(z) < ALONG_Z and -y < 0.5 * np.hypot(x, y))
+    turn = seen.view.camera.T_camera_lidar[:3, :3]
+    x, y, z = turn[:, 2]
+    if abs(z) < ALONG_Z:
+        return bool(-y < 0.5 * np.hypot(x, y))
+    if z > 0 and turn[1, 1] > 0.5:
+        return False
+    points, camera, threads = result.points[seen.in_view, :3], seen.view.camera, result.params.threads
+    of_lidar = _share_of_ground(points, camera, threads)
+    own_frame = transformed(points, camera.T_camera_lidar)
+    of_image = _share_of_ground(own_frame, Camera(projection=np.eye(3)), threads)
+    return of_image > max(GROUND_SHARE, 2 * of_lidar)
+
+
+def _share_of_ground(points: Points, camera: Camera, threads: int | None) -> float:
+    heights = ground(points, camera, threads=threads)
+    low, high = GROUND_M
+    return float(np.mean((heights > low) & (heights < high))) if len(heights) else 0.0
 
 
 def _report(

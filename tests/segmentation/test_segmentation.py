@@ -6,6 +6,7 @@ import sys
 import threading
 import types
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -479,3 +480,55 @@ def test_a_lidar_that_does_not_stand_upright_in_the_image_is_doubted(turn, doubt
     said = [str(one.message) for one in caught if one.category is UprightWarning]
     assert bool(said) == doubtful
     assert all("z of the lidar does not point up in the image" in text for text in said)
+
+
+def street_below(height_m):
+    """A street with a kerb, walls and boxes on it, seen by a lidar `height_m` above: (N, 3), z up."""
+    generator = np.random.default_rng(4)
+    road = generator.uniform([2, -12, 0], [40, 12, 0.02], (4000, 3))
+    walls = generator.uniform([2, -12, 0], [40, 12, 5], (2000, 3))
+    walls[:, 1] = np.sign(walls[:, 1]) * 12
+    boxes = generator.uniform([-1, -1, 0], [1, 1, 1.6], (1500, 3)) + generator.choice(
+        [[9, -5, 0], [14, 4, 0], [22, 0, 0]], 1500
+    )
+    return np.vstack([road, walls, boxes]) - [0, 0, height_m]
+
+
+AHEAD = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
+DOWN = np.array([[0, -1, 0], [-1, 0, 0], [0, 0, -1]])
+
+
+@pytest.mark.parametrize(
+    ("other_axes", "camera_axes", "height_m", "doubtful"),
+    [
+        pytest.param(np.eye(3), AHEAD, 1.7, False, id="z up"),
+        pytest.param(AHEAD, AHEAD, 1.7, False, id="the camera's"),
+        pytest.param([[0, -1, 0], [0, 0, 1], [-1, 0, 0]], AHEAD, 1.7, True, id="OpenGL's: y up, z back"),
+        pytest.param([[0, 1, 0], [0, 0, 1], [1, 0, 0]], AHEAD, 1.7, True, id="y up, z ahead"),
+        pytest.param([[1, 0, 0], [0, 0, 1], [0, -1, 0]], AHEAD, 1.7, True, id="y up, x ahead"),
+        pytest.param(np.eye(3), DOWN, 20, False, id="a drone that looks straight down"),
+    ],
+)
+def test_axes_of_which_z_is_not_up_are_doubted(other_axes, camera_axes, height_m, doubtful):
+    other_axes, transform = np.array(other_axes, float), np.eye(4)
+    transform[:3, :3] = camera_axes @ other_axes.T
+    camera = pinhole(60.0, (160.0, 120.0), T_camera_lidar=transform)
+    masks = ldls.InstanceMasks.from_boxes([[1, 1, 319, 239]], (240, 320))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ldls.segment(street_below(height_m) @ other_axes.T, masks, camera)
+    assert any(one.category is UprightWarning for one in caught) == doubtful
+
+
+@pytest.mark.parametrize("name", ["OpenGL's", "the camera's", "the lidar's"])
+def test_real_frames_in_other_axes_are_doubted_where_z_is_not_up(kitti_frame, name):
+    turn = np.eye(4)
+    turn[:3, :3] = {"OpenGL's": [[0, -1, 0], [0, 0, 1], [-1, 0, 0]], "the camera's": AHEAD, "the lidar's": np.eye(3)}[
+        name
+    ]
+    camera = replace(kitti_frame.camera, T_camera_lidar=kitti_frame.camera.T_camera_lidar @ turn.T)
+    points = kitti_frame.points[:, :3] @ turn[:3, :3].T.astype(np.float32)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ldls.segment(points, kitti_frame.masks, camera)
+    assert any(one.category is UprightWarning for one in caught) == (name == "OpenGL's")
