@@ -78,3 +78,24 @@ def test_points_that_two_cameras_see_have_one_answer(ring):
         assert len({camera for camera, _ in instance.sources}) == len(instance.sources)
         categories = {int(views[camera].masks.categories[mask]) for camera, mask in instance.sources}
         assert categories == {instance.category}
+
+
+@pytest.mark.parametrize(
+    ("params", "order", "most"),
+    [
+        pytest.param(ldls.Params.paper(), [5, 4, 3, 2, 1, 0], 0, id="the paper's method"),
+        pytest.param(ldls.Params(), [0, 5, 4, 3, 2, 1], 0, id="the same camera first"),
+        pytest.param(ldls.Params(), [4, 0, 1, 2, 3, 5], 40, id="another camera first"),
+    ],
+)
+def test_no_camera_but_the_first_has_a_place_that_matters(ring, params, order, most):
+    points, views, _ = ring
+    as_given = objects_of(ldls.segment(points, views, params=params))
+    ordered = objects_of(ldls.segment(points, [views[at] for at in order], params=params))
+    assert sum(one != other for one, other in zip(as_given, ordered, strict=True)) <= most
+
+
+def objects_of(result):
+    """What each point is of: the masks of its object by camera, whatever its label."""
+    masks = [frozenset((result.views[view].view.name, mask) for view, mask in each) for each in result.sources]
+    return [frozenset() if label < 1 else masks[label - 1] for label in result.labels.tolist()]
