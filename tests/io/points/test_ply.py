@@ -132,6 +132,12 @@ def test_a_file_of_results_reads_back(small_scene, tmp_path):
             id="fewer before another element, binary",
         ),
         pytest.param(
+            header("binary_little_endian", 2, after=("element face 0", FACES[1])) + ROWS.tobytes(),
+            ldls.CorruptFileError,
+            "need 32 bytes after it, the file has 48",
+            id="fewer before no faces, binary",
+        ),
+        pytest.param(
             header("ascii", 2) + b"1 2 3 4\n5 6 7 8 9\n",
             ldls.CorruptFileError,
             "line 11: expected 4 cells, got 5: '5 6 7 8 9'",

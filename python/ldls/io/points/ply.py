@@ -98,7 +98,7 @@ def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
 
 def _refuse_more(header: Header, body: bytes, needed: int) -> None:
     """Refuse a binary body with room for a further vertex behind what the header says, save white space."""
-    if any(element.list_properties for element in header.after):
+    if any(element.count and element.list_properties for element in header.after):
         return  # nobody knows how long lists are but who walks through them all
     order = BYTE_ORDERS[header.encoding]
     end = needed + sum(element.count * element.dtype(order).itemsize for element in header.after)
