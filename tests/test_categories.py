@@ -1,6 +1,6 @@
 import pytest
 
-from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids
+from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids, class_id
 from ldls.errors import ParameterError
 
 
@@ -24,6 +24,23 @@ def test_category_ids_of_classes(names, expected):
 
 def test_own_ids_never_meet_those_of_coco():
     assert not set(category_ids({i: f"thing {i}" for i in range(200)})[0].values()) & set(COCO_NAMES)
+
+
+@pytest.mark.parametrize(
+    ("classes", "expected"),
+    [
+        pytest.param([(3, "car"), (1, "person"), (3, "car")], [3, 1, 3], id="one numbering"),
+        pytest.param([(1, "car"), (2, "Car ")], [1, 1], id="one name of two numbers"),
+        pytest.param([(100, "cone"), (100, "sign"), (101, "cone")], [100, 101, 100], id="two names of one number"),
+        pytest.param([(100, "cone"), (100, "sign"), (101, "drum")], [100, 101, 102], id="a number that was given"),
+        pytest.param([(2**31 - 1, "cone"), (2**31 - 1, "sign")], [2**31 - 1, 100], id="the greatest number"),
+    ],
+)
+def test_a_class_has_one_id_whatever_each_table_calls_it(classes, expected):
+    known = {}
+    assert [class_id(category, name, known) for category, name in classes] == expected
+    assert set(known) == set(expected)
+    assert [class_id(category, name, known) for category, name in classes] == expected
 
 
 def test_negative_class():

@@ -21,11 +21,11 @@ def camera(left):
     return ldls.Camera(projection=[[20, 0, left], [0, 20, 15], [0, 0, 1]], image_size=(30, 40))
 
 
-def masks(*rectangles, category=3, scores=None):
+def masks(*rectangles, category=3, scores=None, names=None):
     pixels = np.zeros((len(rectangles), 30, 40), bool)
     for mask, (top, left, height, width) in zip(pixels, rectangles, strict=True):
         mask[top : top + height, left : left + width] = True
-    return ldls.InstanceMasks.from_array(pixels, categories=[category] * len(rectangles), scores=scores)
+    return ldls.InstanceMasks.from_array(pixels, categories=[category] * len(rectangles), scores=scores, names=names)
 
 
 def two_views():
@@ -62,6 +62,26 @@ def test_categories_and_a_strict_bound_keep_instances_apart():
     assert len(ldls.segment(WALL, [left, shifted], same_object=0.9).instances) == 3
     assert len(ldls.segment(WALL, [left, shifted], same_object=0.2).instances) == 2
     assert right.name == ""
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "found"),
+    [
+        pytest.param({100: "forklift"}, {100: "pallet"}, [(100, "forklift"), (101, "pallet")], id="two names, one id"),
+        pytest.param({1: "car"}, {2: "Car"}, [(1, "car")], id="one name, two ids"),
+        pytest.param({100: "forklift"}, {100: "forklift", 3: "car"}, [(100, "forklift")], id="one name, one id"),
+    ],
+)
+def test_instances_of_views_that_number_in_their_own_way_are_joined_by_name(left, right, found):
+    views = [
+        ldls.View(masks((5, 24, 12, 10), category=next(iter(left)), names=left), camera(40)),
+        ldls.View(masks((5, 4, 12, 10), category=next(iter(right)), names=right), camera(20)),
+    ]
+    result = segment(views)
+    assert [(instance.category, instance.name) for instance in result.instances] == found
+    assert [seen.view.masks for seen in result.views] == [view.masks for view in views]
+    backward = segment(views[::-1])
+    assert [instance.name.lower() for instance in backward.instances] == [name for _, name in found[::-1]]
 
 
 def test_the_order_of_cameras_does_not_matter_but_for_names_of_labels():

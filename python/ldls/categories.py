@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from itertools import count
 
 from ldls.errors import ParameterError
 
@@ -73,6 +74,28 @@ def category_ids(names: Mapping[int, str]) -> tuple[dict[int, int], dict[int, st
         raise ParameterError(f"names: class {wrong[0]} is negative, expected 0 or more")
     ids = {index: _COCO_IDS.get(folded(name), FIRST_OTHER_ID + index) for index, name in names.items()}
     return ids, {ids[index]: COCO_NAMES.get(ids[index], name) for index, name in names.items()}
+
+
+def class_id(category: int, name: str, known: dict[int, str]) -> int:
+    """Id of a class among those of several tables of names, which may each number in its own way.
+
+    A class goes by its name, folded. It has the id that it has in `known`, or its own, or, where another class has
+    that, the first from 100 that is free; `known`, to which it is added, then holds every class once.
+
+    Args:
+        category: Its own id.
+        name: Its name.
+        known: Name of each id so far.
+    """
+    own = folded(name)
+    if category in known and folded(known[category]) == own:
+        return category
+    found = next((each for each, held in known.items() if folded(held) == own), category)
+    if folded(known.setdefault(found, name)) == own:
+        return found
+    free = next(each for each in count(FIRST_OTHER_ID) if each not in known)
+    known[free] = name
+    return free
 
 
 def synonyms(name: str) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Instance, Report, Segmentation
 from ldls.stages import GROUND_M, ground
-from ldls.view import SeenView, View, camera_names, check_names
+from ldls.view import SeenView, View, camera_names, check_names, common_categories
 
 COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
@@ -74,7 +74,8 @@ def segment(
         keep_origin: Points at exactly (0, 0, 0) are missing returns to most sensors and left out; keep them if yours
             means them.
         same_object: Two instances of one category in two images become one label if, of the points that both
-            cameras see and that fall on either mask, at least this share falls on both; 0 to 1.
+            cameras see and that fall on either mask, at least this share falls on both; 0 to 1. Where views have
+            different names, a category goes by its name, and instances have the id that the first view gave it.
 
     Returns:
         Labels, confidences and objects, in the order of `points`. Equal bit for bit for any number of threads.
@@ -133,7 +134,7 @@ def diffuse_labels(
     return _ldls.segment(
         cloud,
         [view.masks.core for view in views],
-        [view.masks.categories.tolist() for view in views],
+        common_categories(views)[0],
         [view.masks.scores.tolist() for view in views],
         [view.camera.core for view in views],
         rows,
@@ -156,7 +157,9 @@ def result_of(
     start, end = rows or (0, len(points))
     own = range(len(views)) if own is None else own
     numbered = enumerate(arrays.objects, start=1)
-    instances = tuple(_instance(label, parts, views, own) for label, parts in numbered)
+    categories, names = common_categories(views)
+    scores = [view.masks.scores.tolist() for view in views]
+    instances = tuple(_instance(label, parts, categories, names, scores, own) for label, parts in numbered)
     sightings = [arrays.sightings[number] for number in own]
     in_view = arrays.in_view
     if rows is not None:
@@ -224,22 +227,26 @@ def _expected_on_masks(views: Sequence[SeenView]) -> float:
     return sum(len(seen.in_view) * area / (seen.view.masks.height * seen.view.masks.width) for seen, area in areas)
 
 
-def _instance(label: int, parts: Sequence[tuple[int, int]], views: Sequence[View], own: range) -> Instance:
+def _instance(
+    label: int,
+    parts: Sequence[tuple[int, int]],
+    categories: Sequence[Sequence[int]],
+    names: Mapping[int, str],
+    scores: Sequence[Sequence[float]],
+    own: range,
+) -> Instance:
     """Return the instance that the core's parts, numbers of a view and of a mask from 1, are one object of."""
-    scores = [float(views[number].masks.scores[mask - 1]) for number, mask in parts]
     # of several moments they may be of several categories; that counts which the segmenter is the surest of
-    sums: dict[tuple[int, str], float] = {}
-    for (number, mask), score in zip(parts, scores, strict=True):
-        masks = views[number].masks
-        category = int(masks.categories[mask - 1])
-        named = category, masks.names[category]
-        sums[named] = sums.get(named, 0.0) + score
-    category, name = max(sums, key=sums.__getitem__)
+    sums: dict[int, float] = {}
+    for number, mask in parts:
+        category = categories[number][mask - 1]
+        sums[category] = sums.get(category, 0.0) + scores[number][mask - 1]
+    category = max(sums, key=sums.__getitem__)
     return Instance(
         label=label,
         category=category,
-        name=name,
-        score=max(scores),
+        name=names[category],
+        score=max(scores[number][mask - 1] for number, mask in parts),
         sources=tuple((number - own.start, mask - 1) for number, mask in parts if number in own),
     )
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.categories import class_id
 from ldls.checks import checked
 from ldls.errors import InputError, MaskError
 from ldls.masks import InstanceMasks
@@ -57,6 +58,23 @@ class SeenView:
     in_view: NDArray[np.int64]
     pixels: NDArray[np.float64]
     labels: NDArray[np.int32]
+
+
+def common_categories(views: Sequence[View]) -> tuple[list[list[int]], Mapping[int, str]]:
+    """Category id of each mask of each view, and the name of each id.
+
+    They are those of the masks, except that a class has one id in all views whose masks do not have the same names.
+    """
+    own = [view.masks.categories.tolist() for view in views]
+    tables = [view.masks.names for view in views]
+    if all(table == tables[0] for table in tables):
+        return own, tables[0] if tables else {}
+    known: dict[int, str] = {}
+    common = []
+    for categories, table in zip(own, tables, strict=True):
+        ids = {each: class_id(each, table[each], known) for each in dict.fromkeys(categories)}
+        common.append([ids[each] for each in categories])
+    return common, known
 
 
 def camera_names(views: Sequence[SeenView]) -> tuple[str, ...]:

@@ -138,6 +138,26 @@ def test_an_object_has_the_category_that_most_of_its_masks_have():
         assert sorted(seen) == [0, 1, 2, 3]
 
 
+def test_sweeps_whose_masks_are_numbered_each_in_its_own_way_are_as_by_one_numbering():
+    sweeps = [replace(sweep, pose=np.eye(4)) for sweep in sweeps_of(1)]
+
+    def named(tables):
+        for sweep, table in zip(sweeps, tables, strict=True):
+            (view,) = sweep.views
+            ids = {name: category for category, name in table.items()}
+            categories = [ids["car"], *[ids["cone"]] * (len(view.masks) - 1)]
+            masks = replace_categories(view.masks, categories, table)
+            yield replace(sweep, views=[ldls.View(masks, view.camera)])
+
+    one, other = {100: "car", 101: "cone"}, {100: "cone", 101: "car"}
+    params = replace(ldls.Params.paper(), **PLAIN)
+    expected = ldls.segment_sweeps([*named([one, one, one])], params=params)
+    results = ldls.segment_sweeps([*named([one, other, one])], params=params)
+    for result, alike in zip(results, expected, strict=True):
+        assert result.instances == alike.instances
+        np.testing.assert_array_equal(result.labels, alike.labels)
+
+
 def replace_categories(masks, categories, names):
     return ldls.InstanceMasks.from_array(masks.to_array(), categories=categories, names=names)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import ldls._ldls as _ldls
-from ldls.categories import FIRST_OTHER_ID, folded
+from ldls.categories import class_id
 from ldls.checks import checked
 from ldls.errors import UnsupportedFormatError
 from ldls.io.files import whole_file
@@ -130,22 +130,8 @@ def _annotations(
         for row in each.rows:
             number += 1
             rounded = {name: _rounded(value) for name, value in row.items()}
-            rounded["category"] = _category(row, names)
+            rounded["category"] = class_id(row["category"], row["name"], names)
             yield _annotation(number, each.frame, ids.get(row["camera"]), rounded)
-
-
-def _category(row: Row, names: dict[int, str]) -> int:
-    """Id of a row's class in the table; adds it to `names`.
-
-    It is the row's own, unless masks of another frame gave the class another, or another class that id.
-    """
-    own = folded(row["name"])
-    category: int = next((known for known, name in names.items() if folded(name) == own), row["category"])
-    if folded(names.setdefault(category, row["name"])) == own:
-        return category
-    category = max(FIRST_OTHER_ID, *(known + 1 for known in names))
-    names[category] = row["name"]
-    return category
 
 
 def _annotation(number: int, frame: str, image: int | None, row: Row) -> dict[str, Any]:
