@@ -22,7 +22,7 @@ def box_of_points(x, y, *, size=0.6):
     return np.stack(np.meshgrid(x + steps, y + steps, steps), axis=-1).reshape(-1, 3)
 
 
-def sweep_at(stamp, objects, *, order=None, pose=None, category=1):
+def sweep_at(stamp, objects, *, order=None, pose=None, category=1, names=None):
     """A sweep of objects at (x, y) in the world, its masks in any order; None is one that the segmenter misses."""
     pose = np.eye(4) if pose is None else pose
     back = np.linalg.inv(pose)
@@ -36,7 +36,8 @@ def sweep_at(stamp, objects, *, order=None, pose=None, category=1):
             mask[top:bottom, left:right] = True
             pixels.append(mask)
     pixels = [pixels[number] for number in order or range(len(pixels))]
-    masks = ldls.InstanceMasks.from_array(np.array(pixels).reshape(-1, 480, 640), categories=[category] * len(pixels))
+    pixels = np.array(pixels).reshape(-1, 480, 640)
+    masks = ldls.InstanceMasks.from_array(pixels, categories=[category] * len(pixels), names=names)
     return ldls.Sweep(np.concatenate(clouds), [ldls.View(masks, WIDE)], pose, stamp)
 
 
@@ -400,6 +401,19 @@ def test_a_number_is_given_once_and_not_across_categories_or_long_gaps():
     stamps_and_categories = [(0.0, 1), (0.1, 3), (0.2, 1), (10.1, 1), (20.3, 1)]
     rows = [tracks_of(tracker, [sweep_at(stamp, place, category=kind)]) for stamp, kind in stamps_and_categories]
     assert rows == [[[1]], [[2]], [[1]], [[1]], [[3]]]
+
+
+def test_an_object_goes_by_the_name_of_its_class_where_masks_number_each_in_their_own_way():
+    place = [((6, 0), True)]
+    named = [(100, "cone"), (101, "Cone"), (100, "barrel"), (100, "cone")]
+    sweeps = [sweep_at(0.1 * k, place, category=one, names={one: name}) for k, (one, name) in enumerate(named)]
+    assert tracks_of(ldls.Tracker(), sweeps) == [[1], [1], [2], [1]]
+    tracker, stream = ldls.Tracker(), ldls.LabelDiffusion(params=PARAMS, before=0)
+    for sweep, known in zip(sweeps, [(100, "cone"), (100, "cone"), (101, "barrel"), (100, "cone")], strict=True):
+        (result,) = tracker.track([sweep], ldls.segment_sweeps([sweep], params=PARAMS))
+        streamed = stream.segment(sweep.points, sweep.views, pose=sweep.pose, stamp=sweep.stamp)
+        for (instance,) in (result.instances, streamed.instances):
+            assert (instance.category, instance.name) == known
 
 
 def test_sweeps_of_a_call_may_be_farther_apart_than_tracks_live():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.categories import class_id
 from ldls.checks import as_array, checked, shown
 from ldls.cloud import Points
 from ldls.errors import DtypeError, InputError, ShapeError
@@ -228,3 +229,13 @@ class Segmentation:
             f"Segmentation({len(self.labels)} points, {len(self.in_view)} in view, "
             f"{n_found} of {len(self.instances)} objects found)"
         )
+
+
+def by_name(result: Segmentation, known: dict[int, str]) -> Segmentation:
+    """The result as one of several, in all of which a class has one id and one spelling; adds its own to `known`."""
+    ids = [class_id(each.category, each.name, known) for each in result.instances]
+    named = [(own, known[own]) for own in ids]
+    if named == [(each.category, each.name) for each in result.instances]:
+        return result
+    pairs = zip(result.instances, named, strict=True)
+    return replace(result, instances=tuple(replace(each, category=own, name=name) for each, (own, name) in pairs))

@@ -20,6 +20,7 @@ from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
+from ldls.segmentation.segmentation import by_name
 from ldls.sequences.comparison import compared
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
@@ -57,6 +58,7 @@ class Tracker:
         self._tracks: list[Track] = []
         self._moments: list[Moment] = []
         self._count = 0
+        self._names: dict[int, str] = {}
         self._stamp = -np.inf
 
     @checked
@@ -70,7 +72,7 @@ class Tracker:
         instances. A point around which earlier points are of another object that stands has the label of that. Two
         instances in one place are one object, and so is one of three points or fewer with that on which they lie, or
         near another of so few, by the length of their category: they have one number, and the points of both the label
-        of the first.
+        of the first. A category goes by its name: instances have the id that it had first in the drive.
 
         Args:
             sweeps: The next sweeps of the drive, in the order of their stamps.
@@ -89,6 +91,7 @@ class Tracker:
         for sweep, result in zip(sweeps, results, strict=True):
             check_points(sweep, result)
         self._stamp = sweeps[-1].stamp
+        results = [by_name(result, self._names) for result in results]
         instances = {instance.label: instance for instance in results[0].instances}
         seen = [_sightings(sweep, result) for sweep, result in zip(sweeps, results, strict=True)]
         by_label = self._advanced(instances, [sweep.stamp for sweep in sweeps], seen)
