@@ -34,6 +34,16 @@ def test_a_file_has_one_context_a_place_and_it_has_all_names(results, tmp_path) 
     assert {name for name, _ in rrd.names("world").values()} >= {"person", "car", "dog", "car 2", "dog 2"}
 
 
+def test_frames_that_number_classes_each_in_their_own_way_have_their_names(small_scene, tmp_path) -> None:
+    points, masks, camera = small_scene
+    with open_recording(tmp_path / "a.rrd") as recording:
+        for names in ({100: "cone", 101: "sign"}, {100: "drum", 101: "cone"}):
+            named = ldls.InstanceMasks.from_array(masks.to_array(), categories=[100, 101], names=names)
+            recording.add(ldls.segment(points, named, camera))
+    names = Recorded(tmp_path / "a.rrd").names("world")
+    assert [names[category, None][0] for category in (100, 101, 102)] == ["cone", "sign", "drum"]
+
+
 def test_a_stream_has_contexts_at_their_times(results, tmp_path) -> None:
     stream = rr.RecordingStream("test")
     stream.save(tmp_path / "a.rrd")

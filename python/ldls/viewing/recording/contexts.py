@@ -17,6 +17,7 @@ from ldls.errors import LimitError
 from ldls.labeling import Labeling
 from ldls.palette import BACKGROUND, Colour, as_tuples, category_colour, label_colours
 from ldls.segmentation import Segmentation
+from ldls.segmentation.segmentation import by_name
 from ldls.viewing.recording.stream import Entity, rerun
 
 OUT_OF_VIEW_COLOUR: Colour = (64, 64, 64)
@@ -35,13 +36,15 @@ class Names:
         # number on mask images, and name of the category
         self._named: dict[tuple[int, int, Colour], tuple[int, str]] = {}
         self._logged: dict[str, int] = {}
+        self._classes: dict[int, str] = {}
 
-    def add(self, result: Segmentation) -> None:
-        """Name the categories and instances of a result.
+    def add(self, result: Segmentation) -> Segmentation:
+        """Name the categories and instances of a result; it comes back with the ids that its classes have here.
 
         Raises:
             LimitError: A category, a label or a track is beyond Rerun's ids, or there are more instances than ids.
         """
+        result = by_name(result, self._classes)
         for instance, own in zip(result.instances, result.instance_ids[1:].tolist(), strict=True):
             for kind, number in (("category", instance.category), ("track" if instance.track else "label", own)):
                 if not 0 <= number <= GREATEST_ID:
@@ -56,6 +59,7 @@ class Names:
                 if number > GREATEST_ID:
                     raise LimitError(f"masks: one recording names at most {GREATEST_ID} instances; begin another")
                 self._named[key] = number, instance.name
+        return result
 
     def mask_ids(self, result: Segmentation) -> NDArray[np.uint16]:
         """(M + 1,) class id of the masks of each label of a result that was added, 0 for 0.

@@ -30,7 +30,7 @@ def log_diffusion(root: Entity, names: Names, result: Segmentation, every: int) 
         raise ParameterError(f"every: got {every}, expected at least 1")
     rr = rerun()
     require("scipy.sparse", "viz")
-    names.add(result)
+    result = names.add(result)
     root.log(rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     names.log(root, names.of_points)
     points, stream = root / "points", root.stream.rerun

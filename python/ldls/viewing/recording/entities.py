@@ -44,7 +44,7 @@ def log_result(
     for name in images:
         if name not in cameras:
             raise InputError(f"images: there is no camera {name!r}, expected {', '.join(cameras)}")
-    names.add(result)
+    result = names.add(result)
     root.log(rerun().ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     names.log(root, names.of_points)
     finite, seen_by_any = finite_rows(result.points), result.in_view
