@@ -67,6 +67,29 @@ def test_shapes_of_labelme(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("labels", "names", "found"),
+    [
+        pytest.param(
+            ["box", "forklift", "pallet"],
+            {100: "forklift", 101: "pallet"},
+            [(102, "box"), (100, "forklift"), (101, "pallet")],
+            id="of others",
+        ),
+        pytest.param(["car", "truck"], {3: "truck"}, [(100, "car"), (3, "truck")], id="COCO's id of another"),
+        pytest.param(["car", "cart"], {7: "Wagon"}, [(3, "car"), (101, "cart")], id="no label of the file"),
+        pytest.param(["tin", "box"], {100: "car"}, [(102, "tin"), (101, "box")], id="the next free ones"),
+    ],
+)
+def test_labels_keep_off_the_ids_of_names(tmp_path, labels, names, found):
+    corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
+    content = {"shapes": [{"label": label, "points": corners} for label in labels]}
+    (tmp_path / "a.json").write_text(json.dumps(content | {"imageHeight": 60, "imageWidth": 80}))
+    masks = ldls.read_masks(tmp_path / "a.json", names=names)
+    assert sorted((mask.category, mask.name) for mask in masks) == sorted(found)
+    assert [mask.name for mask in masks] == labels and names.items() <= masks.names.items()
+
+
+@pytest.mark.parametrize(
     ("size", "thing", "surface", "name"),
     [
         pytest.param({"imgHeight": 60, "imgWidth": 80}, "car", "road", "car", id="Cityscapes"),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
-from ldls.categories import COCO_NAMES, category_ids, folded
+from ldls.categories import COCO_NAMES, category_ids, class_id, folded
 from ldls.errors import CorruptFileError, MaskError, within
 from ldls.masks.pixels import checked_size
 
@@ -30,7 +30,8 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
     """Arguments of `InstanceMasks` from labelme's JSON of one image.
 
     Shapes of one label that share a group_id are parts of one instance. Labels with the name of one of COCO's
-    categories, or of `names`, get its id; others 100 and their place in the alphabet.
+    categories, or of `names`, get its id; others 100 and their place in the alphabet, or another that `names` do not
+    have.
 
     Args:
         content: The parsed JSON.
@@ -94,12 +95,13 @@ def _arguments(
     spelled = {folded(label): label for label in sorted(labels, reverse=True) if folded(label) not in given}
     others = sorted(spelled.values())
     ids, own = category_ids(dict(enumerate(others)))
-    of_label = {folded(label): ids[index] for index, label in enumerate(others)} | given
+    known = dict(names or {})
+    of_label = given | {folded(own[each]): class_id(each, own[each], known) for each in ids.values()}
     return {
         "rles": [_ldls.Rle.from_polygons(*size, each) for each in polygons],
         "image_size": size,
         "categories": np.array([of_label[folded(label)] for label in labels], np.int64),
-        "names": COCO_NAMES | own | dict(names or {}),
+        "names": COCO_NAMES | known,
     }
 
 

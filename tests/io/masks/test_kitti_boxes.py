@@ -86,3 +86,10 @@ def test_classes_of_ones_own_get_ids(tmp_path):
     assert (masks[0].category, masks[0].name) == (104, "Crane")
     masks = boxes(tmp_path, f"crane 0 0 0 0 0 5 5 {REST}", image_size=(6, 10), names={104: "Crane"})
     assert (masks[0].category, masks[0].name) == (104, "Crane")
+
+
+def test_classes_of_kitti_keep_off_the_ids_of_ones_own(tmp_path):
+    lines = "".join(f"{name} 0 0 0 0 0 5 5 {REST}\n" for name in ("Van", "Car", "Cyclist"))
+    masks = boxes(tmp_path, lines, image_size=(6, 10), names={101: "Crane", 3: "Lorry", 7: "Cyclist"})
+    assert [(mask.category, mask.name) for mask in masks] == [(103, "Van"), (100, "car"), (7, "Cyclist")]
+    assert masks.names[101] == "Crane" and masks.names[3] == "Lorry"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 
-from ldls.categories import COCO_NAMES, folded
+from ldls.categories import COCO_NAMES, class_id, folded
 from ldls.errors import MaskError, within
 from ldls.io.labels.kitti_objects import KittiObject, read_kitti_objects
 from ldls.masks import InstanceMasks
@@ -49,10 +49,12 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
         FileFormatError: The file is broken; see `read_kitti_objects`.
     """
     objects = [each for each in read_kitti_objects(path) if not each.is_region]
-    all_names = KITTI_NAMES | dict(names or {})
-    ids = {name: category for category, name in all_names.items()} | KITTI_CATEGORIES
+    known = dict(names or {})
+    of_kitti = {name: class_id(category, KITTI_NAMES[category], known) for name, category in KITTI_CATEGORIES.items()}
+    all_names = COCO_NAMES | known
     # a blank separates fields, so names are written without
-    ids = {folded(name).replace(" ", "_"): category for name, category in ids.items()}
+    ids = {folded(name).replace(" ", "_"): category for category, name in all_names.items()}
+    ids = {folded(name): category for name, category in of_kitti.items()} | ids
     with within(path):
         return KittiBoxes(
             boxes=[each.bbox for each in objects],
