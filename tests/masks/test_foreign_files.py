@@ -66,6 +66,19 @@ def test_shapes_of_labelme(tmp_path):
         ldls.read_masks(tmp_path / "a.json")
 
 
+def test_what_labelme_calls_no_object_is_none(tmp_path):
+    corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
+    line = {"label": "__ignore__", "points": corners[:2], "shape_type": "line"}
+    shapes = [{"label": label, "points": corners} for label in ("__ignore__", "car", "_Background_")]
+    content = {"shapes": [*shapes, line], "imageHeight": 60, "imageWidth": 80}
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    masks = ldls.read_masks(tmp_path / "a.json")
+    assert [mask.name for mask in masks] == ["car"] and "__ignore__" not in masks.names.values()
+    with pytest.raises(ldls.MaskError, match="shape 1: line of 2 points"):
+        (tmp_path / "a.json").write_text(json.dumps(content | {"shapes": [shapes[0], line | {"label": "car"}]}))
+        ldls.read_masks(tmp_path / "a.json")
+
+
 @pytest.mark.parametrize(
     ("labels", "names", "found"),
     [
@@ -199,7 +212,7 @@ def test_files_of_others_are_read(data_folder, name, options, names):
     found = [masks.names[each] for each in masks.categories.tolist()]
     if name == "labelme.json":
         shapes = json.loads((data_folder / "real/masks" / name).read_text())["shapes"]
-        assert found == [shape["label"] for shape in shapes] and len(masks) > 0
+        assert found == [shape["label"] for shape in shapes if shape["label"] != "__ignore__"] and len(masks) == 4
     elif name.startswith("defaultcity"):
         assert found == ["truck", "truck"]
     else:
