@@ -49,6 +49,10 @@ SYNONYMS: tuple[tuple[str, ...], ...] = (
 """Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes; the usual one of several first."""
 
 
+NO_OBJECTS = frozenset(("background", "_background_", "__background__", "__ignore__"))
+"""What results, labelme and networks call what is no object, folded."""
+
+
 def folded(name: str) -> str:
     """What names of classes are compared by: `name` without capitals and outer blanks."""
     return name.strip().lower()
@@ -74,6 +78,11 @@ def category_ids(names: Mapping[int, str]) -> tuple[dict[int, int], dict[int, st
         raise ParameterError(f"names: class {wrong[0]} is negative, expected 0 or more")
     ids = {index: _COCO_IDS.get(folded(name), FIRST_OTHER_ID + index) for index, name in names.items()}
     return ids, {ids[index]: COCO_NAMES.get(ids[index], name) for index, name in names.items()}
+
+
+def is_object(name: str) -> bool:
+    """True for a class of objects; False for `NO_OBJECTS`."""
+    return folded(name) not in NO_OBJECTS
 
 
 def class_id(category: int, name: str, known: dict[int, str]) -> int:

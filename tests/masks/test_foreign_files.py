@@ -29,6 +29,12 @@ def test_polygons_of_yolo(tmp_path):
     assert own.categories.tolist() == [1, 100] and own.names[100] == "forklift"
 
 
+def test_a_class_of_yolo_that_is_named_background_has_no_objects(tmp_path):
+    (tmp_path / "a.txt").write_text(f"0 {YOLO}\n1 {YOLO} 0.75\n")
+    masks = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80), names={0: "background", 1: "Car"})
+    assert [(mask.name, mask.score) for mask in masks] == [("car", 0.75)]
+
+
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
@@ -69,7 +75,7 @@ def test_shapes_of_labelme(tmp_path):
 def test_what_labelme_calls_no_object_is_none(tmp_path):
     corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
     line = {"label": "__ignore__", "points": corners[:2], "shape_type": "line"}
-    shapes = [{"label": label, "points": corners} for label in ("__ignore__", "car", "_Background_")]
+    shapes = [{"label": label, "points": corners} for label in ("__ignore__", "car", "_Background_", "background")]
     content = {"shapes": [*shapes, line], "imageHeight": 60, "imageWidth": 80}
     (tmp_path / "a.json").write_text(json.dumps(content))
     masks = ldls.read_masks(tmp_path / "a.json")
@@ -160,13 +166,22 @@ def test_a_folder_of_one_png_an_instance(tmp_path):
 def test_coco_panoptic(tmp_path, folder):
     colours = np.zeros((60, 80, 3), np.uint8)
     colours[SQUARE], colours[~SQUARE] = [44, 1, 2], [9, 0, 0]
+    colours[0, 0] = [10, 0, 0]
     (tmp_path / folder).mkdir(exist_ok=True)
     Image.fromarray(colours).save(tmp_path / folder / "a.png")
-    segments = [{"id": 44 + 256 + 2 * 65536, "category_id": 3}, {"id": 9, "category_id": 7}]
+    segments = [
+        {"id": 44 + 256 + 2 * 65536, "category_id": 3},
+        {"id": 9, "category_id": 7},
+        {"id": 10, "category_id": 8},
+    ]
     content = {
         "images": [{"id": 5, "height": 60, "width": 80, "file_name": "a.jpg"}],
         "annotations": [{"image_id": 5, "file_name": "a.png", "segments_info": segments}],
-        "categories": [{"id": 3, "name": "car", "isthing": 1}, {"id": 7, "name": "road", "isthing": 0}],
+        "categories": [
+            {"id": 3, "name": "car", "isthing": 1},
+            {"id": 7, "name": "road", "isthing": 0},
+            {"id": 8, "name": "background", "isthing": 1},
+        ],
     }
     (tmp_path / "panoptic.json").write_text(json.dumps(content))
     masks = ldls.read_masks(tmp_path / "panoptic.json")

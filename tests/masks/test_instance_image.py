@@ -45,6 +45,12 @@ def test_numbers_need_not_be_small_or_dense():
     np.testing.assert_array_equal(masks.to_array(), [image == 70_000, image == 2**40, image == 2**63])
 
 
+def test_values_of_a_class_that_is_named_background_are_no_masks():
+    values = np.array([[1 * 256 + 1, 2 * 256 + 1, 0]], np.uint16)
+    masks = ldls.InstanceMasks.from_instance_image(values, class_divisor=256, names={1: "background", 2: "car"})
+    assert [mask.name for mask in masks] == ["car"]
+
+
 def test_cityscapes_divides_by_1000():
     image = np.array([[26_001, 26_002], [24_000, 7]], np.int32)
     masks = ldls.InstanceMasks.from_instance_image(image * (image > 999), class_divisor=1000)

@@ -90,6 +90,12 @@ def test_many_large_masks_stay_small():
         ),
         pytest.param(np.zeros((2, 4, 5)), {"categories": [1]}, "categories: exp", id="too few"),
         pytest.param(np.zeros((1, 4, 5)), {"categories": [12]}, "mask 0: category 12", id="unknown"),
+        pytest.param(
+            np.zeros((2, 4, 5)),
+            {"categories": [1, 2], "names": {1: "car", 2: "Background"}},
+            "mask 1: category 2 is named 'Background', .*leave the mask out, or name its category otherwise",
+            id="background",
+        ),
         pytest.param(np.zeros((1, 4, 5)), {"categories": [1.5]}, "whole numbers", id="fraction"),
         pytest.param(np.zeros((2, 4, 5)), {"scores": [1, 2]}, "mask 1: score is 2", id="score > 1"),
         pytest.param(np.zeros((1, 4, 5)), {"scores": [np.nan]}, "mask 0: score is nan", id="nan score"),
@@ -364,6 +370,12 @@ def test_an_array_with_the_masks_last_is_refused_until_it_says_so():
     assert ldls.InstanceMasks.from_array(pixels, instance_axis=-1).image_size == (120, 160)
     assert ldls.InstanceMasks.from_array(pixels, instance_axis=0).image_size == (160, 2)
     assert len(ldls.InstanceMasks.from_array(np.zeros((200, 60, 80), bool))) == 200
+
+
+def test_background_may_have_a_name_where_no_mask_is_of_it():
+    names = {1: "background", 2: "car"}
+    masks = ldls.InstanceMasks.from_array(np.zeros((1, 60, 80)), categories=[2], names=names)
+    assert masks.names == names and masks[0].name == "car"
 
 
 def test_categories_may_be_names():

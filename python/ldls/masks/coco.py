@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import ldls._ldls as _ldls
-from ldls.categories import COCO_NAMES
+from ldls.categories import COCO_NAMES, is_object
 from ldls.errors import CorruptFileError, LeftOutWarning, MaskError, within
 from ldls.masks.instance_mask import InstanceMask
 from ldls.masks.pixels import check_same_size, checked_size
@@ -27,6 +27,8 @@ def arguments(
     names: Mapping[int, str] | None = None,
 ) -> dict[str, Any]:
     """Arguments of `InstanceMasks` from the parsed JSON of a data set or of a bare list of results.
+
+    Annotations of a category that is named background are left out.
 
     Args:
         content: The parsed JSON.
@@ -42,6 +44,8 @@ def arguments(
     names = own_names or names or COCO_NAMES
     image_id = chosen_image(annotations, images, image_id)
     chosen = [a for a in annotations if image_id is None or a.get("image_id") in (None, image_id)]
+    no_objects = [category for category, name in names.items() if not is_object(name)]
+    chosen = [a for a in chosen if a.get("category_id") not in no_objects]
     drawn = [a for a in chosen if a.get("segmentation") != []]
     if len(drawn) < len(chosen):
         warnings.warn(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.categories import is_object
 from ldls.checks import as_array
 from ldls.errors import MaskError, ParameterError
 from ldls.masks.pixels import check_pixels
@@ -48,10 +49,13 @@ def arguments(
         # below Cityscapes' divisor there are stuff and groups
         least = 1 if class_divisor == CITYSCAPES_DIVISOR else 0
         pairs = [divmod(int(number), class_divisor) for number in numbers]
-        things = [category >= least and instance > 0 for category, instance in pairs]
+        given = names or {}
+        things = [
+            category >= least and instance > 0 and is_object(given.get(category, "")) for category, instance in pairs
+        ]
         rles = [rle for rle, is_thing in zip(rles, things, strict=True) if is_thing]
         categories = [category for (category, _), is_thing in zip(pairs, things, strict=True) if is_thing]
-        names = {category: f"class {category}" for category in categories} | dict(names or {})
+        names = {category: f"class {category}" for category in categories} | dict(given)
     height, width = np.shape(image)
     size = (height, width)
     return {"rles": rles, "image_size": size, "categories": categories, "scores": scores, "names": names}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
-from ldls.categories import COCO_NAMES, find_categories
+from ldls.categories import COCO_NAMES, find_categories, is_object
 from ldls.checks import as_array, checked, numbers, shown, whole_number
 from ldls.errors import InputError, LimitError, MaskError, ParameterError, within
 from ldls.masks import adapters, coco, instance_image
@@ -354,6 +354,12 @@ class InstanceMasks:
                 raise MaskError(
                     f"mask {i}: category {category} is unknown; expected one of "
                     f"{_some(self.names)}, or pass names={{{category}: '...'}}"
+                )
+            name = self.names[int(category)]
+            if not is_object(name):
+                raise MaskError(
+                    f"mask {i}: category {category} is named {name!r}, expected the name of a class of objects, for "
+                    "what is none has no mask; leave the mask out, or name its category otherwise"
                 )
             if not 0 <= score <= 1:
                 raise MaskError(f"mask {i}: score is {score}, expected 0 to 1")

@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
-from ldls.categories import COCO_NAMES, category_ids, class_id, folded
+from ldls.categories import COCO_NAMES, category_ids, class_id, folded, is_object
 from ldls.errors import CorruptFileError, MaskError, within
 from ldls.masks.pixels import checked_size
 
 CIRCLE_CORNERS = 64
 
 
-NO_OBJECTS = ("__ignore__", "_background_")
-"""labelme's own labels for what is no object."""
 THINGS = frozenset(("person", "rider", "car", "truck", "bus", "caravan", "trailer", "train", "motorcycle", "bicycle"))
 """Cityscapes' classes that come one by one; its others are surfaces, and groups of so many."""
 MAPILLARY_THINGS = ("animal", "human", "object")
@@ -29,7 +27,7 @@ MAPILLARY_THINGS = ("animal", "human", "object")
 
 
 def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:
-    """Arguments of `InstanceMasks` from labelme's JSON of one image, without its shapes of `NO_OBJECTS`.
+    """Arguments of `InstanceMasks` from labelme's JSON of one image, without shapes of what is no object.
 
     Shapes of one label that share a group_id are parts of one instance. Labels with the name of one of COCO's
     categories, or of `names`, get its id; others 100 and their place in the alphabet, or another that `names` do not
@@ -47,7 +45,7 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
     parts: dict[tuple[str, object], tuple[str, list[list[float]]]] = {}
     for i, shape in enumerate(_listed(content, "shapes")):
         label, group = str(shape.get("label")), shape.get("group_id")
-        if folded(label) in NO_OBJECTS:
+        if not is_object(label):
             continue
         with within(f"shape {i}"):
             own = (folded(label), ("alone", i) if group is None else group)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
+from ldls.categories import is_object
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes
 
@@ -33,11 +34,11 @@ class Crop:
 
 
 def assemble(crops: Iterable[Crop], image_size: tuple[int, int], classes: Classes) -> InstanceMasks:
-    """Masks of an image of (height, width) pixels; instances without a pixel are left out."""
+    """Masks of an image of (height, width) pixels; instances without a pixel, and of no object, are left out."""
     canvas = np.zeros(image_size, np.bool_)
     rles, categories, scores = [], [], []
     for crop in crops:  # one at a time: a crop may be as large as the image
-        if crop.pixels.any():
+        if crop.pixels.any() and is_object(classes.names[crop.category]):
             rles.append(_encode(crop, canvas))
             categories.append(crop.category)
             scores.append(crop.score)

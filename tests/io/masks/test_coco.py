@@ -56,6 +56,13 @@ def test_names_serve_where_the_source_has_none():
     assert ldls.InstanceMasks.from_coco(document(), names={1: "pedestrian"})[0].name == "person"
 
 
+def test_annotations_of_a_category_that_is_named_background_are_left_out():
+    (one,) = document()["annotations"]
+    categories = [{"id": 0, "name": "Background"}, {"id": 1, "name": "person"}]
+    masks = ldls.InstanceMasks.from_coco(document(annotations=[one | {"category_id": 0}, one], categories=categories))
+    assert [mask.name for mask in masks] == ["person"]
+
+
 def test_ids_of_annotations_may_repeat_and_crowds_are_instances():
     annotation = document()["annotations"][0]
     masks = ldls.InstanceMasks.from_coco(document(annotations=[annotation, annotation | {"iscrowd": 1}]))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ldls.categories import is_object
 from ldls.errors import CorruptFileError, MaskError
 from ldls.io.files import strictly_below
 from ldls.io.images import read_image
@@ -55,7 +56,7 @@ def read(path: Path, content: Mapping[str, Any], *, image_id: int | str | None =
     things = [
         (rle, segments[number])
         for number, rle in zip(numbers.tolist(), rles, strict=True)
-        if number in segments and categories[segments[number]].get("isthing", 1)
+        if number in segments and _is_thing(categories[segments[number]])
     ]
     return InstanceMasks(
         [rle for rle, _ in things],
@@ -63,6 +64,10 @@ def read(path: Path, content: Mapping[str, Any], *, image_id: int | str | None =
         categories=np.array([category for _, category in things], np.int64),
         names={category: str(record["name"]) for category, record in categories.items()},
     )
+
+
+def _is_thing(category: Mapping[str, Any]) -> bool:
+    return bool(category.get("isthing", 1)) and is_object(str(category["name"]))
 
 
 def _folders(path: Path) -> tuple[Path, Path]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import ldls._ldls as _ldls
-from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids
+from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids, is_object
 from ldls.errors import CorruptFileError, MaskError
 from ldls.io.cameras.field_file import read_fields
 from ldls.io.files import read_lines
@@ -35,7 +35,7 @@ def is_yolo(lines: Sequence[str]) -> bool:
 def read(
     path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
 ) -> InstanceMasks:
-    """One mask for each line.
+    """One mask for each line, but none for those of a class that is named background.
 
     Args:
         path: `.txt` file.
@@ -63,6 +63,8 @@ def read(
             raise MaskError(
                 f"{place}: class {category} has no name; pass names={{{category}: '...'}}, all of those in data.yaml"
             )
+        if not is_object(names[category]):
+            continue
         # shares count from the outer edges of the image, as COCO's polygons do
         polygon = (corners * image_size[::-1]).ravel().tolist()
         rles.append(_ldls.Rle.from_polygons(*image_size, [polygon]))
