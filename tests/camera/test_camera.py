@@ -92,7 +92,7 @@ def test_a_missing_calibration_stays_file_not_found(tmp_path):
     [
         pytest.param({"projection": np.eye(5)}, "projection: expected shape", id="shape"),
         pytest.param({"projection": np.eye(4)}, "is it the extrinsic\\? Pass T_camera_lidar=", id="extrinsic"),
-        pytest.param({"projection": "abc"}, "projection: expected numbers, got <U", id="text"),
+        pytest.param({"projection": "abc"}, "projection: expected numbers, got 'abc'", id="text"),
         pytest.param({"projection": np.zeros((3, 3))}, "rank below 3", id="zeros"),
         pytest.param({"projection": np.eye(3), "T_camera_lidar": np.eye(3)}, "T_camera_lidar: exp", id="3x3"),
         pytest.param(

@@ -98,6 +98,15 @@ def test_many_large_masks_stay_small():
         ),
         pytest.param(np.zeros((1, 4, 5)), {"categories": [1.5]}, "whole numbers", id="fraction"),
         pytest.param(np.zeros((2, 4, 5)), {"scores": [1, 2]}, "mask 1: score is 2", id="score > 1"),
+        pytest.param(
+            np.zeros((2, 4, 5)),
+            {"scores": [None, 0.5]},
+            r"got \[None, 0.5\]; give numbers alone, of 64 bits at most",
+            id="no score",
+        ),
+        pytest.param(
+            np.zeros((1, 4, 5)), {"scores": np.array(["0.5"])}, r"pass scores.astype\(float32\)", id="text scores"
+        ),
         pytest.param(np.zeros((1, 4, 5)), {"scores": [np.nan]}, "mask 0: score is nan", id="nan score"),
         pytest.param(np.zeros((1, 0, 5)), {}, "image of 0 x 5", id="no rows"),
     ],
@@ -383,3 +392,20 @@ def test_categories_may_be_names():
     assert ldls.InstanceMasks.from_array(pixels, categories=["Car", "person"]).categories.tolist() == [3, 1]
     with pytest.raises(ldls.ParameterError, match="categories: 'caar' is unknown; did you mean 'car'"):
         ldls.InstanceMasks.from_array(pixels, categories=["caar", "person"])
+
+
+@pytest.mark.parametrize(
+    ("categories", "expected"),
+    [
+        pytest.param(np.array(["Car", "person"]), [3, 1], id="array"),
+        pytest.param(np.array(["car", 1], object), [3, 1], id="objects"),
+        pytest.param(("car", "person"), [3, 1], id="tuple"),
+        pytest.param("car", [3, 3], id="one for all"),
+        pytest.param(np.str_("car"), [3, 3], id="one of NumPy"),
+        pytest.param(np.array("car"), [3, 3], id="an array of one"),
+        pytest.param(3, [3, 3], id="one number"),
+    ],
+)
+def test_names_of_categories_may_be_given_in_any_way_that_numbers_may(categories, expected):
+    found = ldls.InstanceMasks.from_array(np.zeros((2, 60, 80), bool), categories=categories).categories
+    assert found.tolist() == expected and found.dtype == np.int32

@@ -110,7 +110,12 @@ def numbers(
         array = array.astype(wanted)  # lists without a number have no type of their own
     if array.dtype.kind not in {"f": "fiu", "i": "iu", "u": "iu", "b": "b"}[wanted.kind]:
         kind = {"f": "numbers", "i": "whole numbers", "u": "whole numbers", "b": "bool"}[wanted.kind]
-        raise (error or DtypeError)(f"{name}: expected {kind}, got {array.dtype}; pass {name}.astype({wanted})")
+        is_array = hasattr(values, "dtype")
+        found = array.dtype if is_array else shown(values)
+        # NumPy keeps numbers that it has no type for as objects, too
+        bound = ", of 64 bits at most" if array.dtype.kind == "O" else ""
+        mend = f"pass {name}.astype({wanted})" if is_array else f"give {kind} alone{bound}"
+        raise (error or DtypeError)(f"{name}: expected {kind}, got {found}; {mend}")
     if not any(_fits(array.shape, shape) for shape in shapes):
         expected = " or ".join(f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)})" for shape in shapes)
         raise (error or ShapeError)(f"{name}: expected shape {expected}, got {array.shape}")

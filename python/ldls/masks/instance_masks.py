@@ -22,6 +22,8 @@ STRIP = 4
 """An array whose last axis is so many times shorter than the others is taken for (H, W, M)."""
 LEAST_SIDE = 100
 """Images are larger, in pixels, where nobody says which axis counts the masks."""
+TEXT_KINDS = "OTU"
+"""NumPy's kinds of arrays that may hold text."""
 MAX_RADIUS = 10_000
 """Farthest that masks grow or shrink, in pixels."""
 
@@ -376,20 +378,25 @@ def _image_size(masks: object, rles: Sequence[_ldls.Rle]) -> tuple[int, int]:
 
 def _ids(categories: ArrayLike, names: Mapping[int, str]) -> ArrayLike:
     """Category ids of category names, which must be among `names`; numbers as they are."""
-    if not isinstance(categories, Sequence) or not any(isinstance(each, str) for each in categories):
+    given: object = categories
+    if not isinstance(given, Sequence):
+        array = as_array("categories", given, MaskError)
+        given = array.tolist() if array.dtype.kind in TEXT_KINDS else ()
+    listed = [given] if isinstance(given, str) else given
+    if not isinstance(listed, Sequence) or not any(isinstance(each, str) for each in listed):
         return categories
     with within("masks"):
-        return [find_categories([each], names)[0] for each in categories]
+        ids = [find_categories([each], names)[0] for each in listed]
+    return ids[0] if isinstance(given, str) else ids
 
 
 def _per_mask(name: str, values: ArrayLike, count: int, dtype: type[np.generic]) -> NDArray[Any]:
     array = as_array(name, values, MaskError)
-    if array.ndim == 0:
-        array = np.full(count, array)
-    if array.shape != (count,):
+    if array.ndim and array.shape != (count,):
         raise MaskError(f"{name}: expected one for each of {count} masks, got shape {array.shape}")
-    # a list without a number has no type of its own
-    array = numbers(name, array if count else array.tolist(), dtype, ("M",), error=MaskError).copy()
+    # of a list, which has no type of its own, messages show what is in it
+    given = values if array.ndim else np.full(count, array)
+    array = numbers(name, given if count else [], dtype, ("M",), error=MaskError).copy()
     array.flags.writeable = False
     return array
 

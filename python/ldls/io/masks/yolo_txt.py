@@ -5,6 +5,7 @@ A network's results may have the score behind the corners. Source: https://docs.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -21,15 +22,17 @@ from ldls.masks import InstanceMasks
 
 CLASSES, DATA = "classes.txt", "data.yaml"
 """Files of class names: of labelling tools, a line each, and of ultralytics."""
+NUMBER = re.compile(r"[-+]?\d+(\.\d*)?")
+"""The class of a line, as it is or as it may have become."""
 LEAST_WORDS = 7
 """A class and the corners of a triangle."""
 CONTIGUOUS_NAMES = {index: COCO_NAMES[category] for index, category in enumerate(CONTIGUOUS_IDS)}
 
 
 def is_yolo(lines: Sequence[str]) -> bool:
-    """True for lines that begin with a class number; KITTI's begin with a name."""
-    words = [line.split() for line in lines if line.strip()]
-    return bool(words) and all(line[0].isdecimal() for line in words)
+    """True for lines of which the first begins with a number; KITTI's begin with a name."""
+    first = next((line.split()[0] for line in lines if line.strip()), "")
+    return NUMBER.fullmatch(first) is not None
 
 
 def read(
@@ -95,6 +98,8 @@ def _names_in(path: Path) -> dict[int, str]:
 
 
 def _parsed(place: str, words: list[str]) -> tuple[int, Any, float]:
+    if not words[0].isdecimal():
+        raise CorruptFileError(f"{place}: class is {words[0][:60]!r}, expected a whole number, counted from 0")
     try:
         category, numbers = int(words[0]), np.array(words[1:], np.float64)
     except ValueError:
