@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import ldls._ldls as _ldls
-from ldls.checks import checked, whole_number
+from ldls.checks import checked, hold_python_values, whole_number
 
 
 @checked
@@ -68,6 +68,7 @@ class Params:
     threads: int | None = None
 
     def __post_init__(self) -> None:
+        hold_python_values(self)
         for field in fields(self):
             value = getattr(self, field.name)
             if str(field.type).startswith("int") and value is not None:

@@ -681,3 +681,18 @@ def test_options_of_the_source_choose_and_belong_to_the_run(tmp_path, by):
         assert (out / "000000.label").read_bytes() == (tmp_path / "one.label").read_bytes()
     with pytest.raises(BatchError, match="options"):
         batch.run(source, out, batch.RunSettings(masks=str(masks)), options={"camera": 2})
+
+
+def test_settings_of_numpy_are_those_of_python(few, tmp_path):
+    params = {"neighbors": 10, "sigma": 0.5}
+    plain = batch.RunSettings(masks=str(few / "masks"), min_score=0.25, sweeps=0, categories=("car", 1),
+                              params=ldls.Params(**params))  # fmt: skip
+    of_numpy = batch.RunSettings(
+        masks=str(few / "masks"),
+        min_score=np.float32(0.25),
+        sweeps=np.int64(0),
+        categories=(np.str_("car"), np.int64(1)),
+        params=ldls.Params(neighbors=np.int64(10), sigma=np.float64(0.5)),
+    )
+    assert of_numpy.record() == plain.record()
+    assert not batch.run(few, tmp_path / "out", of_numpy, frames=slice(1)).failures

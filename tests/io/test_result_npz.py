@@ -1,6 +1,7 @@
 """Segmentations come back from their files as they were, and files that are not whole are refused."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -46,6 +47,27 @@ def scene(small_scene):
 def test_one_camera(scene, tmp_path, dtype):
     points, masks, camera = scene
     result = ldls.segment(points.astype(dtype), masks, camera, params=ldls.Params(iterations=None, threads=1))
+    same(through_file(result, tmp_path / "a.npz"), result)
+
+
+@pytest.mark.parametrize(
+    ("of_params", "of_camera"),
+    [
+        pytest.param({"neighbors": np.int64(10), "iterations": np.int16(4), "window": np.uint8(5)}, {}, id="whole"),
+        pytest.param(
+            {"sigma": np.float32(0.1), "abstain": np.longdouble(0.25), "depth_gap": Fraction(1, 2)}, {}, id="real"
+        ),
+        pytest.param({"calibrated": np.bool_(True), "threads": np.int32(1)}, {}, id="flag and threads"),
+        pytest.param({}, {"min_depth_m": np.float32(0.1), "image_size": (np.int64(60), np.int64(80))}, id="camera"),
+    ],
+)
+def test_numbers_of_numpy_become_pythons_own(scene, tmp_path, of_params, of_camera):
+    points, masks, camera = scene
+    params, camera = replace(ldls.Params(threads=1), **of_params), replace(camera, **of_camera)
+    for made, given in ((params, of_params), (camera, of_camera)):
+        assert {type(getattr(made, name)) for name in given} <= {int, float, bool, tuple}
+        assert all(getattr(made, name) == value for name, value in given.items())
+    result = ldls.segment(points, masks, camera, params=params)
     same(through_file(result, tmp_path / "a.npz"), result)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import ldls._ldls as _ldls
+from ldls.checks import as_python, hold_python_values
 from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
@@ -60,6 +61,9 @@ class RunSettings:
     track: bool = False
 
     def __post_init__(self) -> None:
+        hold_python_values(self)
+        if self.categories is not None:
+            object.__setattr__(self, "categories", tuple(map(as_python, self.categories)))
         if self.masks is not None and self.segmenter is not None:
             raise ParameterError("masks, segmenter: give one of them, got both")
         if not 0 <= self.sweeps <= MOST_SWEEPS:

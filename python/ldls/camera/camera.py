@@ -13,7 +13,7 @@ import ldls._ldls as _ldls
 from ldls.camera import camera_info, nuscenes
 from ldls.camera.distortion import Distortion
 from ldls.camera.rigid import as_matrix, as_transform, from_parts
-from ldls.checks import as_image_size, checked_as
+from ldls.checks import as_image_size, checked_as, hold_python_values
 from ldls.errors import CalibrationError, within
 
 
@@ -68,6 +68,7 @@ class Camera:
     distortion: Distortion = field(default_factory=Distortion)
 
     def __post_init__(self) -> None:
+        hold_python_values(self)
         if getattr(self.projection, "shape", None) == (4, 4):
             raise CalibrationError(
                 "projection: expected K (3, 3) or P (3, 4), got (4, 4); is it the extrinsic? Pass T_camera_lidar="

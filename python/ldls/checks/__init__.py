@@ -5,6 +5,24 @@ go through `as_array` and `numbers`. What the values mean is for the callee to c
 """
 
 from ldls.checks.annotations import checked, checked_as
-from ldls.checks.values import as_array, as_image_size, numbers, shown, whole_number
+from ldls.checks.values import (
+    as_array,
+    as_image_size,
+    as_python,
+    hold_python_values,
+    numbers,
+    shown,
+    whole_number,
+)
 
-__all__ = ["as_array", "as_image_size", "checked", "checked_as", "numbers", "shown", "whole_number"]
+__all__ = [
+    "as_array",
+    "as_image_size",
+    "as_python",
+    "checked",
+    "checked_as",
+    "hold_python_values",
+    "numbers",
+    "shown",
+    "whole_number",
+]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import operator
 import sys
+from collections.abc import Callable
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, Literal
 
 from ldls.errors import DtypeError, InputError, LdlsError, LimitError, ParameterError, ShapeError
@@ -16,6 +18,8 @@ MAX_ROWS = 2**31 - 1
 """Most rows of an array: points and labels are numbered by 32 bits with sign."""
 LATEST_S = 9.2e9
 """Stamps are below it: in 2261, nanoseconds since 1970 run out of 64 bits. Milliseconds passed it in April 1970."""
+PYTHONS: dict[type, Callable[[Any], object]] = {Integral: int, Real: float, str: str}
+"""What makes Python's own of a kind of number, and of text."""
 LONGEST = 80
 """Characters of a value that a message shows."""
 
@@ -143,6 +147,20 @@ def is_whole(value: object) -> bool:
     except TypeError:
         return False
     return not isinstance(value, bool) and not is_of_numpy(value, "bool_") and not is_of_numpy(value, "ndarray")
+
+
+def as_python(value: Any) -> Any:  # noqa: ANN401
+    """A number, bool or text as Python's own, which files of JSON take; anything else as it is."""
+    if is_of_numpy(value, "bool_"):
+        return bool(value)
+    own = next((own for kind, own in PYTHONS.items() if isinstance(value, kind)), None)
+    return value if own is None or isinstance(value, bool) else own(value)
+
+
+def hold_python_values(made: object) -> None:
+    """Make numbers, bools and texts that a frozen dataclass holds Python's own, as `as_python` does."""
+    for name, value in vars(made).items():
+        object.__setattr__(made, name, as_python(value))
 
 
 def is_of_numpy(value: object, name: Literal["bool_", "ndarray"]) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, find_categories, is_object
-from ldls.checks import as_array, checked, numbers, shown, whole_number
+from ldls.checks import as_array, as_python, checked, numbers, shown, whole_number
 from ldls.errors import InputError, LimitError, MaskError, ParameterError, within
 from ldls.masks import adapters, coco, instance_image
 from ldls.masks.instance_mask import InstanceMask
@@ -55,7 +55,9 @@ class InstanceMasks:
         self.core = _ldls.Masks(height, width, list(rles))
         if categories is None:
             categories, names = np.ones(len(rles), np.int32), names or {1: "object"}
-        self.names = dict(COCO_NAMES if names is None else names)
+        given = COCO_NAMES if names is None else names
+        # those of NumPy become Python's own
+        self.names = {int(category): str(name) for category, name in given.items()}
         self.categories = _per_mask("categories", _ids(categories, self.names), len(rles), np.int32)
         self.scores = _per_mask("scores", 1.0 if scores is None else scores, len(rles), np.float32)
         self._check()
@@ -245,6 +247,7 @@ class InstanceMasks:
     @checked
     def to_coco(self, *, image_id: int = 1, file_name: str | None = None) -> dict[str, Any]:
         """COCO's data set of this one image, with compressed run lengths; its `annotations` are results as well."""
+        image_id = as_python(image_id)
         image: dict[str, Any] = {"id": image_id, "height": self.height, "width": self.width}
         if file_name is not None:
             image["file_name"] = file_name

@@ -50,6 +50,18 @@ def test_the_document_of_masks_is_the_content_of_their_file(tmp_path):
     assert_same(ldls.InstanceMasks.from_coco(masks.to_coco()), masks)
 
 
+def test_ids_and_names_of_numpy_are_written(tmp_path):
+    names = {np.int64(3): np.str_("car")}
+    masks = ldls.InstanceMasks.from_array(np.ones((1, 4, 5)), categories=[3], names=names)
+    ldls.save(masks, tmp_path / "a.json", image_id=np.int64(4))
+    ldls.save(masks, tmp_path / "results.json", image_id=np.int64(4), results=True)
+    assert json.loads((tmp_path / "a.json").read_text()) == masks.to_coco(image_id=np.int64(4))
+    assert {type(key) for key in masks.names} == {int} and {type(name) for name in masks.names.values()} == {str}
+    (result,) = json.loads((tmp_path / "results.json").read_text())
+    assert result["image_id"] == 4
+    assert len(ldls.read_masks(tmp_path / "a.json", image_id=np.int64(4))) == 1
+
+
 def test_names_serve_where_the_source_has_none():
     results = [{"category_id": 104, "segmentation": RLE}]
     assert ldls.InstanceMasks.from_coco(results, names={104: "crane"})[0].name == "crane"
