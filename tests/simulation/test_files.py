@@ -13,6 +13,7 @@ from ldls.errors import ParameterError
 from ldls.evaluation import ClassSet
 from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import (
+    Drive,
     FrameOrder,
     SegmenterErrors,
     SensorErrors,
@@ -23,8 +24,10 @@ from ldls.simulation import (
     suite as make_whole_suite,
     suite_folder,
     suite_orders,
+    write_drive,
     write_kitti,
 )
+from ldls.simulation.production import seeded_orders
 from ldls.simulation.scene_object import CLASS_NAMES, CYCLIST
 from ldls.stages import project
 
@@ -192,6 +195,17 @@ def test_frames_of_another_kind_are_neither_kept_nor_added_to(tmp_path, changed,
     # what was not finished binds nobody
     (tmp_path / "training/annotations/000001.txt").unlink()
     assert [order.is_whole(tmp_path) for order in others] == [True, False, False]
+
+
+def test_settings_of_numpy_are_written_as_those_of_python(tmp_path):
+    errors = SegmenterErrors(missed=np.float32(0.5)), SensorErrors(delay_s=np.float32(0.25))
+    (order,) = seeded_orders(np.arange(1), lidar="vlp-16", segmenter=errors[0], sensors=errors[1])
+    order.make(tmp_path / "frames")
+    assert order.is_whole(tmp_path / "frames")
+    drives = [Drive(n_frames=n, seed=seed, lidar="vlp-16") for n, seed in ((np.int64(1), np.int64(2)), (1, 2))]
+    for drive in drives:
+        # the second goes on with the frame of the first
+        assert len([*write_drive(tmp_path / "drive", drive)]) == 1
 
 
 def test_no_process_is_refused(tmp_path):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ldls.camera.extrinsic import turn_of
 from ldls.camera.rigid import from_parts, inverse
+from ldls.checks import hold_python_values
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.ground import Ground
@@ -77,6 +78,7 @@ class Drive:
     spinning: bool = False
 
     def __post_init__(self) -> None:
+        hold_python_values(self)
         if self.n_frames < 1:
             raise ParameterError(f"n_frames: got {self.n_frames}, expected 1 or more")
         if not abs(self.turn_deg_s) <= FASTEST_TURN_DEG_S:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks import hold_python_values
 from ldls.errors import ParameterError
 
 
@@ -91,6 +92,7 @@ def _rotation(axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
 def _check_strengths(
     errors: SegmenterErrors | SensorErrors, *, probabilities: tuple[str, ...] = (), signed: tuple[str, ...] = ()
 ) -> None:
+    hold_python_values(errors)
     for field in fields(errors):
         value = getattr(errors, field.name)
         low, high = (-np.inf if field.name in signed else 0), (1 if field.name in probabilities else np.inf)

@@ -16,6 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ldls.checks import hold_python_values
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.kitti_layout import check_there, write_kitti, write_lines
@@ -75,6 +76,9 @@ class FrameOrder:
     camera: str = "kitti"
     segmenter: SegmenterErrors
     sensors: SensorErrors
+
+    def __post_init__(self) -> None:
+        hold_python_values(self)
 
     def is_whole(self, folder: str | PathLike[str]) -> bool:
         """True where the frame is in `folder`; its annotations come last.
