@@ -109,6 +109,26 @@ def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, s
     assert len(set.intersection(*by_frame)) >= 3, "objects go on as themselves over all windows"
 
 
+@pytest.mark.parametrize("sweeps", [0, 1])
+def test_masks_that_number_classes_anew_in_each_frame_have_the_same_tracks(drive, tmp_path, sweeps):
+    expected = run(drive, tmp_path / "expected", sweeps=sweeps)
+    for number, path in enumerate(sorted((drive / "masks").iterdir())):
+        masks = ldls.read_masks(path)
+        names = [*sorted({mask.name for mask in masks}), "cone", "drum"][:: 1 if number % 2 else -1]
+        table = {100 + place: name.upper() if number % 3 else name for place, name in enumerate(names)}
+        categories = [100 + names.index(mask.name) for mask in masks]
+        rles = [mask.rle for mask in masks]
+        ldls.save(ldls.InstanceMasks(rles, masks.image_size, categories=categories, names=table), path)
+    summary = run(drive, tmp_path / "out", sweeps=sweeps)
+    assert summary.tracks == expected.tracks and summary.objects == expected.objects and len(summary.objects) == 2
+    known, found = rows(tmp_path / "expected"), rows(tmp_path / "out")
+    for one, other in zip(known, found, strict=True):
+        assert [one[name] for name in ("frame", "track", "name")] == [
+            other[name] for name in ("frame", "track", "name")
+        ]
+    assert len({(row["category"], row["name"]) for row in found}) == 2
+
+
 def test_results_with_tracks_are_in_the_formats_that_name_instances(drive, tmp_path):
     out, formats = tmp_path / "out", ("panoptic", "lidarseg", "png")
     run(drive, out, formats=formats, frames=slice(3))

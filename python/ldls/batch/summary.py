@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ldls.categories import folded
 from ldls.io.files import whole_file
 from ldls.io.objects import FrameObjects
 
@@ -97,8 +98,9 @@ def objects_of(records: Iterable[Mapping[str, Any]]) -> Iterator[FrameObjects]:
 
 
 def count_objects(records: Iterable[Mapping[str, Any]]) -> dict[str, int]:
-    """Objects with points of all frames, by category name, the most frequent first."""
+    """Objects with points of all frames, by category name as it is spelled first, the most frequent first."""
+    spelled: dict[str, str] = {}
     total: Counter[str] = Counter()
     for record in records:
-        total.update(row["name"] for row in record.get("objects", ()))
+        total.update(spelled.setdefault(folded(row["name"]), row["name"]) for row in record.get("objects", ()))
     return dict(total.most_common())

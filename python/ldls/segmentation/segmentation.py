@@ -30,7 +30,7 @@ class Instance:
 
     Attributes:
         label: The label, from 1.
-        category: Category id.
+        category: Category id: that of its masks, but one for each name where views name their categories differently.
         name: Category name.
         score: Highest score of its masks, 0 to 1.
         sources: Its masks: number of the view and of the mask in it, both from 0; one a view that shows it, and none
