@@ -151,10 +151,12 @@ def is_whole(value: object) -> bool:
 
 def as_python(value: Any) -> Any:  # noqa: ANN401
     """A number, bool or text as Python's own, which files of JSON take; anything else as it is."""
+    if value is None or type(value) in (bool, int, float, str):
+        return value
     if is_of_numpy(value, "bool_"):
         return bool(value)
     own = next((own for kind, own in PYTHONS.items() if isinstance(value, kind)), None)
-    return value if own is None or isinstance(value, bool) else own(value)
+    return value if own is None else own(value)
 
 
 def hold_python_values(made: object) -> None:
