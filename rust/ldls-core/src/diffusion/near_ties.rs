@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 
 /// What the series of one round after the other leave out, as a share of the largest value: the first tells labels apart that differ,
 /// the next knows equal ones, for which it leaves out less than rounding does. What neither is sure of is left for the products.
-const ROUNDS: [Option<f64>; 3] = [Some(1e-14), Some(1e-19), None];
+const ROUNDS: [Option<f64>; 3] = [Some(1e-14), Some(1e-18), None];
 /// Points up to which they are a few: what flows to these is diffused in double precision in the time that it takes to look at all
 /// seeds. More are those of masks that lie over one another, most of whose labels are equal.
 const FEW: usize = 1 << 8;
