@@ -133,7 +133,8 @@ def find_categories(wanted: Iterable[int | str], names: Mapping[int, str]) -> li
 def _ids(wanted: int | str, names: Mapping[int, str]) -> list[int]:
     by_name = {folded(name): name for name in names.values()}
     asked = folded(wanted) if isinstance(wanted, str) else None
-    found = [category for category, name in names.items() if category == wanted or folded(name) == asked]
+    found = [category for category, name in names.items() if wanted in (category, name)]
+    found = found or [category for category, name in names.items() if folded(name) == asked]
     if found:
         return found
     own = own_name(str(wanted), by_name, {})

@@ -40,9 +40,13 @@ EXPECTED_ON_MASKS = 20.0
 """Points that masks of this area would have on them by chance, from which on none at all is no chance."""
 ALONG_Z = 0.7
 """Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
+STEEPEST = 0.97
+"""The same up to which a camera may look up, where a leaning wall in the image passes for ground."""
 NOT_FINITE = "points: no row is finite; nothing is labelled; are they read as they were written?"
 GROUND_SHARE = 0.2
 """Share of the points in view that the ground must have to tell where up is."""
+ENOUGH_FOR_GROUND = 4000
+"""Points that tell as much of the ground as more do."""
 SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
@@ -188,7 +192,8 @@ def nothing_in_view(result: Segmentation) -> str | None:
     n_in_view = result.report.n_in_view
     if (result.labels > 0).any():
         return None
-    if len(result.points) and not len(finite_rows(result.points)):
+    # of sweeps that were labelled together the report counts the points of all
+    if result.report.n_nonfinite and not len(finite_rows(result.points)):
         return NOT_FINITE
     if not result.views:
         return None
@@ -310,7 +315,8 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
             name
             for each in results
             for name, seen in zip(camera_names(each.views), each.views, strict=True)
-            if _leans(seen, each)
+            # the ground is fitted around the first camera
+            if not _is_own_frame(each.views[0]) and _leans(seen, each)
         )
         if leaning:
             message = (
@@ -333,19 +339,25 @@ def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning
         yield f"{place}{doubt}", NoUsablePoints if doubt == NOT_FINITE else NothingInView
 
 
+def _is_own_frame(seen: SeenView) -> bool:
+    """True for a cloud in the frame of the camera, where up is -y."""
+    turn = seen.view.camera.T_camera_lidar
+    return bool(turn[1, 1] > 0.5 and turn[2, 2] > ALONG_Z)
+
+
 def _leans(seen: SeenView, result: Segmentation) -> bool:
     """True if z of the lidar points down or to the side in an image, by over 60 degrees.
 
     Where the camera looks along it, the ground must tell: what a drone sees lies below z, and in other frames below
-    what is up in the image. It is left alone in clouds that are in the camera's own frame, where up is -y.
+    what is up in the image.
     """
-    turn = seen.view.camera.T_camera_lidar[:3, :3]
-    x, y, z = turn[:, 2]
+    x, y, z = seen.view.camera.T_camera_lidar[:3, 2]
     if abs(z) < ALONG_Z:
         return bool(-y < 0.5 * np.hypot(x, y))
-    if z > 0 and turn[1, 1] > 0.5:
+    if ALONG_Z <= z < STEEPEST or _is_own_frame(seen):
         return False
-    points, camera, threads = result.points[seen.in_view, :3], seen.view.camera, result.params.threads
+    rows = seen.in_view[:: max(1, len(seen.in_view) // ENOUGH_FOR_GROUND)]
+    points, camera, threads = result.points[rows, :3], seen.view.camera, result.params.threads
     of_lidar = _share_of_ground(points, camera, threads)
     own_frame = transformed(points, camera.T_camera_lidar)
     of_image = _share_of_ground(own_frame, Camera(projection=np.eye(3)), threads)

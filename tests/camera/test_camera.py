@@ -134,16 +134,32 @@ def test_a_scaled_projection_sees_the_same():
     np.testing.assert_allclose(one[1], other[1])
 
 
-@pytest.mark.parametrize("T_camera_lidar", [np.eye(4), [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]])
-def test_a_projection_of_negative_sign_is_its_negative(T_camera_lidar):
-    # the extrinsic apart, or in the projection, whose third row is then of any direction
+def test_a_projection_of_negative_sign_is_its_negative():
     K = pinhole().projection
     points = np.random.default_rng(0).normal(size=(500, 3))
-    expected = ldls.stages.project(points, ldls.Camera(projection=K @ T_camera_lidar), image_size=(60, 80))
-    found = ldls.stages.project(points, ldls.Camera(projection=-K @ T_camera_lidar), image_size=(60, 80))
+    expected = ldls.stages.project(points, ldls.Camera(projection=K), image_size=(60, 80))
+    found = ldls.stages.project(points, ldls.Camera(projection=-K), image_size=(60, 80))
     assert len(expected[0]) > 5
     np.testing.assert_array_equal(found[0], expected[0])
     np.testing.assert_array_equal(found[1], expected[1])
+
+
+TO_OPTICAL = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("mirror", "to_optical"),
+    [
+        pytest.param(np.diag([1.0, 1, 1]), TO_OPTICAL, id="forward, left, up"),
+        pytest.param(np.diag([1.0, 1, 1]), TO_OPTICAL * [1, -1, 1], id="forward, right, up"),
+        pytest.param([[-1.0, 0, 80], [0, 1, 0], [0, 0, 1]], TO_OPTICAL, id="mirrored image"),
+    ],
+)
+def test_an_extrinsic_in_the_projection_may_be_of_any_hand(mirror, to_optical):
+    projection = mirror @ pinhole().projection[:, :3] @ to_optical
+    camera = ldls.Camera(projection=np.column_stack([projection, np.zeros(3)]))
+    in_view, _ = ldls.stages.project(np.array([[5.0, 0.2, 0.1], [-5, 0.2, 0.1]]), camera, image_size=(60, 80))
+    assert in_view.tolist() == [0]
 
 
 def test_the_camera_of_a_mirrored_image_looks_forward():

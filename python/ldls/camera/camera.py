@@ -29,11 +29,10 @@ def _check_not_transposed(projection: NDArray[np.float64]) -> None:
 def _depth_forward(projection: NDArray[np.float64]) -> NDArray[np.float64]:
     """Of P and -P, which project alike, the one whose third row is the depth, positive before the camera.
 
-    That is the one of positive determinant (Hartley and Zisserman 2004, section 6.2.3), but for the camera of a
-    mirrored image, whose third row points forward.
+    Where the extrinsic is in the projection the third row may point anywhere, and nothing tells -P from a mirror.
     """
-    points_forward = projection[2, 2] > np.abs(projection[2, :2]).max()
-    is_negated = not points_forward and np.linalg.slogdet(projection[:, :3])[0] < 0
+    points_back = -projection[2, 2] > np.abs(projection[2, :2]).max()
+    is_negated = points_back and np.linalg.slogdet(projection[:, :3])[0] < 0
     return -projection if is_negated else projection
 
 

@@ -18,7 +18,7 @@ MAX_ROWS = 2**31 - 1
 """Most rows of an array: points and labels are numbered by 32 bits with sign."""
 LATEST_S = 9.2e9
 """Stamps are below it: in 2261, nanoseconds since 1970 run out of 64 bits. Milliseconds passed it in April 1970."""
-PYTHONS: dict[type, Callable[[Any], object]] = {Integral: int, Real: float, str: str}
+PYTHONS: dict[type, Callable[[Any], object]] = {Integral: int, Real: float, str: str.__str__}
 """What makes Python's own of a kind of number, and of text."""
 LONGEST = 80
 """Characters of a value that a message shows."""

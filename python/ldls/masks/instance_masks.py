@@ -57,7 +57,7 @@ class InstanceMasks:
             categories, names = np.ones(len(rles), np.int32), names or {1: "object"}
         given = COCO_NAMES if names is None else names
         # those of NumPy become Python's own
-        self.names = {int(category): str(name) for category, name in given.items()}
+        self.names = {int(category): as_python(name) for category, name in given.items()}
         self.categories = _per_mask("categories", _ids(categories, self.names), len(rles), np.int32)
         self.scores = _per_mask("scores", 1.0 if scores is None else scores, len(rles), np.float32)
         self._check()

@@ -117,11 +117,11 @@ class LabelDiffusion:
             keep_origin=keep_origin,
             same_object=SAME_OBJECT_OF_SWEEPS if same_object is None else same_object,
         )
+        # of those before it was warned when they came; a warning that is raised leaves the stream as it was
+        warn_of(results[-1:], report, stacklevel=4)
         self._tracker = self._tracker or Tracker()
         (result,) = self._tracker.track([sweep], results[-1:])
         self._recent = recent
-        # of those before it was warned when they came
-        warn_of(results[-1:], report, stacklevel=4)
         return result
 
     def _views(self, masks: InstanceMasks | Sequence[InstanceMasks] | Sequence[View]) -> tuple[View, ...]:

@@ -177,6 +177,13 @@ fn geometric_sum(terms: usize, middle: f64, half_width: f64) -> Vec<f64> {
     // 2 t T_k = T_(k + 1) + T_(k - 1), where T_(-1) is T_1: the first counts twice, as those of an even function do
     let mut sum = vec![2.0];
     let mut next = Vec::new();
+    // what further terms add is next to nothing
+    let enough = NOTHING.ln() / (middle + half_width).ln();
+    let terms = if enough > 0.0 {
+        terms.min(enough.ceil() as usize)
+    } else {
+        terms
+    };
     for _ in 1..terms {
         sum.extend([0.0; 2]);
         next.clear();
