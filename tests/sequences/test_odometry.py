@@ -241,6 +241,18 @@ def test_past_more_than_two_frames_the_way_is_lost():
         odometry_of(drive)
 
 
+@pytest.mark.parametrize(
+    ("stamps", "frame"),
+    [
+        pytest.param([0.1 * (k % 5) for k in range(10)], "7", id="two drives"),
+        pytest.param([100.0 if k == 4 else 0.1 * k for k in range(10)], "7", id="a stamp far ahead"),
+    ],
+)
+def test_a_clock_that_stays_behind_is_another_drive(stamps, frame):
+    with pytest.raises(ldls.PoseError, match=rf"^drive: frame {frame}: its stamp .* is not after that before it"):
+        odometry_of(frames(stamps))
+
+
 def test_where_no_frame_is_left_the_first_says_why():
     with pytest.raises(ldls.InputError, match="^drive: sweeps: got 0, expected 2 or more; frame 0: points: broken"):
         odometry_of(Frames([BROKEN] * 3))

@@ -26,15 +26,16 @@ def odometry_of(source: Source) -> Trajectory:
     Stamps are those of the frames; where frames have none, frame k is taken at k x 0.1 s.
     Where frames have the times of their points, `ldls.odometry` takes the motion out of its sweeps.
     Frames are read one after the other, and none is kept. Frames that cannot be read, have too few points or come no
-    later than the one before are left out with a `LeftOutWarning`: up to two in a row, any number at either end. So
-    are the first ones before a gap, if they are fewer than three.
+    later than the one before are left out with a `LeftOutWarning`: up to two in a row, and any number at either end
+    that cannot be read or have too few points. So are the first ones before a gap, if they are fewer than three.
 
     Args:
         source: The drive, its frames in the order of time.
 
     Raises:
         SourceError: Some frames have stamps and others none.
-        PoseError: A sweep has nothing in common with the one before it, or more than two in a row are left out.
+        PoseError: A sweep has nothing in common with the one before it, or more than two in a row are left out, or come
+            no later than the one before them.
         InputError: Fewer than two frames are left.
         ImportError: `ldls[odometry]` is not installed.
     """
@@ -66,6 +67,9 @@ def _way(source: Source, left_out: dict[str, str]) -> Way:
         try:
             usable = way.usable(*sweep)
         except LdlsError as error:
+            # one or two clocks that jump are a fault; more are another drive, or another order
+            if isinstance(error, PoseError) and number - laid[-1] > MOST_LEFT_OUT:
+                raise PoseError(f"frame {frame.name}: {error}") from None
             left_out[frame.name] = str(error)
             continue
         if gap and len(way) < BEGINNING:
