@@ -152,7 +152,7 @@ class NothingInView(LdlsWarning):
 
 
 class PrecisionWarning(LdlsWarning):
-    """Coordinates too large for single precision to resolve."""
+    """Coordinates too large for single precision to resolve, or intensities that a file cannot hold as they are."""
 
 
 class ScaleWarning(LdlsWarning):

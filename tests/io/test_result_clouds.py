@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import ldls
+from ldls.errors import PrecisionWarning
 from ldls.palette import instance_colours
 
 
@@ -87,22 +88,27 @@ def test_las_keeps_larger_intensities_as_they_are(result, tmp_path, largest):
 
 
 @pytest.mark.parametrize(
-    ("intensities", "error", "message"),
+    ("intensities", "held", "message"),
     [
-        pytest.param([0.05, 0.5, 1.0001], ldls.LimitError, "up to 1.0001 lose 0.5 .*divide them", id="above 1"),
-        pytest.param([0, 70_000], ldls.LimitError, "intensities 0 to 70000, expected 0 to 65535", id="above 65535"),
-        pytest.param([-1, 5], ldls.LimitError, "intensities -1 to 5, expected 0", id="below 0"),
-        pytest.param([0.5, np.nan], ldls.NonFiniteError, "250 of 501 .*intensities, are not finite", id="NaN"),
-        pytest.param([1, np.inf], ldls.NonFiniteError, "intensities, are not finite", id="infinite"),
+        pytest.param([0.05, 0.5, 1.6], [0, 0, 2], "hold fractions, which are rounded, for", id="above 1"),
+        pytest.param([0, 70_000], [0, 65535], "hold numbers above 65535, which are that, for", id="above 65535"),
+        pytest.param([-1, 5], [0, 5], "hold numbers below 0, which are 0, for", id="below 0"),
+        pytest.param([-1, 0.2], [0, 13107], "hold numbers below 0, which are 0, for", id="below 0 and to 1"),
+        pytest.param([1, np.nan], [65535, 0], "hold NaN, which are 0, for", id="NaN"),
+        pytest.param([np.nan, -7, 3], [0, 0, 3], "hold NaN, which are 0; numbers below 0, which are 0", id="two kinds"),
+        pytest.param([9, np.inf, -np.inf], [9, 65535, 0], "below 0, .* above 65535", id="infinite"),
+        pytest.param([np.nan], [0], "hold NaN", id="all NaN"),
     ],
 )
-def test_las_refuses_intensities_that_it_cannot_hold(result, tmp_path, intensities, error, message):
-    pytest.importorskip("laspy", reason="the extra las is not installed")
+def test_las_warns_of_intensities_that_it_cannot_hold(result, tmp_path, intensities, held, message):
+    laspy = pytest.importorskip("laspy", reason="the extra las is not installed")
     points = result.points.copy()
     points[:, 3] = np.resize(intensities, len(points))
-    with pytest.raises(error, match=f"a.las: .*{message}"):
+    with pytest.warns(PrecisionWarning, match=message) as warned:
         ldls.save(replace(result, points=points), tmp_path / "a.las")
-    assert list(tmp_path.iterdir()) == []
+    assert [warning.filename for warning in warned] == [__file__]
+    assert "save .ply or .npz" in str(warned[0].message)
+    np.testing.assert_array_equal(laspy.read(tmp_path / "a.las").intensity, np.resize(held, len(points)))
 
 
 def test_las_rounds_fractions_of_large_intensities(result, tmp_path):

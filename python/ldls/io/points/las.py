@@ -7,6 +7,7 @@ libraries take a file that was cut short for a whole one, and some damaged files
 from __future__ import annotations
 
 import struct
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,14 @@ from numpy.typing import NDArray
 import ldls._ldls as _ldls
 from ldls._optional import require
 from ldls.cloud import Points
-from ldls.errors import CorruptFileError, LimitError, NonFiniteError, TruncatedFileError, UnsupportedFormatError
+from ldls.errors import (
+    CorruptFileError,
+    LimitError,
+    NonFiniteError,
+    PrecisionWarning,
+    TruncatedFileError,
+    UnsupportedFormatError,
+)
 from ldls.io.files import InputFile, open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances
 from ldls.io.points.laz_chunks import check_chunks, laszip_record
@@ -40,7 +48,7 @@ MAX_COLOR = 257
 """A byte times this fills the sixteen bits that LAS has for a colour."""
 MAX_INTENSITY = 2**16 - 1
 MOST_LOST = 0.01
-"""What intensities may lose in whole numbers, as a part of the largest."""
+"""What intensities may lose in whole numbers without a warning, as a part of the largest."""
 
 
 @dataclass(frozen=True)
@@ -169,21 +177,21 @@ def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z to 0.1 mm, intensity, colour, and `instance`, `category` and `confidence` of their own.
 
     `.laz` is packed. Intensities of 0 to 1 are spread over the 16 bits that LAS has; where one is larger, all are
-    rounded.
+    rounded. NaN and negative ones are 0, those above 65,535 that; where such are lost, or fractions, there is a
+    `PrecisionWarning`.
     Of a map or a tracked result, `instance` is the track. Points out of view have instance and category 0, as the
     background has.
 
     Raises:
-        NonFiniteError: A coordinate or intensity is not finite, which LAS cannot say.
-        LimitError: The cloud is wider than the coordinates of LAS, a category id is above 65,535, or intensities are
-            not within 0 to 65,535 or lose more than a hundredth of the largest where they are rounded.
+        NonFiniteError: A point is not finite, which LAS cannot say.
+        LimitError: The cloud is wider than the coordinates of LAS, or a category id is above 65,535.
         ImportError: The extra `las` is not installed.
     """
     laspy = require("laspy", "las")
     require("lazrs", "las")
     xyz = result.points[:, :3].astype(np.float64)
-    _check_writable(path, result.points[:, :4], result.categories)
-    intensities = _intensities(path, result.points)
+    _check_writable(path, xyz, result.categories)
+    intensities = _intensities(result.points)
     header = laspy.LasHeader(point_format=COLOR_FORMAT, version="1.4")
     header.scales, header.offsets = np.full(3, SCALE_M), _middle(xyz)
     header.add_extra_dims([laspy.ExtraBytesParams(name, kind) for name, kind in DIMENSIONS.items()])
@@ -203,15 +211,13 @@ def _fill(las: Any, xyz: NDArray[np.float64], result: Labelled) -> None:  # noqa
     las["confidence"] = result.confidence
 
 
-def _check_writable(path: Path, points: Points, categories: NDArray[np.int32]) -> None:
-    finite = np.isfinite(points).all(axis=1)
+def _check_writable(path: Path, xyz: NDArray[np.float64], categories: NDArray[np.int32]) -> None:
+    finite = np.isfinite(xyz).all(axis=1)
     if not finite.all():
-        what = "points" if np.isfinite(points[:, 3:]).all() else "points, or their intensities,"
         raise NonFiniteError(
-            f"{path}: {(~finite).sum()} of {len(points)} {what} are not finite, the first in row {np.argmin(finite)}; "
+            f"{path}: {(~finite).sum()} of {len(xyz)} points are not finite, the first in row {np.argmin(finite)}; "
             "LAS has no such numbers, save .ply or .npz instead"
         )
-    xyz = points[:, :3].astype(np.float64)
     if len(xyz) and (np.ptp(xyz, axis=0) / 2 > MAX_STEPS * SCALE_M).any():
         raise LimitError(f"{path}: the cloud is {np.ptp(xyz, axis=0).max():.0f} m wide, expected at most 429,000 m")
     if len(categories) and not 0 <= categories.min() <= categories.max() <= MAX_CATEGORY:
@@ -225,23 +231,28 @@ def _middle(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.round((xyz.min(axis=0) + xyz.max(axis=0)) / 2) if len(xyz) else np.zeros(3)
 
 
-def _intensities(path: Path, points: Points) -> NDArray[np.uint16]:
+def _intensities(points: Points) -> NDArray[np.uint16]:
     if points.shape[1] == 3:
         return np.zeros(len(points), np.uint16)
-    known = points[:, 3].astype(np.float64)
-    low, high = known.min(initial=0), known.max(initial=0)
-    if low < 0 or high > MAX_INTENSITY:
-        raise LimitError(
-            f"{path}: intensities {low:g} to {high:g}, expected 0 to {MAX_INTENSITY}; scale them, or save .ply or .npz "
-            "instead"
-        )
-    if high <= 1:
-        return np.round(known * MAX_INTENSITY).astype(np.uint16)
-    whole = np.round(known)
-    lost = np.abs(whole - known).max()
-    if lost > MOST_LOST * high:
-        raise LimitError(
-            f"{path}: intensities up to {high:g} lose {lost:.2g} in the whole numbers of LAS; divide them by the "
-            "largest, for those of 0 to 1 are spread over its 16 bits, or save .ply or .npz instead"
+    own = points[:, 3].astype(np.float64)
+    high = own.max(initial=0, where=np.isfinite(own))
+    numbers = np.nan_to_num(own)
+    spread = MAX_INTENSITY if high <= 1 else 1
+    held = numbers.clip(0, MAX_INTENSITY / spread) * spread
+    whole = np.round(held)
+    lost = {
+        "NaN, which are 0": np.isnan(own).any(),
+        "numbers below 0, which are 0": (numbers < 0).any(),
+        f"numbers above {MAX_INTENSITY}, which are that": (numbers > MAX_INTENSITY).any(),
+        "fractions, which are rounded": high > 1 and np.abs(whole - held).max() > MOST_LOST * high,
+    }
+    if any(lost.values()):
+        what = "; ".join(each for each, is_so in lost.items() if is_so)
+        # the same for all frames of a run, so that it is said once
+        warnings.warn(
+            f"intensities hold {what}, for LAS has whole numbers, 0 to {MAX_INTENSITY}; save .ply or .npz to keep "
+            "them, or divide them by the largest, for those of 0 to 1 are spread over these",
+            PrecisionWarning,
+            stacklevel=5,
         )
     return whole.astype(np.uint16)
