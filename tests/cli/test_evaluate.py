@@ -410,17 +410,26 @@ def test_names_of_ones_own_can_be_background(frames):
     assert scores(frames / "t")["Car precision"] == 100.0
 
 
-def test_a_scored_name_that_occurs_nowhere_is_refused(frames):
+def test_a_scored_name_that_occurs_nowhere_is_warned_of_beside_the_tables(frames):
     (frames / "truth/1.txt").write_text("1 Car\n1 gnome\n0 background\n0 background\n")
     outcome = evaluate(frames, "--categories", "car,persn", "--background", "gnome", "--out", frames / "t")
+    assert outcome.exit_code == 0
+    assert outcome.stderr.endswith("warning: --categories: 'persn' is unknown; did you mean 'person'?\n")
+    assert scores(frames / "t")["car recall"] > 0
+    outcome = evaluate(frames, "--categories", "car,gnom", "--background", "gnome")
+    assert outcome.stderr.endswith("warning: --categories: 'gnom' is unknown; did you mean 'gnome'?\n")
+    # of one's own, and of a vocabulary though no frame has it
+    outcome = evaluate(frames, "--categories", "Gnome,zebra,Car", "--out", frames / "t")
+    assert outcome.exit_code == 0
+    assert "warning" not in outcome.stderr
+    assert scores(frames / "t")["Gnome recall"] == 0.0
+
+
+def test_scored_names_that_all_occur_nowhere_are_refused(frames):
+    outcome = evaluate(frames, "--categories", "persn,forklft", "--out", frames / "t")
     assert outcome.exit_code == 1
     assert outcome.stderr.endswith("error: --categories: 'persn' is unknown; did you mean 'person'?\n")
-    outcome = evaluate(frames, "--categories", "car,gnom", "--background", "gnome")
-    assert outcome.stderr.endswith("error: --categories: 'gnom' is unknown; did you mean 'gnome'?\n")
     assert not (frames / "t").exists()
-    # of one's own, and of a vocabulary though no frame has it
-    assert evaluate(frames, "--categories", "Gnome,zebra,Car", "--out", frames / "t").exit_code == 0
-    assert scores(frames / "t")["Gnome recall"] == 0.0
 
 
 @pytest.fixture
@@ -519,6 +528,10 @@ def test_the_classes_of_nuscenes_are_scored_together(tmp_path):
     assert "1 frame, 3 of 5 points counted" in outcome.output
     row = scores(tmp_path / "t")
     assert (row["car IoU"], row["pedestrian IoU"], row["barrier IoU"]) == (100.0, 50.0, None)
+    assert "1 frame, 3 of 5 points counted" in evaluate(tmp_path, "--categories", "nuScenes").output
+    outcome = evaluate(tmp_path, "--categories", "nuScenes,car")
+    assert outcome.exit_code == 1
+    assert outcome.output == "error: --categories: nuscenes stands for all 16 classes of its challenge; give it alone\n"
     outcome = evaluate(tmp_path, "--categories", "nuscenes", "--leave-out", "Van")
     assert outcome.exit_code == 1
     assert "--leave-out: the 16 classes of nuScenes have their own; leave it out" in outcome.output

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -136,7 +136,7 @@ def evaluate(
 
     if calib is None:
         refuse({"image": image}, "its images say what a camera of --calib sees, and there is none")
-    if words(categories) == (NUSCENES,):
+    if _are_nuscenes(words(categories)):
         refuse({"leave-out": leave_out, "background": background or None}, "the 16 classes of nuScenes have their own")
         scored = ClassSet.nuscenes()
     else:
@@ -188,6 +188,20 @@ def evaluate(
             "sweeps, too, and may go beyond it",
             soft_wrap=True,
         )
+
+
+def _are_nuscenes(categories: Sequence[str]) -> bool:
+    """True where the word for all of nuScenes' challenge stands in the place of categories.
+
+    Raises:
+        ParameterError: Others stand beside it.
+    """
+    from ldls.categories import folded
+
+    found = NUSCENES in map(folded, categories)
+    if found and len(categories) > 1:
+        raise ParameterError(f"--categories: {NUSCENES} stands for all 16 classes of its challenge; give it alone")
+    return found
 
 
 def _places(predictions: str, name: str | None, beside: list[str]) -> dict[str, tuple[Path, str | None]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from ldls.categories import COCO_NAMES, find_categories, folded, synonyms
 from ldls.checks import checked
-from ldls.errors import InputError, ParameterError
+from ldls.errors import InputError, LdlsWarning, ParameterError
 from ldls.io.labels.kitti_objects import KITTI
 from ldls.io.labels.nuscenes_labels import LIDARSEG, NUSCENES
 from ldls.io.labels.semantic_kitti import SEMANTIC_KITTI
@@ -166,17 +167,26 @@ class ClassSet:
         return {folded(name): number for name, number in every.items()}
 
     def check_occur(self, seen: Iterable[str]) -> None:
-        """Refuse scored names that neither a vocabulary nor any label has, and that nothing else counts as.
+        """Warn of scored names that neither a vocabulary nor any label has, and that nothing else counts as.
 
         Args:
             seen: The names of classes that truth or predictions have.
 
         Raises:
-            ParameterError: There is one; the message has the nearest name.
+            ParameterError: All are such; the message, as that of the warning, has the nearest name.
         """
-        every = dict.fromkeys([*sorted({*seen} - {BACKGROUND}), *sorted(_known_names())])
-        alone = (name for name in self.names if name not in self.aliases.values())
-        find_categories(alone, dict(enumerate(every)))
+        every = dict(enumerate(dict.fromkeys([*sorted({*seen} - {BACKGROUND}), *sorted(_known_names())])))
+        faults = []
+        for name in self.names:
+            if name not in self.aliases.values():
+                try:
+                    find_categories([name], every)
+                except ParameterError as error:
+                    faults.append(error)
+        if len(faults) == len(self.names):
+            raise faults[0]
+        for fault in faults:
+            warnings.warn(str(fault), LdlsWarning, stacklevel=2)
 
     def _check_known(self, truth: Labeling) -> None:
         unknown = [name for name, count in truth.counts().items() if count and not self.knows(name)]
