@@ -33,6 +33,14 @@ FACES = ("element face 1", "property list uchar int vertex_indices")
         pytest.param(b"\xef\xbb\xbf" + header("ascii") + ascii_body(ROWS), id="byte order mark"),
         pytest.param((header("ascii") + ascii_body(ROWS)).replace(b"\n", b"\r\n"), id="CRLF, ascii"),
         pytest.param(header("binary_little_endian").replace(b"\n", b"\r\n") + ROWS.tobytes(), id="CRLF, binary"),
+        pytest.param(header("ascii") + ascii_body(ROWS) + b"# made by hand\n", id="a comment behind, ascii"),
+        pytest.param(
+            header("ascii", after=("element edge 1", "property int a")) + ascii_body(ROWS) + b"# edges\n7\n",
+            id="a comment before another element, ascii",
+        ),
+        pytest.param(
+            header("ascii", after=FACES) + ascii_body(ROWS) + b"3 0\n1 2\n", id="a face over two lines, ascii"
+        ),
         pytest.param(
             header("binary_little_endian", after=FACES) + ROWS.tobytes() + b"\3\0\0\0\0\1\0\0\0\2\0\0\0",
             id="faces after",
@@ -114,10 +122,10 @@ def test_a_file_of_results_reads_back(small_scene, tmp_path):
             id="fewer in ascii",
         ),
         pytest.param(
-            header("ascii", 2, after=FACES) + ascii_body(ROWS) + b"3 0 1 2\n",
+            header("ascii", 2, after=("element edge 1", "property int a")) + ascii_body(ROWS) + b"# edges\n7\n",
             ldls.CorruptFileError,
-            "header have 3 lines, the file has 4",
-            id="fewer before faces, ascii",
+            "line 16: the elements of the header have 3 lines, the file has 4",
+            id="fewer before another element, ascii",
         ),
         pytest.param(
             header("binary_big_endian", 2) + ROWS.astype(">f4").tobytes(),

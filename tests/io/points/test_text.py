@@ -27,6 +27,13 @@ ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
         pytest.param("intensity x y z ring\n9 1 2 3 7\n", [[1, 2, 3, 9]], id="intensity comes fourth"),
         pytest.param("1 2 3 0.5 7\n", [[1, 2, 3, 0.5, 7]], id="more columns without names"),
         pytest.param("x,y,z\n1.5,-2,3e-3,\n4,5,6\n", ROWS, id="a comma behind the last cell"),
+        pytest.param("x y z i\n1 2 3 0.5 parked car\n", [[1, 2, 3, 0.5]], id="more cells of text"),
+        pytest.param("1 2 3\n4 5 6 parked car\n", [[1, 2, 3], [4, 5, 6]], id="more cells of text without names"),
+        pytest.param("x,y,z,name\n1.0,2.0,3.0,hello, world\n", [[1, 2, 3]], id="a comma in text"),
+        pytest.param("x,y,z,i\n1,2,3,0.5,,\n", [[1, 2, 3, 0.5]], id="empty cells"),
+        pytest.param('x,y,z\n1,2,3,"", \n', [[1, 2, 3]], id="empty cells in quotes"),
+        pytest.param("1 2 3\n4 5 6 # 2 hits\n", [[1, 2, 3], [4, 5, 6]], id="a comment behind a row"),
+        pytest.param("x y z\n4 5 6 // 2 hits", [[4, 5, 6]], id="a comment behind a row with names"),
         pytest.param('name,x,y,z\n"a,b",1.5,-2,3e-3\n,4,5,6\n', ROWS, id="a comma in quotes"),
         pytest.param("nan 2 inf\n", [[np.nan, 2, np.inf]], id="not finite"),
         pytest.param("x,y,z\n", np.zeros((0, 3)), id="header alone"),
@@ -59,6 +66,12 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
         ),
         pytest.param(
             "x y z r\n1 2 3 4 5\n", ldls.CorruptFileError, "line 2: expected 4 cells, got 5", id="header, blanks"
+        ),
+        pytest.param(
+            'x,y,z,n\n1,2,3,"a,b"\n1,5,2,3,"4"\n', ldls.CorruptFileError, "line 3: expected 4 cells, got 5", id="quotes"
+        ),
+        pytest.param(
+            "1 2 3\n4 5 6 a\n4 b 6\n", ldls.CorruptFileError, "line 3: .* column 2, got 'b'", id="word behind text"
         ),
         pytest.param("1,,3\n", ldls.CorruptFileError, "line 1: .* column 2, got ''", id="empty cell"),
         pytest.param(

@@ -5,6 +5,7 @@ Source: http://paulbourke.net/dataformats/ply/.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatE
 from ldls.io.files import open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
-from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
+from ldls.io.points.text_rows import Row, as_text, is_number, of_kind, read_rows, split_header, text_rows, whole_number
 
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 TYPES = {
@@ -59,7 +60,7 @@ def read(path: Path) -> Points:
         TruncatedFileError: The file ends before the vertices that the header says, or, in ascii, with the last number
             of them, without a line end: that number may be cut short.
         CorruptFileError: The header contradicts itself or what follows it, or a number is none; the message names the
-            line. In binary, what follows lists is not known, and nothing is said of it.
+            line. What follows lists is not known, and nothing is said of it.
         UnsupportedFormatError: The vertices, or an element before them, have a list property.
     """
     with open_file(path, "PLY file") as file:
@@ -98,14 +99,32 @@ def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
 
 def _refuse_more(header: Header, body: bytes, needed: int) -> None:
     """Refuse a binary body with room for a further vertex behind what the header says, save white space."""
-    if any(element.count and element.list_properties for element in header.after):
-        return  # nobody knows how long lists are but who walks through them all
+    if _has_lists(header.after):
+        return
     order = BYTE_ORDERS[header.encoding]
     end = needed + sum(element.count * element.dtype(order).itemsize for element in header.after)
     if len(body) - end >= header.vertex.dtype(order).itemsize and body[end:].strip():
         raise CorruptFileError(
             f"the elements of the header need {end} bytes after it, the file has {len(body)}; mend the header"
         )
+
+
+def _refuse_more_lines(header: Header, rows: Sequence[Row], needed: int) -> None:
+    """Refuse further lines of numbers in ascii behind what the header says."""
+    if _has_lists(header.after):
+        return
+    behind = [number for number, line in rows[needed:] if is_number(line.split()[0])]
+    n_after = sum(element.count for element in header.after)
+    if len(behind) > n_after:
+        raise CorruptFileError(
+            f"line {behind[n_after]}: the elements of the header have {needed + n_after} lines, the file has "
+            f"{needed + len(behind)}; mend the header"
+        )
+
+
+def _has_lists(elements: Sequence[Element]) -> bool:
+    """True where nobody knows how long elements are but who walks through them all."""
+    return any(element.count and element.list_properties for element in elements)
 
 
 def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines: int) -> Points:
@@ -116,12 +135,7 @@ def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines
         raise TruncatedFileError(
             f"element vertex {count} needs as many lines, the file ends after {max(0, len(rows) - start)}"
         )
-    n_lines = start + count + sum(element.count for element in header.after)
-    if n_lines < len(rows):
-        raise CorruptFileError(
-            f"line {rows[n_lines][0]}: the elements of the header have {n_lines} lines, the file has {len(rows)}; "
-            "mend the header"
-        )
+    _refuse_more_lines(header, rows, start + count)
     cells = read_rows(rows[start : start + count], columns.positions, len(vertex.properties))
     names, kinds = ([each[position] for position in columns.positions] for each in (vertex.properties, vertex.types))
     return columns.stack([of_kind(*each) for each in zip(names, cells.T, map(np.dtype, kinds), strict=True)])

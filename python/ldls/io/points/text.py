@@ -11,9 +11,8 @@ from ldls.cloud import MAX_COLUMNS
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file
 from ldls.io.points.named_columns import NamedColumns, plain_name
-from ldls.io.points.text_rows import Row, read_rows, text_rows
+from ldls.io.points.text_rows import COMMENTS, Row, read_rows, text_rows
 
-COMMENTS = ("#", "//")
 DELIMITERS = (";", "\t", ",")
 """Tried in this order; where none stands in the first line, blanks separate."""
 
@@ -28,8 +27,8 @@ def read(path: Path) -> NDArray[np.float64]:
     Raises:
         TruncatedFileError: The file is empty, its last line has too few cells, or it ends with its last number, without
             a line end: that number may be cut short.
-        CorruptFileError: Another line has too few cells, one has more than the first, or a cell is no number; the
-            message names it.
+        CorruptFileError: Another line has too few cells, one has a number behind as many cells as the first, or a cell
+            is no number; the message names it.
         UnsupportedFormatError: There are more columns than clouds have.
     """
     with open_file(path, "text file of points") as file:

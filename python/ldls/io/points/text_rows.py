@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,8 @@ Row = tuple[int, str]
 """Number of a line in its file, from 1, and the line; with its end, which the last one may lack."""
 MAX_HEADER_BYTES = 1 << 16
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+COMMENTS = ("#", "//")
+DIGIT = re.compile("[0-9]")
 
 
 def split_header(content: bytes, last: str) -> tuple[list[Row], bytes]:
@@ -77,32 +81,25 @@ def read_rows(
         rows: Lines that hold cells. What follows the last cell that is wanted of the last line, be it a blank or the
             line's end, says that it is whole: 12.3 at the very end of a file may be what is left of 12.345.
         positions: Columns wanted.
-        n_cells: Most cells that a row may have.
+        n_cells: Most cells that a row may have; what follows them must be no number.
         delimiter: What stands between cells; None for any blanks.
 
     Raises:
         TruncatedFileError: The last row has too few cells, or nothing follows its last one.
-        CorruptFileError: Another row has too few cells, one has too many, or a cell is no number; the message names
+        CorruptFileError: Another row has too few cells, one has more numbers, or a cell is no number; the message names
             the line.
     """
     if not rows:
         return np.zeros((0, len(positions)))
     lines = [line for _, line in rows]
     # where all cells between blanks are wanted, NumPy counts them as it goes
-    counted = delimiter is None and list(positions) == list(range(n_cells))
-    if not counted:
+    numbers = _loaded(lines, None) if delimiter is None and list(positions) == list(range(n_cells)) else None
+    if numbers is None or numbers.shape[1] != len(positions):
+        numbers = _loaded(lines, delimiter, positions)
         _refuse_long_row(rows, n_cells, delimiter)
-    wanted = None if counted else list(positions)
-    try:
-        numbers = np.loadtxt(
-            lines, np.float64, comments=None, delimiter=delimiter, usecols=wanted, ndmin=2, quotechar='"'
-        )
-        if numbers.shape[1] != len(positions):
-            raise ValueError(f"{numbers.shape[1]} columns")
-    except ValueError as error:
-        _refuse_long_row(rows, n_cells, delimiter)
+    if numbers is None:
         _refuse_wrong_cell(rows, positions, delimiter)
-        raise CorruptFileError(f"not rows of numbers ({error})") from None
+        raise CorruptFileError("not rows of numbers")
     number, last = rows[-1]
     cells = last.split(delimiter)
     if not last[-1].isspace() and max(positions) == len(cells) - 1:
@@ -132,25 +129,48 @@ def of_kind(name: str, column: NDArray[np.float64], kind: np.dtype[np.number]) -
     return column.astype(kind)
 
 
+def _loaded(
+    lines: Sequence[str], delimiter: str | None, positions: Sequence[int] | None = None
+) -> NDArray[np.float64] | None:
+    """The cells at `positions`, or all; None if one is no number, or if of all cells rows have different counts."""
+    try:
+        return np.loadtxt(
+            lines, np.float64, comments=None, delimiter=delimiter, usecols=positions, ndmin=2, quotechar='"'
+        )
+    except ValueError:
+        return None
+
+
 def _refuse_long_row(rows: Sequence[Row], n_cells: int, delimiter: str | None) -> None:
+    """Refuse a row with a number behind its last cell, as decimal commas make them; text there harms nothing."""
     for number, line in rows:
-        # counting what stands between cells is the cheaper half
+        # counting what stands between cells is cheaper than parting them, and a look for digits than parsing
         if delimiter is not None and line.count(delimiter) < n_cells:
             continue
-        found = _n_cells(line, delimiter)
-        if found > n_cells:
+        behind = line.split(delimiter, n_cells)[n_cells:]
+        if not behind or not DIGIT.search(behind[0]):
+            continue
+        surplus = [*takewhile(lambda cell: not cell.lstrip().startswith(COMMENTS), _cells(line, delimiter)[n_cells:])]
+        if any(map(is_number, surplus)):
             raise CorruptFileError(
-                f"line {number}: expected {n_cells} cells, got {found}: {line.strip()[:80]!r}; numbers need a decimal "
-                "point, and every row as many cells as the columns that the file says"
+                f"line {number}: expected {n_cells} cells, got {n_cells + len(surplus)}: {line.strip()[:80]!r}; "
+                "numbers need a decimal point, and every row as many cells as the columns that the file says"
             )
 
 
-def _n_cells(line: str, delimiter: str | None) -> int:
-    if delimiter is None:
-        return len(line.split())
-    cells = next(csv.reader([line.strip()], delimiter=delimiter))
-    # what ends its last cell as it ends the others makes no further one
-    return len(cells) - (cells[-1].strip() == "")
+def _cells(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is not None and '"' in line:
+        return next(csv.reader([line.strip()], delimiter=delimiter))
+    return line.split(delimiter)
+
+
+def is_number(cell: str) -> bool:
+    """True for a cell, in quotes or not, that holds a number."""
+    try:
+        float(cell.strip().strip('"'))
+    except ValueError:
+        return False
+    return True
 
 
 def _refuse_wrong_cell(rows: Sequence[Row], positions: Sequence[int], delimiter: str | None) -> None:
@@ -165,9 +185,7 @@ def _refuse_wrong_cell(rows: Sequence[Row], positions: Sequence[int], delimiter:
 
 
 def _check_number(place: str, position: int, cell: str) -> None:
-    try:
-        float(cell.strip().strip('"'))
-    except ValueError:
+    if not is_number(cell):
         raise CorruptFileError(
             f"{place}: expected a number with a decimal point in column {position + 1}, got {cell.strip()[:40]!r}"
-        ) from None
+        )
