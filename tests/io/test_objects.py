@@ -93,7 +93,7 @@ def test_json_is_a_data_set_after_cocos(result, tmp_path):
     assert car["box"]["yaw"] == pytest.approx(found.box.yaw, abs=1e-4)
 
 
-def test_a_class_has_one_id_in_json_whatever_each_frame_calls_it(result, tmp_path):
+def test_a_class_has_one_id_in_tables_whatever_each_frame_calls_it(result, tmp_path):
     def named(*classes):
         pairs = zip(result.instances, classes, strict=True)
         return replace(result, instances=tuple(replace(i, category=c, name=name) for i, (c, name) in pairs))
@@ -110,6 +110,10 @@ def test_a_class_has_one_id_in_json_whatever_each_frame_calls_it(result, tmp_pat
         "cone", "car", "barrel", "cone", "barrel", "sign",
     ]  # fmt: skip
     assert names == {3: "car", 100: "cone", 101: "barrel", 102: "sign"}
+    ldls.save_objects(frames, tmp_path / "a.csv")
+    rows = [(int(row["category"]), row["name"]) for row in read_rows(tmp_path / "a.csv")]
+    assert [category for category, _ in rows] == [each["category_id"] for each in content["annotations"]]
+    assert [name for _, name in rows] == ["cone", "car", "barrel", "Cone", "barrel", "sign"]
 
 
 def test_json_of_several_cameras_has_an_image_of_each(tmp_path):

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
@@ -52,8 +52,9 @@ def save_objects(results: Segmentation | Mapping[str, Segmentation], path: str |
 
     `.csv` has the columns of `Segmentation.to_table` after `frame`; `.json` is a data set after COCO's with an
     annotation for each object, its box in the lidar frame beside the one in the image. An object that no image of its
-    frame shows has empty cells for camera and mask in `.csv`, and null for `image_id` and `bbox` in `.json`.
-    docs/formats.md says what is in each. Numbers are rounded to four decimals. The file appears only when it is whole.
+    frame shows has empty cells for camera and mask in `.csv`, and null for `image_id` and `bbox` in `.json`. A class
+    has one category id in the file, by its name. Numbers are rounded to four decimals. docs/formats.md says what is in
+    each. The file appears only when it is whole.
 
     Args:
         results: A result, whose frame has no name in the table, or results by the names of their frames.
@@ -81,9 +82,17 @@ def objects_writer(path: str | PathLike[str]) -> Callable[[Iterable[FrameObjects
 
     def write(frames: Iterable[FrameObjects]) -> None:
         with whole_file(path) as file:
-            writer(file, frames)
+            writer(file, _with_class_ids(frames))
 
     return write
+
+
+def _with_class_ids(frames: Iterable[FrameObjects]) -> Iterator[FrameObjects]:
+    """The frames with one category id a class, which masks of each frame may number in their own way."""
+    names: dict[int, str] = {}
+    for each in frames:
+        ids = [class_id(row["category"], row["name"], names) for row in each.rows]
+        yield replace(each, rows=[row | {"category": own} for row, own in zip(each.rows, ids, strict=True)])
 
 
 def _write_csv(file: IO[bytes], frames: Iterable[FrameObjects]) -> None:
@@ -129,8 +138,8 @@ def _annotations(
             )
         for row in each.rows:
             number += 1
+            names.setdefault(row["category"], row["name"])
             rounded = {name: _rounded(value) for name, value in row.items()}
-            rounded["category"] = class_id(row["category"], row["name"], names)
             yield _annotation(number, each.frame, ids.get(row["camera"]), rounded)
 
 
