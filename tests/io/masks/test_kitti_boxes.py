@@ -93,3 +93,18 @@ def test_classes_of_kitti_keep_off_the_ids_of_ones_own(tmp_path):
     masks = boxes(tmp_path, lines, image_size=(6, 10), names={101: "Crane", 3: "Lorry", 7: "Cyclist"})
     assert [(mask.category, mask.name) for mask in masks] == [(103, "Van"), (100, "car"), (7, "Cyclist")]
     assert masks.names[101] == "Crane" and masks.names[3] == "Lorry"
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        pytest.param({1: "Car", 2: "Pedestrian"}, [(1, "Car"), (2, "Pedestrian")], id="both"),
+        pytest.param({2: "Pedestrian", 1: "Car"}, [(1, "Car"), (2, "Pedestrian")], id="in another order"),
+        pytest.param({5: "CAR", 7: "person"}, [(5, "CAR"), (7, "person")], id="COCO's"),
+        pytest.param({0: "Car", 1: "Pedestrian"}, [(3, "car"), (1, "Pedestrian")], id="0 is passed over"),
+    ],
+)
+def test_names_of_ones_own_are_those_of_classes_of_kitti(tmp_path, names, expected):
+    lines = "".join(f"{name} 0 0 0 0 0 5 5 {REST}\n" for name in ("Car", "Pedestrian"))
+    masks = boxes(tmp_path, lines, image_size=(6, 10), names=names)
+    assert [(mask.category, mask.name) for mask in masks] == expected

@@ -42,19 +42,19 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
 
     Args:
         path: Label file, or a detector's results in its layout.
-        names: Names of further category ids, for classes that are not KITTI's.
+        names: Names of further category ids, for classes that are not KITTI's, or for KITTI's in the place of its own;
+            0 is passed over.
 
     Raises:
         MaskError: A class without category id, or a score outside 0 to 1.
         FileFormatError: The file is broken; see `read_kitti_objects`.
     """
     objects = [each for each in read_kitti_objects(path) if not each.is_region]
-    known = dict(names or {})
+    given = {category: name for category, name in (names or {}).items() if category != 0}
+    known = dict(given)
     of_kitti = {name: class_id(category, KITTI_NAMES[category], known) for name, category in KITTI_CATEGORIES.items()}
     all_names = COCO_NAMES | known
-    # a blank separates fields, so names are written without
-    ids = {folded(name).replace(" ", "_"): category for category, name in all_names.items()}
-    ids = {folded(name): category for name, category in of_kitti.items()} | ids
+    ids = _ids(all_names) | {folded(name): category for name, category in of_kitti.items()} | _ids(given)
     with within(path):
         return KittiBoxes(
             boxes=[each.bbox for each in objects],
@@ -62,6 +62,11 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
             scores=[_score(i, each) for i, each in enumerate(objects)],
             names=all_names,
         )
+
+
+def _ids(names: Mapping[int, str]) -> dict[str, int]:
+    # a blank separates fields, so names are written without
+    return {folded(name).replace(" ", "_"): category for category, name in names.items()}
 
 
 def read(
@@ -72,7 +77,8 @@ def read(
     Args:
         path: Label file, or a detector's results in its layout.
         image_size: (height, width) of the image in pixels, which the file does not say.
-        names: Names of further category ids, for classes that are not KITTI's.
+        names: Names of further category ids, for classes that are not KITTI's, or for KITTI's in the place of its own;
+            0 is passed over.
 
     Raises:
         MaskError: No image size, a class without category id, or a box that is none.
