@@ -167,7 +167,7 @@ def test_files_of_all_frames_are_not_written_over_those_of_one(drive, tmp_path, 
     batch.run(drive, tmp_path / "out", settings)
     before = runs.contents(tmp_path / "out")
     ((name, file),) = options.items()
-    said = rf"{name.partition('_')[0]}: .*{file} is the name of a file that the run itself writes there; give another"
+    said = rf"{name.partition('_')[0]}: .*{file} is the name of a file that runs write there; give another"
     with pytest.raises(ParameterError, match=said):
         batch.run(drive, tmp_path / "out", settings, **{name: tmp_path / "out" / file})
     assert runs.contents(tmp_path / "out") == before

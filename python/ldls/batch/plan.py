@@ -129,7 +129,7 @@ def check_places(
 
 
 def check_apart(files: Mapping[str, Path], folder: Path, names: Sequence[str]) -> None:
-    """Refuse a file of all frames in the place of one that the run has itself, which one of them would be lost to.
+    """Refuse a file of all frames in the place of one that runs, tracked or not, write there: one would be lost.
 
     Args:
         files: The files of all frames, by the options that name them.
@@ -143,9 +143,7 @@ def check_apart(files: Mapping[str, Path], folder: Path, names: Sequence[str]) -
     own = {folder.resolve(): {*of_frames, TABLE}, (folder / FOLDER).resolve(): {*of_frames, STATE}}
     for option, path in files.items():
         if _folded(path.name) in own.get(path.parent.resolve(), ()):
-            raise ParameterError(
-                f"{option}: {path} is the name of a file that the run itself writes there; give another"
-            )
+            raise ParameterError(f"{option}: {path} is the name of a file that runs write there; give another")
 
 
 def _folded(file: str) -> str:
