@@ -1,6 +1,7 @@
 """Runs that label sweeps of a drive together: the labels, windows, frames that fail, and what is done again."""
 
 import json
+import re
 import shutil
 import signal
 
@@ -348,6 +349,23 @@ def test_a_sweep_that_odometry_cannot_use_fails_alone_or_is_between_the_others(s
     placed = {frame: np.array(record["pose"]) for frame, record in records(tmp_path / "other").items()}
     before, after = (placed[frame][:3, 3] for frame in open_source(drive).names[2::2])
     np.testing.assert_allclose(placed[name][:3, 3], (before + after) / 2, atol=1e-6)
+
+
+def test_a_sweep_at_an_end_that_is_mended_needs_another_folder(simulated, tmp_path):
+    pytest.importorskip("kiss_icp", reason="the extra odometry is not installed")
+    drive = shutil.copytree(simulated.parent, tmp_path / simulated.parent.name) / simulated.name
+    name = open_source(drive).names[-1]
+    settings = {"masks": str(drive / "masks_02"), "poses": "kiss-icp"}
+    path = drive / f"velodyne_points/data/{name}.bin"
+    whole = path.read_bytes()
+    path.write_bytes(b"x")
+    with pytest.warns(LeftOutWarning, match="1 of 5 frames"):
+        run(drive, tmp_path / "out", **settings)
+    path.write_bytes(whole)
+    (failure,) = run(drive, tmp_path / "out", **settings).failures
+    assert failure.frame == name
+    assert re.search(r"poses\.txt: stamp: no pose at .* give another --out to find the way anew", failure.message)
+    assert run(drive, tmp_path / "other", **settings).n_done == 5
 
 
 def test_a_file_of_poses_needs_no_first_sweep(drive, tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -99,7 +99,7 @@ class Poses:
         """
         pose, stamp = frame.pose, self.stamps[index]
         if self._trajectory is not None:
-            with within(str(self._settings.poses)):
+            with self._within_file():
                 pose = None if stamp is None else self._trajectory.at(stamp)
         if self._settings.sweeps and (stamp is None or pose is None):
             what = "stamp" if stamp is None else "pose"
@@ -114,8 +114,22 @@ class Poses:
         """
         if self._trajectory is None:
             return frame.deskewed()
-        with within(str(self._settings.poses)):
+        with self._within_file():
             return frame.deskewed(self._trajectory)
+
+    @contextmanager
+    def _within_file(self) -> Iterator[None]:
+        """Begin errors with the file of poses; where a run found these, say how to find them anew."""
+        path = Path(str(self._settings.poses))
+        with within(str(path)):
+            try:
+                yield
+            except PoseError as error:
+                if path.name != FOUND_POSES or not holds_found_poses(path.parent):
+                    raise
+                raise PoseError(
+                    f"{error}; or, if a sweep was mended, give another --out to find the way anew"
+                ) from None
 
     def check(self, chosen: Frames) -> None:
         """Refuse, before any work, frames without poses where they are needed, or in another order than their stamps.
