@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import takewhile
 
 import numpy as np
@@ -92,14 +93,19 @@ def read_rows(
     if not rows:
         return np.zeros((0, len(positions)))
     lines = [line for _, line in rows]
-    # where all cells between blanks are wanted, NumPy counts them as it goes
-    numbers = _loaded(lines, None) if delimiter is None and list(positions) == list(range(n_cells)) else None
-    if numbers is None or numbers.shape[1] != len(positions):
-        numbers = _loaded(lines, delimiter, positions)
+    numbers = None
+    if delimiter is None and list(positions) == list(range(n_cells)):
+        # where all cells between blanks are wanted, NumPy counts them as it goes
+        with suppress(ValueError):
+            numbers = _loaded(lines, None, None)
+    if numbers is None or numbers.shape[1] != n_cells:
+        try:
+            numbers = _loaded(lines, delimiter, positions)
+        except ValueError as error:
+            _refuse_long_row(rows, n_cells, delimiter)
+            _refuse_wrong_cell(rows, positions, delimiter)
+            raise CorruptFileError(f"not rows of numbers ({error})") from None
         _refuse_long_row(rows, n_cells, delimiter)
-    if numbers is None:
-        _refuse_wrong_cell(rows, positions, delimiter)
-        raise CorruptFileError("not rows of numbers")
     number, last = rows[-1]
     cells = last.split(delimiter)
     if not last[-1].isspace() and max(positions) == len(cells) - 1:
@@ -129,16 +135,8 @@ def of_kind(name: str, column: NDArray[np.float64], kind: np.dtype[np.number]) -
     return column.astype(kind)
 
 
-def _loaded(
-    lines: Sequence[str], delimiter: str | None, positions: Sequence[int] | None = None
-) -> NDArray[np.float64] | None:
-    """The cells at `positions`, or all; None if one is no number, or if of all cells rows have different counts."""
-    try:
-        return np.loadtxt(
-            lines, np.float64, comments=None, delimiter=delimiter, usecols=positions, ndmin=2, quotechar='"'
-        )
-    except ValueError:
-        return None
+def _loaded(lines: Sequence[str], delimiter: str | None, positions: Sequence[int] | None) -> NDArray[np.float64]:
+    return np.loadtxt(lines, np.float64, comments=None, delimiter=delimiter, usecols=positions, ndmin=2, quotechar='"')
 
 
 def _refuse_long_row(rows: Sequence[Row], n_cells: int, delimiter: str | None) -> None:
