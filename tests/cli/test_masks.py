@@ -52,6 +52,13 @@ def test_masks_go_through_every_format_and_stay_what_they_are(masks):
         pytest.param(["--min-area", 100], lambda m: m.filter(min_area=100), id="area"),
         pytest.param(["--resolve", "area"], lambda m: m.resolve_overlaps("area"), id="overlaps"),
         pytest.param(["--shrink", 2, "--grow", 1], lambda m: m.shrink(2).grow(1), id="opening"),
+        pytest.param(["--shrink", 2, "--min-area", 1], lambda m: m.filter(min_area=10).shrink(2), id="area shrunk"),
+        pytest.param(["--grow", 2, "--min-area", 10], lambda m: m.grow(2), id="area grown"),
+        pytest.param(
+            ["--resolve", "order", "--min-area", 7],
+            lambda m: m.filter(min_area=10).resolve_overlaps("order"),
+            id="area left",
+        ),
     ],
 )
 def test_masks_change_on_the_way(masks, options, change):

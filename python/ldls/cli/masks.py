@@ -97,7 +97,9 @@ def convert(
     ] = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
-    min_area: Annotated[int, typer.Option(metavar="N", help="Fewest pixels of a mask that is kept.", min=0)] = 0,
+    min_area: Annotated[
+        int, typer.Option(metavar="N", help="Fewest pixels of a mask that is kept, shrunk, grown and resolved.", min=0)
+    ] = 0,
     shrink: Annotated[int, typer.Option(metavar="N", help="Take this many pixels off the edges of masks.", min=0)] = 0,
     grow: Annotated[int, typer.Option(metavar="N", help="Add this many pixels to the edges of masks.", min=0)] = 0,
     resolve: Annotated[
@@ -135,13 +137,15 @@ def convert(
         instance_axis=AXES[instance_axis],
         class_divisor=class_divisor,
     )
-    kept = wanted(read, min_score=min_score, categories=categories).filter(min_area=min_area)
+    kept = wanted(read, min_score=min_score, categories=categories)
     if shrink:
         kept = kept.shrink(shrink)
     if grow:
         kept = kept.grow(grow)
+    kept = kept.filter(min_area=min_area)
     if resolve is not None:
-        kept = kept.resolve_overlaps(resolve.value)
+        # what too small a mask holds is left to others, and what is left of one may be too small
+        kept = kept.resolve_overlaps(resolve.value).filter(min_area=min_area)
     save(kept, out, **(VARIANTS[variant] if variant else {}))
     console().print(f"wrote {len(kept)} of {len(read)} masks to {out}", soft_wrap=True)
 
