@@ -24,6 +24,16 @@ def test_real_frames(data_folder, tmp_path):
     assert {"Car", "DontCare"} <= {*found.names}
 
 
+def test_without_images_their_size_is_said_once(data_folder, tmp_path):
+    training = tmp_path / "training"
+    shutil.copytree(data_folder / "kitti/training", training, ignore=shutil.ignore_patterns("image_2"))
+    outcome = run(app, ["annotate", str(training), str(tmp_path / "out")])
+    assert outcome.exit_code == 0, outcome.output
+    (warning,) = outcome.stderr.strip().splitlines()
+    assert "375 x 1242 (height x width) is assumed" in warning
+    assert warning.endswith(f"put them into {training / 'image_2'}")
+
+
 def test_files_that_are_there_are_kept(data_folder, tmp_path):
     command = ["annotate", str(data_folder / "kitti/training"), str(tmp_path / "out")]
     assert "kept" not in run(app, command).output

@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from ldls.cli.label_pairs import Counting, FrameFolders, read_pairs
-from ldls.errors import InputError, ShapeError
+from ldls.errors import InputError, LdlsWarning, ShapeError
 from ldls.io.labels.label_formats import LabelFile, LabelFiles, pair_files
 
 CALIB = """P0: 1 0 0 0 0 1 0 0 0 0 1 0
@@ -43,7 +43,8 @@ def test_boxes_take_points_calibration_and_the_size_of_the_image(boxes):
     np.testing.assert_allclose(pair.ranges_m, np.linalg.norm(POINTS[:, :3], axis=1), rtol=1e-6)
     assert pair.truth.ignored.tolist() == [False, False, True]
     # KITTI's usual image is wide enough for the third point
-    assert not read(boxes, points="velodyne", calib="calib").truth.ignored.any()
+    with pytest.warns(LdlsWarning, match=r"375 x 1242 \(height x width\) is assumed.*; name their folder \(--image\)"):
+        assert not read(boxes, points="velodyne", calib="calib").truth.ignored.any()
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".jpeg"])
@@ -69,7 +70,7 @@ def test_what_boxes_need_is_named(boxes):
         read(boxes, points="calib", calib="calib")
     (boxes / "mine/7.txt").write_text("1 Car\n")
     with pytest.raises(ShapeError, match="frame 7: prediction has 1 points, truth 3"):
-        read(boxes, points="velodyne", calib="calib")
+        read(boxes, points="velodyne", calib="calib", images="image_2")
 
 
 def test_squeezeseg_brings_its_ranges(tmp_path):

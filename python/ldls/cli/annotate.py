@@ -22,7 +22,8 @@ def annotate(
         Path,
         typer.Argument(
             metavar="TRAINING",
-            help="Folder of KITTI object data: label_2, velodyne, calib and, for their size, image_2.",
+            help="Folder of KITTI object data: label_2, velodyne, calib and image_2, for the size of the images; "
+            "without it 375 x 1242 is assumed.",
             exists=True,
             file_okay=False,
         ),

@@ -107,7 +107,11 @@ def evaluate(
         typer.Option(help="Folder of KITTI calibrations: only points that the camera sees count.", **FOLDER),
     ] = None,
     image: Annotated[
-        Path | None, typer.Option(help="Folder of the images, whose size says what the camera sees.", **FOLDER)
+        Path | None,
+        typer.Option(
+            help="Folder of the images, whose size says what the camera sees; without it 375 x 1242 is assumed.",
+            **FOLDER,
+        ),
     ] = None,
     out: Annotated[
         Path | None,

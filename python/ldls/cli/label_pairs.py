@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets.file_source import IMAGE_SUFFIXES
-from ldls.errors import InputError, ShapeError, within
+from ldls.errors import InputError, LdlsWarning, ShapeError, within
 from ldls.evaluation.bound import bound_labels
 from ldls.evaluation.classes import ClassSet
 from ldls.evaluation.pair import Pair, ranges_of
@@ -62,7 +63,7 @@ class FrameFolders:
         return read_points(next((path for path in paths if path.exists()), paths[0]))
 
     def read_camera(self, name: str) -> Camera:
-        """Camera of the frame `name`, with the size of its image where the folder of images is known.
+        """Camera of the frame `name`, with the size of its image; KITTI's usual one, and a warning, without images.
 
         Raises:
             InputError: The folder of calibrations is not known, or that of images has none of the frame.
@@ -74,9 +75,17 @@ class FrameFolders:
         camera = read_camera(self.calib / f"{name}.txt", format="kitti")
         return replace(camera, image_size=self._image_size(name))
 
-    def _image_size(self, name: str) -> tuple[int, int] | None:
+    def _image_size(self, name: str) -> tuple[int, int]:
         if self.images is None or not self.images.is_dir():
-            return None
+            mend = "name their folder (--image)" if self.images is None else f"put them into {self.images}"
+            height, width = IMAGE_SIZE
+            warnings.warn(
+                f"images: their size is not known, {height} x {width} (height x width) is assumed, KITTI's usual one, "
+                f"and decides which points are in view; {mend}",
+                LdlsWarning,
+                stacklevel=1,
+            )
+            return IMAGE_SIZE
         paths = [self.images / f"{name}{suffix}" for suffix in IMAGE_SUFFIXES]
         found = next((path for path in paths if path.exists()), None)
         if found is None:
