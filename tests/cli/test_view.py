@@ -61,6 +61,9 @@ def test_a_ring_takes_an_image_for_each_camera(small_scene, saved):
         done = run("ring.npz", *(word for image in images for word in ("--image", image)), "--diffusion", 0)
         assert done.exit_code == 0, done.output
         assert {"world/camera/left/image", "world/camera/right/image"} <= Recorded("ring.rrd").entities
+    for image, message in {"image.png": "of which camera", "nosuch=image.png": "no camera nosuch"}.items():
+        done = run("ring.npz", "--image", image, "--diffusion", 0)
+        assert done.exit_code == 1 and message in done.stderr and "one of left, right" in done.stderr
     one = run("ring.npz", "--image", "right=image.png", "--diffusion", 0)
     assert one.exit_code == 0 and "world/camera/left/image" not in Recorded("ring.rrd").entities
 
@@ -69,10 +72,28 @@ def test_images_without_a_name_are_of_the_cameras_that_are_not_named():
     for texts in (["cam3=a.png", "b.png", "c.png"], ["b.png", "cam3=a.png", "c.png"], ["b.png", "c.png", "cam3=a.png"]):
         files = image_files(texts, ("cam1", "cam2", "cam3"))
         assert files == {"cam1": "b.png", "cam2": "c.png", "cam3": "a.png"}
-    assert image_files(["cam1=a.png", "b.png"], ("cam1", "cam2", "cam3")) == {"cam1": "a.png", "cam2": "b.png"}
-    for texts, message in ((["cam1=a.png", "cam1=b.png"], "cam1 has a.png and b.png"), (["a.png"] * 4, "got 4 images")):
-        with pytest.raises(ldls.InputError, match=message):
-            image_files(texts, ("cam1", "cam2", "cam3"))
+
+
+def test_names_of_images_may_have_a_sign_of_equality(tmp_path):
+    file = str(tmp_path / "a=b.png")
+    Path(file).touch()
+    assert image_files([file], ("camera 0",)) == {"camera 0": file}
+    assert image_files([file, "c.png"], ("cam1", "cam2")) == {"cam1": file, "cam2": "c.png"}
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        pytest.param(["cam1=a.png", "cam1=b.png"], "cam1 has a.png and b.png", id="two of a camera"),
+        pytest.param(["a.png"] * 4, "got 4 images", id="too many"),
+        pytest.param(["a.png"], "a.png is of which camera? Expected CAMERA=FILE with one of cam1, cam2", id="one"),
+        pytest.param(["cam2=b.png", "a.png"], "a.png is of which camera? .* one of cam1, cam3", id="one of two"),
+        pytest.param(["nosuch=b.png"], "no camera nosuch, expected one of cam1, cam2, cam3", id="no such camera"),
+    ],
+)
+def test_images_of_no_one_camera_are_refused(texts, message):
+    with pytest.raises(ldls.InputError, match=message.replace("?", r"\?")):
+        image_files(texts, ("cam1", "cam2", "cam3"))
 
 
 @pytest.fixture(scope="module")
@@ -205,6 +226,7 @@ def test_frames_that_fail_are_named_and_passed_over(tmp_path):
         pytest.param(["frame.npz", "--rerun", "a.html"], "expected spawn or a file that ends in .rrd", id="target"),
         pytest.param(["frame.npz", "--masks", "m"], "frame.npz is a result", id="masks of a result"),
         pytest.param(["frame.npz", "--image", "image.png", "--image", "image.png"], "got 2 images", id="many images"),
+        pytest.param(["frame.npz", "--image", "a=image.png"], "no camera a, expected one of camera 0", id="no camera"),
         pytest.param(["frame.npz", "--image", "nothing.png"], "nothing.png", id="no such image"),
         pytest.param(["kitti", "--image", "image.png"], "kitti is a source", id="an image of a source"),
         pytest.param(["kitti", "--min-score", "0.5"], "choose among", id="scores without masks"),

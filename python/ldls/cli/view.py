@@ -34,7 +34,7 @@ def view(
         list[str] | None,
         typer.Option(
             metavar="[CAMERA=]FILE",
-            help="Image of a RESULT; of several cameras one each, by name or in the order of those not named.",
+            help="Image of a RESULT; of several cameras by their names, or one for each in their order.",
             show_default=False,
         ),
     ] = None,
@@ -157,17 +157,20 @@ def view_result(
 
 
 def image_files(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, str]:
-    """Files of images by camera: CAMERA=FILE for one by name, FILE for the others in their order.
+    """Files of images by camera: CAMERA=FILE for one by name, FILE for all others in their order.
 
     Raises:
-        InputError: There are more images than cameras, or one camera has two.
+        InputError: There are more images than cameras, one camera has two or is not there, or an image without a name
+            may be of any of several cameras.
     """
     paths: dict[str, str] = {}
     unnamed = []
     for text in texts:
         camera, equals, file = text.partition("=")
-        if not equals or camera not in cameras:
+        if not equals or (camera not in cameras and Path(text).exists()):
             unnamed.append(text)
+        elif camera not in cameras:
+            raise InputError(f"--image: no camera {camera}, expected one of {', '.join(cameras) or 'none'}; got {text}")
         elif camera in paths:
             raise InputError(f"--image: camera {camera} has {paths[camera]} and {file}; give one")
         else:
@@ -175,5 +178,9 @@ def image_files(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, str]:
     others = [camera for camera in cameras if camera not in paths]
     if len(unnamed) > len(others):
         raise InputError(f"--image: got {len(texts)} images, the result has cameras {', '.join(cameras) or 'none'}")
+    if 0 < len(unnamed) < len(others):
+        raise InputError(
+            f"--image: {unnamed[0]} is of which camera? Expected CAMERA=FILE with one of {', '.join(others)}"
+        )
     paths |= zip(others, unnamed, strict=False)
     return paths
