@@ -266,6 +266,8 @@ def test_a_point_that_two_cameras_see_has_the_windows_of_both(ring):
         pytest.param(["1,nan"], "POINT: got '1,nan', expected", id="NaN"),
         pytest.param(["1,"], "POINT: got '1,', expected", id="half a pixel"),
         pytest.param(["1,2", "--camera", "b"], "--camera: got 'b', expected one of 0 camera 0", id="no such camera"),
+        pytest.param(["1", "--camera", "b"], "--camera: got 'b', expected one of 0 camera 0", id="beside a row"),
+        pytest.param(["0,0,9", "--camera", "b"], "--camera: got 'b', expected one of 0 camera 0", id="beside a place"),
         pytest.param(["1", "--columns", "5"], "--columns: given beside RESULT", id="columns beside a result"),
         pytest.param(["1", "--image-id", "3"], "--image-id: given beside RESULT", id="files beside a result"),
         pytest.param(["1", "--no-fisheye"], "--fisheye: given beside RESULT", id="a lens beside a result"),

@@ -58,8 +58,10 @@ def chosen_point(
         raise ParameterError(f"--on: got {picture} beside {word!r}; only a pixel U,V lies on a picture")
     if len(numbers) == 2:
         return _nearest_to_pixel(result, _view_of(result, camera), np.array(numbers))
-    if camera is not None and len(result.views) > 1:
-        raise ParameterError(f"--camera: got {camera!r} beside {word!r}; only a pixel U,V belongs to a camera")
+    if camera is not None:
+        _view_of(result, camera)
+        if len(result.views) > 1:
+            raise ParameterError(f"--camera: got {camera!r} beside {word!r}; only a pixel U,V belongs to a camera")
     if len(numbers) == 3:
         return _nearest_to_place(result, np.array(numbers))
     return ChosenPoint(row=_row(word))
