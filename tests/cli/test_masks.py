@@ -78,6 +78,18 @@ def test_of_overlapping_masks_what_is_left_of_one_may_be_too_small(tmp_path):
     np.testing.assert_array_equal(ldls.read_masks(tmp_path / "out.npz").to_array(), pixels[1:2])
 
 
+def test_a_folder_of_one_png_an_instance_is_taken(masks):
+    made, folder = masks
+    (folder / "each").mkdir()
+    for number, pixels in enumerate(made.to_array()):
+        Image.fromarray(pixels).save(folder / f"each/{number}.png")
+    outcome = ldls_masks("show", folder / "each")
+    assert outcome.exit_code == 0 and "3 masks of 60 x 40 pixels" in outcome.output, outcome.output
+    outcome = ldls_masks("convert", folder / "each", folder / "out.npz")
+    assert outcome.exit_code == 0, outcome.output
+    np.testing.assert_array_equal(ldls.read_masks(folder / "out.npz").to_array(), made.to_array())
+
+
 def test_variants_are_written(masks):
     made, folder = masks
     for name, variant in {"list.json": "results", "research.npz": "research", "stack.npy": "pixels"}.items():

@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from ldls.cli.command import Command
-from ldls.cli.frame_files import IMAGE_ID
+from ldls.cli.frame_files import EXISTING, IMAGE_ID
 from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of, wanted
 from ldls.cli.messages import console, speaks_plainly
 from ldls.errors import ParameterError
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ldls.masks import InstanceMasks
 
 app = typer.Typer(help="Make, show and convert instance masks.", no_args_is_help=True)
-EXISTING = {"exists": True, "dir_okay": False, "readable": True}
 SUFFIXES = "COCO .json, .npz, instance .png, .npy stack"
 """What masks are written as."""
 
@@ -30,7 +29,10 @@ MaskPictureOption = Annotated[
     typer.Option(metavar="FILE.png", help="Picture of the masks on the image.", show_default=False, dir_okay=False),
 ]
 MasksArgument = Annotated[
-    Path, typer.Argument(metavar="MASKS", help="File of any format of docs/masks.md.", **EXISTING)
+    Path,
+    typer.Argument(
+        metavar="MASKS", help="File or folder of any format of docs/masks.md.", **(EXISTING | {"dir_okay": True})
+    ),
 ]
 OutArgument = Annotated[Path, typer.Argument(metavar="OUT", help=f"{SUFFIXES}: the suffix chooses.", dir_okay=False)]
 
