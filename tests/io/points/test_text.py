@@ -73,6 +73,7 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
         pytest.param(
             "1 2 3\n4 5 6 a\n4 b 6\n", ldls.CorruptFileError, "line 3: .* column 2, got 'b'", id="word behind text"
         ),
+        pytest.param("1,5;2,5;3,5\n", ldls.CorruptFileError, "decimal point .* '1,5'", id="decimal commas"),
         pytest.param("1,,3\n", ldls.CorruptFileError, "line 1: .* column 2, got ''", id="empty cell"),
         pytest.param(
             "17\n1 2 3\n", ldls.CorruptFileError, "line 1: expected x y z or their names, got '17'", id="count"
@@ -80,6 +81,10 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
         pytest.param(
             "x y z\n1 2\n3 4 5\n", ldls.CorruptFileError, "line 2: expected at least 3 cells", id="header, short"
         ),
+        pytest.param(
+            "x [m],y [m],z [m]\n1,2,3\n", ldls.CorruptFileError, r"column x is missing; found x \[m\] y", id="units"
+        ),
+        pytest.param("x_m y_m z_m\n1 2 3\n", ldls.CorruptFileError, "column x is missing; found x_m y_m", id="names"),
         pytest.param("x y z X\n", ldls.CorruptFileError, "column x is there 2 times", id="name twice"),
         pytest.param("# nothing\n", ldls.TruncatedFileError, "only comments", id="comments"),
         pytest.param("\n \n", ldls.TruncatedFileError, "empty", id="blank"),

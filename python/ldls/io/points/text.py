@@ -11,7 +11,7 @@ from ldls.cloud import MAX_COLUMNS
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file
 from ldls.io.points.named_columns import NamedColumns, plain_name
-from ldls.io.points.text_rows import COMMENTS, Row, read_rows, text_rows
+from ldls.io.points.text_rows import COMMENTS, Row, is_number, read_rows, text_rows
 
 DELIMITERS = (";", "\t", ",")
 """Tried in this order; where none stands in the first line, blanks separate."""
@@ -28,7 +28,7 @@ def read(path: Path) -> NDArray[np.float64]:
         TruncatedFileError: The file is empty, its last line has too few cells, or it ends with its last number, without
             a line end: that number may be cut short.
         CorruptFileError: Another line has too few cells, one has a number behind as many cells as the first, or a cell
-            is no number; the message names it.
+            is no number; the message names it. Or the first line has names, of which none are x, y and z.
         UnsupportedFormatError: There are more columns than clouds have.
     """
     with open_file(path, "text file of points") as file:
@@ -50,7 +50,12 @@ def _parse(text: str) -> NDArray[np.float64]:
 def _names(line: str) -> list[str] | None:
     bare = line.lstrip("#/ ")
     names = [name.strip() for name in bare.split(_delimiter(bare))]
-    return names if {"x", "y", "z"} <= {plain_name(name) for name in names} else None
+    return names if {"x", "y", "z"} <= {plain_name(name) for name in names} or _are_words(line, names) else None
+
+
+def _are_words(line: str, cells: list[str]) -> bool:
+    """True for a line of words, no comment, without a number."""
+    return line.strip().lstrip("\"'")[:1].isalpha() and not any(map(is_number, cells))
 
 
 def _parse_nameless(rows: list[Row]) -> NDArray[np.float64]:
