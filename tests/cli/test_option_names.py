@@ -82,9 +82,15 @@ FRAME = "segment --points points.npy --calib camera.yml --masks masks.npz --out 
                      id="lidar of segment"),
         pytest.param(f"{FRAME} --extrinsic lidar.txt --cores 100000", "--cores: got 100000", id="cores of segment"),
         pytest.param(f"{FRAME} --part-gap -1", "--part-gap: got -1", id="parameter of segment"),
+        pytest.param(
+            f"{FRAME} --points cut.bin --columns 5 --extrinsic lidar.txt",
+            "; pass another --columns if rows are of another length; in Python, pass recover=True to read",
+            id="columns of segment",
+        ),
         pytest.param("run kitti --masks masks --out out --cores 100000", "--cores: got 100000", id="cores of run"),
         pytest.param("view kitti --dataset foo", "--dataset: got 'foo'", id="kind of view"),
-        pytest.param("masks convert overlapping.npz a.png", "--resolve score leaves it to one", id="overlaps"),
+        pytest.param("masks convert overlapping.npz a.png", "; .json and .npz hold masks that overlap; --resolve score "
+                     "leaves it to one", id="overlaps"),
         pytest.param("masks convert masks.npz a.npy", "or pass --variant pixels", id="pixels only"),
         pytest.param("evaluate labels labels --max-range -1", "--max-range: got -1", id="range"),
         pytest.param("evaluate labels labels --max-range 9", "frame 0 has no ranges of its points; give its --points",
@@ -97,7 +103,7 @@ def test_errors_name_options(files, words, message):
 
 
 def test_findings_and_frames_that_fail_name_no_arguments_as_if_they_were_options(files):
-    expected = "in Python, pass columns= or recover=True"
+    expected = "in Python or ldls.toml, pass columns= if rows"
     found = CliRunner().invoke(app, ["info", "kitti", "--all"])
     assert found.exit_code == 1 and expected in " ".join(found.output.replace("│", " ").split()), found.output
     shown = CliRunner().invoke(app, ["view", "kitti", "--rerun", "a.rrd"])

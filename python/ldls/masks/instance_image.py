@@ -132,5 +132,5 @@ def _refuse_overlaps(spans: NDArray[np.int64], owners: NDArray[np.int64], height
         first, second = sorted(owners[at : at + 2].tolist())
         raise MaskError(
             f"masks {first} and {second} share pixel ({row}, {column}), and an instance image gives each pixel to one; "
-            "resolve_overlaps() leaves it to one"
+            ".json and .npz hold masks that overlap; resolve_overlaps() leaves it to one"
         )

@@ -50,6 +50,20 @@ def test_a_truncated_file_says_where_it_ends(tmp_path):
     np.testing.assert_array_equal(points, rows(11, 4)[:10])
 
 
+@pytest.mark.parametrize(
+    ("columns", "mend"),
+    [
+        pytest.param(None, "; pass columns= if rows are of another length; pass recover=True to read", id="usual"),
+        pytest.param(5, "; pass another columns= if rows are of another length; pass recover=True to read", id="given"),
+    ],
+)
+def test_what_mends_a_truncated_file_tells_by_whom_its_columns_are_given(tmp_path, columns, mend):
+    path = tmp_path / "000123.bin"
+    path.write_bytes(rows(11, 4).tobytes()[:168])
+    with pytest.raises(ldls.TruncatedFileError, match=mend):
+        ldls.read_points(path, columns=columns)
+
+
 def test_five_columns_are_not_taken_for_four(tmp_path):
     values = rows(8, 5)
     values[:, 4] = np.arange(8)

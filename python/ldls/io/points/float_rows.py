@@ -56,7 +56,10 @@ def _rows(path: Path, content: NDArray[np.uint8], columns: int, *, guessed: bool
             f"last whole point ends at {whole}"
         )
         if not recover:
-            raise TruncatedFileError(f"{message}; pass columns= or recover=True to read the whole points")
+            other = "columns=" if guessed else "another columns="
+            raise TruncatedFileError(
+                f"{message}; pass {other} if rows are of another length; pass recover=True to read the whole points"
+            )
         warnings.warn(f"{path}: {message}", RecoveredFileWarning, stacklevel=4)
     values = np.frombuffer(content, "<f4", count=whole // FLOAT_BYTES)
     if guessed:
