@@ -113,7 +113,9 @@ def test_cameras_without_names_are_numbered(small_scene) -> None:
     ("images", "message"),
     [
         pytest.param([photo(), photo()], "images: got 2, expected 1", id="more images than cameras"),
-        pytest.param(photo(80, 60), r"expected \(60, 80, 3\) uint8, the size of the masks", id="swapped sides"),
+        pytest.param(
+            photo(80, 60), r"image: got 80 x 60 \(height x width\), the masks are of 60 x 80$", id="swapped sides"
+        ),
         pytest.param(photo().astype(float), "float64; read it with ldls.read_image", id="not uint8"),
         pytest.param(photo()[..., 0], r"image: expected \(60, 80, 3\) uint8, .*got \(60, 80\) uint8", id="grey"),
         pytest.param(Image.fromarray(photo()).convert("L"), r"got \(60, 80\) uint8; read it", id="grey of Pillow"),

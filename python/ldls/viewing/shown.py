@@ -97,6 +97,9 @@ def image_like(image: AnImage | None, size: tuple[int, int]) -> NDArray[np.uint8
     if image is None:
         return np.full((*size, 3), CANVAS, np.uint8)
     pixels = as_array("image", image, InputError)
+    if pixels.shape[2:] == (3,) and pixels.dtype == np.uint8 and pixels.shape[:2] != size:
+        sides = " x ".join(map(str, pixels.shape[:2]))
+        raise InputError(f"image: got {sides} (height x width), the masks are of {size[0]} x {size[1]}")
     if pixels.shape != (*size, 3) or pixels.dtype != np.uint8:
         found = f"{pixels.shape} {pixels.dtype}" if pixels.ndim else shown(image)
         raise InputError(
