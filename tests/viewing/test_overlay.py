@@ -14,7 +14,7 @@ from ldls.viewing import birds_eye_view, comparison, masks_overlay, overlay
 from ldls.viewing.drawing import MARK
 from ldls.viewing.overlay import overlays_of
 from ldls.viewing.shown import Shown, images_of, names_of
-from ldls.viewing.tags import place_tags
+from ldls.viewing.tags import place_tags, shortened
 
 
 @pytest.fixture
@@ -179,6 +179,34 @@ def test_only_objects_with_points_are_named(small_scene, drawn) -> None:
     masks = ldls.InstanceMasks.from_array([nowhere, *masks.to_array()], categories=[18, 1, 3])
     overlay(ldls.segment(points, masks, camera))
     assert [tag.text for tag in drawn] == ["person 2", "car 3"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        pytest.param("car 3", "car 3", id="short"),
+        pytest.param("vehicle.construction 12", "vehicle.construction 12", id="twenty"),
+        pytest.param("a forklift that carries pallets 12", "a forklift that car\u2026 12", id="with its number"),
+        pytest.param("a forklift that carries pallets 0.95", "a forklift that car\u2026 0.95", id="with its score"),
+        pytest.param("a forklift that is of no number", "a forklift that is\u2026", id="without a number"),
+        pytest.param(f"{'W' * 80} 3", f"{'W' * 19}\u2026 3", id="one word"),
+        pytest.param("W" * 80, f"{'W' * 19}\u2026", id="one word without a number"),
+        pytest.param("", "", id="none"),
+    ],
+)
+def test_long_names_are_shortened_and_numbers_stay(text, expected) -> None:
+    assert shortened(text) == expected
+
+
+def test_long_names_are_drawn_as_shortened_ones(small_scene) -> None:
+    points, masks, camera = small_scene
+
+    def pictures(name):
+        named = ldls.InstanceMasks.from_array(masks.to_array(), categories=[1, 1], names={1: name})
+        result = ldls.segment(points, named, camera)
+        return [picture.tobytes() for picture in (overlay(result), birds_eye_view(result), masks_overlay(named))]
+
+    assert pictures("forklift" * 10) == pictures("forklift" * 2 + "for\u2026") != pictures("forklift" * 2 + "for")
 
 
 def test_names_with_line_breaks_are_drawn_on_one_line(small_scene) -> None:

@@ -15,6 +15,8 @@ I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
 AVERSION = 4.0
 """Heights of a tag that it goes aside rather than lie where it had better not be."""
+LONGEST = 20
+"""Characters of a name, without its number, of which a tag shows no more."""
 Box = tuple[int, int, int, int]  # left, top, right, bottom, in pixels of the picture
 
 
@@ -35,13 +37,13 @@ def draw_tags(
     aversion: float = AVERSION,
     taken: Sequence[Box] = (),
 ) -> None:
-    """Draw tags onto the picture; one for which no room is left is not drawn.
+    """Draw tags onto the picture, long names shortened; one for which no room is left is not drawn.
 
     `covered` (H, W), of the picture's shape at any size, is where tags had better not be; `aversion` is the
     number of its heights that a tag goes aside rather than lie there. Tags stay clear of the boxes `taken`.
     """
     draw = ImageDraw.Draw(picture)
-    tags = [tag._replace(text=one_line(tag.text)) for tag in tags]
+    tags = [tag._replace(text=shortened(one_line(tag.text))) for tag in tags]
     font = ImageFont.load_default(size=12 * pen_px)
     places = place_tags(
         [tag.box for tag in tags],
@@ -58,6 +60,16 @@ def draw_tags(
     for tag, place in shown:
         draw.rounded_rectangle(place, 3 * pen_px, tag.colour)
         draw.text(_middle(place), tag.text, _ink(tag.colour), font, anchor="mm")
+
+
+def shortened(text: str) -> str:
+    """`text` with no more than the beginning of a long name; the number behind it stays."""
+    name, _, number = text.rpartition(" ")
+    if not number.replace(".", "", 1).isdecimal():
+        name, number = text, ""
+    if len(name) <= LONGEST:
+        return text
+    return f"{name[: LONGEST - 1].rstrip()}\u2026 {number}".rstrip()
 
 
 def place_tags(
