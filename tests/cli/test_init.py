@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 import ldls
 import ldls.errors
+from ldls.camera.extrinsic import OPTICAL_FROM_BODY
 from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.simulation import sample_frame
@@ -94,6 +95,17 @@ def in_parts_that_leave_it_open(folder, camera):
     write(folder / "mount.yaml", f"lidar_to_cam:\n  translation: {translation}\n  rotation: {rotation}\n")
 
 
+def in_angles_that_leave_it_open(folder, camera):
+    body = np.linalg.inv(camera.T_camera_lidar) @ np.linalg.inv(OPTICAL_FROM_BODY)
+    R = body[:3, :3]
+    angles = [np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(R[2, 0]), np.arctan2(R[1, 0], R[0, 0])]
+    write(folder / "camera.yaml", intrinsics(camera))
+    write(
+        folder / "mount.yaml",
+        f"translation: {body[:3, 3].tolist()}\nroll_pitch_yaw_deg: {np.degrees(angles).tolist()}\n",
+    )
+
+
 def in_rows_of_numbers(folder, camera):
     write(folder / "front.yaml", intrinsics(camera))
     write(folder / "T.txt", rows(camera.T_camera_lidar))
@@ -106,6 +118,7 @@ def in_rows_of_numbers(folder, camera):
         in_parts_that_say_how,
         in_a_matrix_the_other_way_round,
         in_parts_that_leave_it_open,
+        in_angles_that_leave_it_open,
         in_rows_of_numbers,
     ],
     ids=lambda each: each.__name__,

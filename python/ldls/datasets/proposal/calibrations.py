@@ -31,7 +31,7 @@ SAME = 1e-3
 QUATERNIONS = ("quaternion_xyzw", "quaternion_wxyz")
 TRANSLATIONS = ("translation", "t", "T", "position", "trans")
 WAYS = ("rotation", *QUATERNIONS, "roll_pitch_yaw_deg")
-ROTATIONS = ("rotation", "R", "quaternion", "orientation", "rot", *QUATERNIONS)
+ROTATIONS = ("R", "quaternion", "orientation", "rot", *WAYS)
 
 
 @dataclass(frozen=True)
