@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 import ldls
 import ldls.errors
-from ldls.camera.extrinsic import OPTICAL_FROM_BODY
 from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.simulation import sample_frame
@@ -96,14 +95,11 @@ def in_parts_that_leave_it_open(folder, camera):
 
 
 def in_angles_that_leave_it_open(folder, camera):
-    body = np.linalg.inv(camera.T_camera_lidar) @ np.linalg.inv(OPTICAL_FROM_BODY)
-    R = body[:3, :3]
-    angles = [np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(R[2, 0]), np.arctan2(R[1, 0], R[0, 0])]
+    translation, _ = pose(camera)
+    R = np.linalg.inv(camera.T_camera_lidar)[:3, :3]
+    angles = np.degrees([np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(R[2, 0]), np.arctan2(R[1, 0], R[0, 0])])
     write(folder / "camera.yaml", intrinsics(camera))
-    write(
-        folder / "mount.yaml",
-        f"translation: {body[:3, 3].tolist()}\nroll_pitch_yaw_deg: {np.degrees(angles).tolist()}\n",
-    )
+    write(folder / "mount.yaml", f"translation: {translation}\nroll_pitch_yaw_deg: {angles.tolist()}\n")
 
 
 def in_rows_of_numbers(folder, camera):

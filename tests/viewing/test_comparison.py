@@ -1,14 +1,18 @@
 """The comparison says and marks what changed, and pictures become files."""
 
+import importlib
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import ldls
+from ldls.simulation import sample_frame
 from ldls.viewing import comparison, save_pictures
 from ldls.viewing.comparison import captions
+from ldls.viewing.depth import depth_picture
 
 
 @pytest.fixture
@@ -57,6 +61,35 @@ def test_a_ring_is_compared_too(small_scene) -> None:
     # a row a camera, then the views from above
     assert picture.width == 1800
     assert picture.height == 2 * (round(897 * 60 / 80) + 30) + 30 + 897
+
+
+def test_every_picture_of_a_ring_has_the_name_of_its_camera(small_scene, monkeypatch) -> None:
+    points, masks, camera = small_scene
+    result = ldls.segment(points, [ldls.View(masks, camera, "left"), ldls.View(masks, camera, "right")])
+    written = []
+    module = importlib.import_module("ldls.viewing.comparison")
+    drawn = module.grid
+    monkeypatch.setattr(module, "grid", lambda each, own=(), **how: written.append([*own]) or drawn(each, own, **how))
+    comparison(result)
+    of_cameras = [f"{name}: {method}" for name in ("left", "right") for method in ("direct projection", "ldls")]
+    assert of_cameras in written
+    assert captions(result) in written
+
+
+def test_points_over_several_images_have_the_names_of_the_cameras() -> None:
+    frame = sample_frame()
+    (image,) = frame.images
+    (alone, left, longer) = (
+        np.asarray(depth_picture(replace(frame, images=images)))
+        for images in (
+            (image,),
+            (replace(image, name="left"), replace(image, name="right")),
+            (replace(image, name="left"), replace(image, name="right_front")),
+        )
+    )
+    assert alone.shape[:2] == (375, 1242)
+    assert left.shape[:2] == (290 + 30, 2 * 960)
+    assert (left[:30, :960] == longer[:30, :960]).all() and (left[:30, 960:] != longer[:30, 960:]).any()
 
 
 def test_three_files(result, tmp_path) -> None:

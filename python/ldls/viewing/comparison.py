@@ -38,16 +38,15 @@ def comparison(result: Segmentation, images: Images = None) -> Image.Image:
     ground = ground_of(result, size_px=(half(WIDTH_PX), half(WIDTH_PX)), fill=True)
     around = surroundings(result, ground)
     above = [birds_eye_of(shown, ground, around.copy(), boxes=shown is pair[1]) for shown in pair]
-    return grid(
-        [
-            _overlays(pair, images_of(result, images)),
-            grid(above, ["direct projection from above", "ldls from above, with boxes"], columns=2),
-        ],
-        columns=1,
-    )
+    counts, methods = captions(result), ("direct projection", "ldls")
+    over, below = counts, ["direct projection from above", "ldls from above, with boxes"]
+    if len(result.views) > 1:
+        # the counts are of the points of all cameras
+        over, below = [f"{name}: {method}" for name in camera_names(result.views) for method in methods], counts
+    return grid([_overlays(pair, images_of(result, images), over), grid(above, below, columns=2)], columns=1)
 
 
-def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]]) -> Image.Image:
+def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]], captions: Sequence[str]) -> Image.Image:
     """Both overlays of every camera: one above the other if there is only one wide image, else side by side."""
     views = pair[0].result.views
     height, width = views[0].view.masks.image_size
@@ -55,8 +54,7 @@ def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]]) -> Ima
     each_px = WIDTH_PX if stacked else half(WIDTH_PX)
     of_cameras = zip(views, images, strict=True)
     tiles = [tile for seen, image in of_cameras for tile in overlays_of(pair, seen, image, each_px)]
-    cameras = [name for name in camera_names(views)[1:] for _ in pair]
-    return grid(tiles, [*captions(pair[0].result), *cameras], columns=1 if stacked else 2)
+    return grid(tiles, captions, columns=1 if stacked else 2)
 
 
 def captions(result: Segmentation) -> list[str]:

@@ -22,14 +22,15 @@ DIMMED = 0.6
 
 
 def depth_picture(frame: Frame) -> Image.Image:
-    """The images of a frame side by side, each with the points that its camera sees.
+    """The images of a frame side by side, each with the points that its camera sees; of several with their names.
 
     Raises:
         LdlsError: An image cannot be read.
     """
     width = ONE_PX if len(frame.images) == 1 else TILE_PX
     tiles = [_tile(image.read(), frame.points, image.camera, width) for image in frame.images]
-    return grid(tiles, columns=ceil(sqrt(len(tiles))), gap_px=0)
+    names = [image.name for image in frame.images] if len(tiles) > 1 else []
+    return grid(tiles, names, columns=ceil(sqrt(len(tiles))), gap_px=0)
 
 
 def depth_colours(depth_m: NDArray[np.float64]) -> NDArray[np.uint8]:
