@@ -82,7 +82,7 @@ def test_from_a_bag_to_a_labelled_bag(run):
 
     write_robot_drive("robot", "mcap", frames=2)
     names = run("docs/ros.md", holding="import ldls")
-    labelled = RosBag("robot/labelled", points_topic="/points_labelled")
+    labelled = RosBag("robot/labelled")  # its labelled clouds alone
     assert len(labelled) == 2
     np.testing.assert_array_equal(labelled.cloud(1).fields["class_id"], names["result"].categories)
 
