@@ -13,12 +13,21 @@ from ldls.errors import DtypeError, InputError, ShapeError
 MAX_COLUMNS = 64
 """Wider arrays are clouds lying on their side."""
 
+WIDEST_CLOUD_M = 10_000.0
+"""Extent beyond which the unit is probably not the metre."""
+
 Points = NDArray[np.float32] | NDArray[np.float64]
 
 
 def finite_rows(points: Points) -> NDArray[np.int64]:
     """Rows of the points (N, >= 3) whose coordinates are all finite, ascending."""
     return np.flatnonzero(np.isfinite(points[:, :3]).all(axis=1))
+
+
+def doubt_of_scale(low: ArrayLike, high: ArrayLike) -> str | None:
+    """What is odd about the extent of points from `low` to `high` (3,), in metres; None where nothing is."""
+    extent = float(np.max(np.subtract(high, low)))
+    return f"points: extent is {extent:.3g} m, over 10 km; are they in metres?" if extent > WIDEST_CLOUD_M else None
 
 
 def as_points(points: ArrayLike) -> Points:

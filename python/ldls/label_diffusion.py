@@ -13,7 +13,7 @@ import ldls._ldls as _ldls
 from ldls.camera import Camera
 from ldls.camera.rigid import transformed
 from ldls.checks import checked
-from ldls.cloud import Points, as_points, finite_rows
+from ldls.cloud import Points, as_points, doubt_of_scale, finite_rows
 from ldls.errors import (
     DuplicateWarning,
     InputError,
@@ -34,8 +34,6 @@ from ldls.view import SeenView, View, camera_names, check_names, common_categori
 
 COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
-WIDEST_CLOUD_M = 10_000.0
-"""Extent beyond which the unit is probably not the metre."""
 EXPECTED_ON_MASKS = 20.0
 """Points that masks of this area would have on them by chance, from which on none at all is no chance."""
 ALONG_Z = 0.7
@@ -305,9 +303,9 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
         if any(result.points.dtype == np.float32 for result in results) and step > COARSEST_STEP_M:
             message = f"points: float32 spacing at {farthest:.1e} is {step:.2g} m; pass float64 or subtract an origin"
             yield message, PrecisionWarning
-        extent = max(most - least for least, most in zip(low, high, strict=True))
-        if extent > WIDEST_CLOUD_M:
-            yield f"points: extent is {extent:.3g} m, over 10 km; are they in metres?", ScaleWarning
+        scale = doubt_of_scale(low, high)
+        if scale is not None:
+            yield scale, ScaleWarning
         if report["only_islands"]:
             message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
             yield message, DuplicateWarning

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.cloud import doubt_of_scale
 from ldls.datasets.frame import CameraImage, Frame, Source
 from ldls.errors import LdlsError
 from ldls.stages import project
@@ -147,9 +148,14 @@ def _of_cloud(frame: Frame) -> list[Finding]:
     finite: NDArray[np.bool_] = np.asarray(np.isfinite(frame.points[:, :3]).all(axis=1))
     if not finite.any():
         return [Finding(frame.name, f"none of its {len(finite):,} points is finite", broken=True)]
+    findings = []
     if not finite.all():
-        return [Finding(frame.name, f"{1 - finite.mean():.1%} of its points are not finite", broken=False)]
-    return []
+        findings.append(Finding(frame.name, f"{1 - finite.mean():.1%} of its points are not finite", broken=False))
+    xyz = frame.points[finite, :3].astype(np.float64)
+    scale = doubt_of_scale(xyz.min(axis=0), xyz.max(axis=0))
+    if scale is not None:
+        findings.append(Finding(frame.name, scale, broken=False))
+    return findings
 
 
 def _of_image(frame: Frame, image: CameraImage) -> list[Finding]:
