@@ -401,6 +401,13 @@ def test_real_frames_against_their_boxes(data_folder, tmp_path):
     row = scores(tmp_path / "t")
     assert row["Car IoU"] > 60
     assert row["Pedestrian IoU"] > 60
+    outcome = run(
+        app,
+        ["evaluate", str(out), str(labels), "--points", str(training / "velodyne"), "--calib", str(training / "calib")],
+    )
+    assert outcome.exit_code == 0, outcome.output
+    (warning,) = outcome.stderr.strip().splitlines()
+    assert warning.endswith("name their folder (--image)")
 
 
 def test_names_of_ones_own_can_be_background(frames):

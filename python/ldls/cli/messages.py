@@ -77,8 +77,9 @@ def speaks_plainly(command: Callable[..., R]) -> Callable[..., R]:
                 typer.secho(f"error: {_plain(error)}", err=True, fg="red")
                 raise typer.Exit(1) from None
             finally:
-                for warning in caught:
-                    typer.secho(f"warning: {in_options(str(warning.message))}", err=True, fg="yellow")
+                # each once, also where filters that change in between let it through again
+                for message in dict.fromkeys(str(warning.message) for warning in caught):
+                    typer.secho(f"warning: {in_options(message)}", err=True, fg="yellow")
         return result
 
     wrapped.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]

@@ -170,7 +170,7 @@ def image_files(texts: Sequence[str], cameras: Sequence[str]) -> dict[str, str]:
         if not equals or (camera not in cameras and Path(text).exists()):
             unnamed.append(text)
         elif camera not in cameras:
-            raise InputError(f"--image: no camera {camera}, expected one of {', '.join(cameras) or 'none'}; got {text}")
+            raise InputError(f"--image: no camera {camera}, expected one of {', '.join(cameras) or 'none'}")
         elif camera in paths:
             raise InputError(f"--image: camera {camera} has {paths[camera]} and {file}; give one")
         else:
