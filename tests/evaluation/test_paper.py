@@ -156,12 +156,16 @@ def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
     assert "nan" not in ran.output.lower()
 
 
-def test_a_scored_name_that_occurs_nowhere_is_refused(folder, tmp_path):
-    words = ["reproduce", str(folder), "--categories", "car,persn", "--out", str(tmp_path / "out")]
-    ran = CliRunner().invoke(app, words)
+def test_a_scored_name_that_occurs_nowhere_is_warned_of(folder, tmp_path):
+    words = ["reproduce", str(folder), "--out", str(tmp_path / "out"), "--categories"]
+    ran = CliRunner().invoke(app, [*words, "persn"])
     assert ran.exit_code == 1
     assert ran.stderr.endswith("error: --categories: 'persn' is unknown; did you mean 'person'?\n")
     assert not (tmp_path / "out").exists()
+    ran = CliRunner().invoke(app, [*words, "car,persn"])
+    assert ran.exit_code == 0, ran.output
+    assert ran.stderr.endswith("warning: --categories: 'persn' is unknown; did you mean 'person'?\n")
+    assert (tmp_path / "out/comparison.md").is_file()
 
 
 def test_tables_are_written_over_no_input(folder, tmp_path):
