@@ -653,6 +653,19 @@ def test_warnings_of_frames_are_said_once(few, tmp_path):
     assert outcome.output.count("no row is finite") == 1
 
 
+def test_intensities_that_las_cannot_hold_are_said_once(few, tmp_path):
+    pytest.importorskip("laspy", reason="the extra las is not installed")
+    for number in range(12):
+        path = few / f"velodyne/{number:06d}.bin"
+        points = np.fromfile(path, "<f4").reshape(-1, 4)
+        points[number, 3] = np.nan
+        layouts.write_points(path, points)
+    outcome = command(*runs.arguments(few, tmp_path / "out"), "--formats", "las")
+    assert outcome.exit_code == 0, outcome.output
+    assert outcome.output.count("intensities hold NaN, which are 0") == 1
+    assert len(list((tmp_path / "out").glob("*.las"))) == 12
+
+
 def test_records_reach_the_journal_while_the_run_lasts(few, tmp_path, monkeypatch):
     # the function of that name hides the module
     monkeypatch.setattr(sys.modules["ldls.batch.run"], "GROUP_S", 0.0)
