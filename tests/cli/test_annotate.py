@@ -32,6 +32,11 @@ def test_without_images_their_size_is_said_once(data_folder, tmp_path):
     (warning,) = outcome.stderr.strip().splitlines()
     assert "375 x 1242 (height x width) is assumed" in warning
     assert warning.endswith(f"put them into {training / 'image_2'}")
+    of_frames = ["--points", str(training / "velodyne"), "--calib", str(training / "calib")]
+    outcome = run(app, ["evaluate", str(tmp_path / "out"), str(training / "label_2"), *of_frames])
+    assert outcome.exit_code == 0, outcome.output
+    (warning,) = outcome.stderr.strip().splitlines()
+    assert warning.endswith("name their folder (--image)")
 
 
 def test_files_that_are_there_are_kept(data_folder, tmp_path):
