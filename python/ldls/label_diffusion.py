@@ -191,7 +191,7 @@ def nothing_in_view(result: Segmentation) -> str | None:
     if (result.labels > 0).any():
         return None
     # of sweeps that were labelled together the report counts the points of all
-    if result.report.n_nonfinite and not len(finite_rows(result.points)):
+    if result.report.n_nonfinite and len(result.points) and not len(finite_rows(result.points)):
         return NOT_FINITE
     if not result.views:
         return None
