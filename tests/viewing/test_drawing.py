@@ -1,10 +1,12 @@
 """Marks on pictures, against a rendering pixel by pixel."""
 
+from io import BytesIO
+
 import numpy as np
 import pytest
 from PIL import Image
 
-from ldls.viewing.drawing import Canvas, disc
+from ldls.viewing.drawing import Canvas, disc, font_for
 
 WIDTH, HEIGHT = 24, 16
 
@@ -40,3 +42,16 @@ def test_what_is_drawn_on_a_copy_is_not_on_the_canvas():
     copied = canvas.copy()
     copied.stamp(np.array([[3, 3]]), (255, 255, 255), disc(1.0))
     assert np.asarray(copied.picture().convert("RGB")).any() and not np.asarray(canvas.picture().convert("RGB")).any()
+
+
+@pytest.mark.parametrize("own", [["car 1", "person 2"], ["a very long na\u2026 3"], [], ["car", "\uffff"]])
+def test_letters_that_every_machine_has_look_the_same_on_all(own):
+    assert isinstance(font_for(own, 12).path, BytesIO), "a font in memory is Pillow's"
+
+
+def test_other_letters_are_drawn_by_a_font_that_has_them():
+    font = font_for(["Fu\u00dfg\u00e4nger 4", "car 1"], 12)
+    if isinstance(font.path, BytesIO):
+        pytest.skip("the system has no font of those that are looked for")
+    missing = bytes(font.getmask("\uffff"))
+    assert missing not in [bytes(font.getmask(letter)) for letter in "\u00df\u00e4"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from math import ceil
 
@@ -20,6 +21,16 @@ MARK: Colour = (255, 255, 255)
 """Colour of the rim of marked points."""
 GAP_PX = 6
 FONT_PX = 17
+FONTS = (
+    "DejaVuSans.ttf",
+    "NotoSans-Regular.ttf",
+    "arial.ttf",
+    "Arial.ttf",
+    "NotoSansCJK-Regular.ttc",
+    "msyh.ttc",
+    "Arial Unicode.ttf",
+)
+"""Files of fonts of Linux, Windows and macOS, as they name them."""
 CAPTION_PX = 30
 
 
@@ -89,6 +100,26 @@ class Canvas:
         return self._pixels[self._margin : self._margin + height, self._margin : self._margin + width]
 
 
+def font_for(texts: Iterable[str], size_px: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Pillow's own font, the same everywhere; where it lacks a letter one of the system's that has all, if any."""
+    own = ImageFont.load_default(size=size_px)
+    letters = sorted({letter for text in texts for letter in text if not letter.isascii() and letter.isprintable()})
+    if not letters or _has(own, letters):
+        return own
+    for name in FONTS:
+        with suppress(OSError):
+            font = ImageFont.truetype(name, size_px)
+            if _has(font, letters):
+                return font
+    return own
+
+
+def _has(font: ImageFont.FreeTypeFont | ImageFont.ImageFont, letters: Sequence[str]) -> bool:
+    """True if none of `letters` is drawn as what no font has."""
+    missing = bytes(font.getmask("\uffff"))
+    return all(bytes(font.getmask(letter)) != missing for letter in letters)
+
+
 def grid(
     pictures: Sequence[Image.Image], captions: Sequence[str] = (), *, columns: int, gap_px: int = GAP_PX
 ) -> Image.Image:
@@ -96,10 +127,11 @@ def grid(
     sizes = [picture.size for picture in pictures]
     corners, size = places_in_grid(sizes, captions=bool(captions), columns=columns, gap_px=gap_px)
     whole = Image.new("RGB", size, PAPER)
-    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=FONT_PX)
+    captions = [one_line(caption) for caption in captions]
+    draw, font = ImageDraw.Draw(whole), font_for(captions, FONT_PX)
     for i, (left, top) in enumerate(corners):
         if captions:
-            draw.text((left + FONT_PX // 2, top - CAPTION_PX // 2), one_line(captions[i]), INK, font, anchor="lm")
+            draw.text((left + FONT_PX // 2, top - CAPTION_PX // 2), captions[i], INK, font, anchor="lm")
         whole.paste(pictures[i], (left, top))
     return whole
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from ldls.palette import Colour
-from ldls.viewing.drawing import one_line
+from ldls.viewing.drawing import font_for, one_line
 
 I32 = NDArray[np.int32]
 I64 = NDArray[np.int64]
@@ -44,7 +44,7 @@ def draw_tags(
     """
     draw = ImageDraw.Draw(picture)
     tags = [tag._replace(text=shortened(one_line(tag.text))) for tag in tags]
-    font = ImageFont.load_default(size=12 * pen_px)
+    font = font_for((tag.text for tag in tags), 12 * pen_px)
     places = place_tags(
         [tag.box for tag in tags],
         [(ceil(draw.textlength(tag.text, font) + 8 * pen_px), ceil(17 * pen_px)) for tag in tags],
