@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path, PureWindowsPath
 
-from ldls.batch.run_tracks import FOLDER, STATE, TABLE
+from ldls.batch.run_tracks import TRACKS_STATE, TRACKS_TABLE
 from ldls.batch.window import Frames
 from ldls.datasets import Source
 from ldls.errors import BatchError, ParameterError, UnsafePathError, some
 from ldls.sequences.trajectory import LONGEST_GAP_S
-from ldls.viewing.formats import ENDINGS, file_name, file_names
+from ldls.viewing.formats import ENDINGS, TRACKS, file_name, file_names
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 
@@ -140,7 +140,7 @@ def check_apart(files: Mapping[str, Path], folder: Path, names: Sequence[str]) -
         ParameterError: There is one.
     """
     of_frames = {_folded(file) for name in names for file in file_names(name)} if files else set()
-    own = {folder.resolve(): {*of_frames, TABLE}, (folder / FOLDER).resolve(): {*of_frames, STATE}}
+    own = {folder.resolve(): {*of_frames, TRACKS_TABLE}, (folder / TRACKS).resolve(): {*of_frames, TRACKS_STATE}}
     for option, path in files.items():
         if _folded(path.name) in own.get(path.parent.resolve(), ()):
             raise ParameterError(f"{option}: {path} is the name of a file that runs write there; give another")

@@ -20,7 +20,7 @@ from ldls.batch.lock import only_run
 from ldls.batch.plan import check_apart, check_names, check_places, chosen_of, windows_of
 from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import RunBag
-from ldls.batch.run_tracks import FOLDER, TABLE, RunTracks
+from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import FAILURES_NAME, Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
 from ldls.batch.window import Frames, Outcome
@@ -111,7 +111,7 @@ def run(
     # a journal that was cut off, or is none, is judged when it is opened
     if begun is not None:
         tables = [FAILURES_NAME] if not begun else []
-        tables += [FOLDER, TABLE] if settings.track and TRACKS not in begun else []
+        tables += [TRACKS, TRACKS_TABLE] if settings.track and TRACKS not in begun else []
         check_places(folder, opened.names, settings.frame_formats, begun, tables)
     of_all = {name: Path(path) for name, path in (("objects", objects), ("map", map_file)) if path is not None}
     check_outputs({name: [path] for name, path in of_all.items()}, _inputs(opened, settings), made=folder)

@@ -40,7 +40,7 @@ from ldls.segmentation.object_rows import Row
 from ldls.sequences import LabelledMap, Sweep, Tracker
 from ldls.viewing.formats import RESULT, TRACKS, file_name
 
-FOLDER, TABLE, STATE = TRACKS, "tracks.csv", "tracks.json"
+TRACKS_TABLE, TRACKS_STATE = "tracks.csv", "tracks.json"
 FORMATS = ("npz", "label", "panoptic", "ply", "pcd", "las", "laz", "parquet", "csv")
 """Formats of results that name instances."""
 COLUMNS = (
@@ -68,11 +68,13 @@ class RunTracks:
             UnsafePathError: Files of a frame and of the tracks would be one.
         """
         Tracker()
-        if any(name.casefold() == FOLDER for name in names):
-            raise UnsafePathError(f"frame {FOLDER!r}: its files and {TABLE} may be one; rename it, or do not track")
+        if any(name.casefold() == TRACKS for name in names):
+            raise UnsafePathError(
+                f"frame {TRACKS!r}: its files and {TRACKS_TABLE} may be one; rename it, or do not track"
+            )
         if map_file is not None:
             map_writer(map_file)
-        self._folder, self.folder, self._map = folder, folder / FOLDER, map_file
+        self._folder, self.folder, self._map = folder, folder / TRACKS, map_file
         self._formats = {"label", *formats}
 
     def write(self, records: Callable[[], Iterable[Record]], before: Callable[[], None] = lambda: None) -> list[str]:
@@ -99,7 +101,7 @@ class RunTracks:
         formats = [
             word for word in FORMATS if word in self._formats or any(_place(frame, word) in files for frame in frames)
         ]
-        expected = {TABLE, *(_place(frame, word) for frame in frames for word in formats)}
+        expected = {TRACKS_TABLE, *(_place(frame, word) for frame in frames for word in formats)}
         current = noted["made_of"] == made_of and expected == files.keys()
         current = current and all(is_written(self._folder / name, files[name]) for name in files)
         if current and self._map is None:
@@ -110,7 +112,7 @@ class RunTracks:
         self.folder.mkdir(exist_ok=True)
         sweep(self.folder)
         now: dict[str, list[int | str]] = {}
-        with whole_file(self._folder / TABLE) as file:
+        with whole_file(self._folder / TRACKS_TABLE) as file:
             text = io.TextIOWrapper(file, encoding="utf-8", newline="")
             table = csv.writer(text, lineterminator="\n")
             table.writerow(COLUMNS)
@@ -124,10 +126,10 @@ class RunTracks:
                     places.add(placed, result)
             # the file outlives the wrapper
             text.detach()
-        now[TABLE] = written(self._folder / TABLE)
+        now[TRACKS_TABLE] = written(self._folder / TRACKS_TABLE)
         for name in files.keys() - now.keys():
             (self._folder / name).unlink(missing_ok=True)
-        with whole_file(self.folder / STATE) as file:
+        with whole_file(self.folder / TRACKS_STATE) as file:
             file.write(json.dumps({"files": now, "made_of": made_of}, indent=0).encode())
         if self._map is not None:
             save(places, self._map)
@@ -159,7 +161,7 @@ class RunTracks:
     @contextmanager
     def _table(self) -> Iterator[Iterator[dict[str, str]]]:
         """The rows of the table that was written, by their columns."""
-        with open_file(self._folder / TABLE, "table of tracks") as file:
+        with open_file(self._folder / TRACKS_TABLE, "table of tracks") as file:
             yield csv.DictReader(io.TextIOWrapper(file, encoding="utf-8", newline=""))
 
     def _tracked(self, records: Iterable[Record]) -> Iterator[tuple[str, Sweep, Segmentation]]:
@@ -184,7 +186,7 @@ class RunTracks:
     def _before(self) -> dict[str, Any]:
         """What an earlier run noted of its tracks."""
         try:
-            with open_file(self.folder / STATE, "note of tracks", limit=LARGE_BYTES) as file:
+            with open_file(self.folder / TRACKS_STATE, "note of tracks", limit=LARGE_BYTES) as file:
                 match json.loads(file.text()):
                     case {"files": dict() as files, "made_of": str() as made_of}:
                         return {"files": {name: files[name] for name in files if _is_ours(name)}, "made_of": made_of}
@@ -199,13 +201,15 @@ def _is_placed(record: Record) -> bool:
 
 def _place(frame: str, word: str) -> str:
     """Where a file of a frame is in the folder of the run."""
-    return f"{FOLDER}/{file_name(frame, word)}"
+    return f"{TRACKS}/{file_name(frame, word)}"
 
 
 def _is_ours(name: str) -> bool:
     """True for the name of a file that tracks have; nothing else is removed."""
     endings = tuple(file_name("", word) for word in FORMATS)
-    return name == TABLE or (name.startswith(f"{FOLDER}/") and name.endswith(endings) and len(Path(name).parts) == 2)
+    return name == TRACKS_TABLE or (
+        name.startswith(f"{TRACKS}/") and name.endswith(endings) and len(Path(name).parts) == 2
+    )
 
 
 def _numbered(row: Row, known: Mapping[str, str] | None) -> Row:

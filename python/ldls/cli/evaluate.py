@@ -230,13 +230,14 @@ def _check_tracked(paths: Iterable[Path]) -> None:
     Raises:
         ParameterError: A path is the folder of such a run.
     """
-    from ldls.batch.run_tracks import FOLDER, STATE
+    from ldls.batch.run_tracks import TRACKS_STATE
+    from ldls.viewing.formats import TRACKS
 
     for path in paths:
-        if (path / FOLDER / STATE).is_file():
+        if (path / TRACKS / TRACKS_STATE).is_file():
             raise ParameterError(
                 f"--track: files in {path} number the objects of each frame anew; expected files whose numbers mean "
-                f"the same object throughout, which are in {path / FOLDER}"
+                f"the same object throughout, which are in {path / TRACKS}"
             )
 
 
