@@ -54,7 +54,9 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
     known = dict(given)
     of_kitti = {name: class_id(category, KITTI_NAMES[category], known) for name, category in KITTI_CATEGORIES.items()}
     all_names = COCO_NAMES | known
-    ids = _ids(all_names) | {folded(name): category for name, category in of_kitti.items()} | _ids(given)
+    ids = (
+        _ids_by_type(all_names) | {folded(name): category for name, category in of_kitti.items()} | _ids_by_type(given)
+    )
     with within(path):
         return KittiBoxes(
             boxes=[each.bbox for each in objects],
@@ -64,7 +66,8 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
         )
 
 
-def _ids(names: Mapping[int, str]) -> dict[str, int]:
+def _ids_by_type(names: Mapping[int, str]) -> dict[str, int]:
+    """Category id of each class, by its name as KITTI's files have it, folded."""
     # a blank separates fields, so names are written without
     return {folded(name).replace(" ", "_"): category for category, name in names.items()}
 

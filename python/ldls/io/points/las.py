@@ -191,12 +191,11 @@ def write(path: Path, result: Labelled) -> None:
     require("lazrs", "las")
     xyz = result.points[:, :3].astype(np.float64)
     _check_writable(path, xyz, result.categories)
-    intensities = _intensities(result.points)
     header = laspy.LasHeader(point_format=COLOR_FORMAT, version="1.4")
     header.scales, header.offsets = np.full(3, SCALE_M), _middle(xyz)
     header.add_extra_dims([laspy.ExtraBytesParams(name, kind) for name, kind in DIMENSIONS.items()])
     las = laspy.LasData(header, laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header))
-    las.intensity = intensities
+    las.intensity = _intensities(result.points)
     _fill(las, xyz, result)
     with whole_file(path) as file:
         las.write(file, do_compress=path.suffix.lower() == ".laz")
