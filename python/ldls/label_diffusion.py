@@ -2,49 +2,23 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
 from ldls.camera import Camera
-from ldls.camera.rigid import transformed
 from ldls.checks import checked
-from ldls.cloud import Points, as_points, doubt_of_scale, finite_rows
-from ldls.errors import (
-    DuplicateWarning,
-    InputError,
-    NonFiniteError,
-    NothingInView,
-    NoUsablePoints,
-    ParameterError,
-    PrecisionWarning,
-    ScaleWarning,
-    UprightWarning,
-    some,
-)
+from ldls.cloud import Points, as_points
+from ldls.doubts import warn_of
+from ldls.errors import InputError, NonFiniteError, ParameterError
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Instance, Report, Segmentation
-from ldls.stages import GROUND_M, ground
-from ldls.view import SeenView, View, camera_names, check_names, common_categories
+from ldls.view import SeenView, View, check_names, common_categories
 
-COARSEST_STEP_M = 0.01
-"""Step between single-precision coordinates from which on distances between neighbours suffer."""
-EXPECTED_ON_MASKS = 20.0
-"""Points that masks of this area would have on them by chance, from which on none at all is no chance."""
-ALONG_Z = 0.7
-"""Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
-STEEPEST = 0.97
-"""The same up to which a camera may look up, where a leaning wall in the image passes for ground."""
-NOT_FINITE = "points: no row is finite; nothing is labelled; are they read as they were written?"
-GROUND_SHARE = 0.2
-"""Share of the points in view that the ground must have to tell where up is."""
-ENOUGH_FOR_GROUND = 4000
-"""Points that tell as much of the ground as more do."""
 SAME_OBJECT = 0.5
 """Share of common points from which on instances of two images are one object."""
 
@@ -182,54 +156,6 @@ def result_of(
     )
 
 
-def nothing_in_view(result: Segmentation) -> str | None:
-    """Why nothing of a cloud is labelled, if no point is finite, in view, or on a mask; None otherwise.
-
-    The text has no numbers, so that those of many frames are few.
-    """
-    n_in_view = result.report.n_in_view
-    if (result.labels > 0).any():
-        return None
-    # of sweeps that were labelled together the report counts the points of all
-    if result.report.n_nonfinite and len(result.points) and not len(finite_rows(result.points)):
-        return NOT_FINITE
-    if not result.views:
-        return None
-    usable, behind = _usable_and_behind(result)
-    if usable == 0:
-        return None
-    if n_in_view == 0 and behind == usable:
-        found, cause = "every point lies behind the camera", "is T_camera_lidar that of this lidar, or its inverse"
-    elif n_in_view == 0:
-        found, cause = "no point falls inside the image", "are calibration and image size those of this camera"
-    elif _expected_on_masks(result.views) > EXPECTED_ON_MASKS and not (result.direct_labels > 0).any():
-        found, cause = "no point in view falls on a mask", "are the masks those of this frame"
-    else:
-        return None
-    return f"points: {found}; nothing is labelled; {cause}, and are x, y, z in order and in metres?"
-
-
-def _usable_and_behind(result: Segmentation) -> tuple[int, int]:
-    """How many points of a cloud are not left out, and how many of these lie behind all of its cameras."""
-    report = result.report
-    if report.n_sweeps == 1:
-        return report.n_points - report.n_nonfinite - report.n_origin, report.n_behind
-    # the report has those of all sweeps together
-    finite = np.isfinite(result.points[:, :3]).all(axis=1)
-    # without any at the origin they may have been kept
-    missing = ~result.points[:, :3].any(axis=1) & (report.n_origin > 0)
-    usable = result.points[finite & ~missing]
-    cameras = [seen.view.camera for seen in result.views]
-    behind = [transformed(usable, each.T_camera_lidar)[:, 2] <= each.min_depth_m for each in cameras]
-    return len(usable), int(np.all(behind, axis=0).sum())
-
-
-def _expected_on_masks(views: Sequence[SeenView]) -> float:
-    """Points that would fall on the masks if those in view were spread evenly over the images."""
-    areas = [(seen, sum(seen.view.masks.core.areas())) for seen in views]
-    return sum(len(seen.in_view) * area / (seen.view.masks.height * seen.view.masks.width) for seen, area in areas)
-
-
 def _instance(
     label: int,
     parts: Sequence[tuple[int, int]],
@@ -281,91 +207,6 @@ def check_finite(cloud: Points) -> None:
             f"points: {finite.sum()} of {len(finite)} rows are finite, row {finite.argmin()} is the first "
             "that is not; pass nonfinite='drop' to leave such rows out"
         )
-
-
-def warn_of(results: Sequence[Segmentation], report: Mapping[str, Any], *, stacklevel: int) -> None:
-    """Warn of what is odd about points, cameras and masks of some sweeps that were labelled together.
-
-    Args:
-        results: Those of the sweeps to warn of.
-        report: What the core says of all of them.
-        stacklevel: Of `warnings.warn`, from here.
-    """
-    for message, category in (*_oddities(results, report), *_doubts(results)):
-        warnings.warn(message, category, stacklevel=stacklevel)
-
-
-def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Iterator[tuple[str, type[Warning]]]:
-    low, high = report["bounds"]
-    if low[0] <= high[0]:  # there is a finite point
-        farthest = max(abs(bound) for bound in (*low, *high))
-        step = float(np.spacing(np.float32(farthest)))
-        if any(result.points.dtype == np.float32 for result in results) and step > COARSEST_STEP_M:
-            message = f"points: float32 spacing at {farthest:.1e} is {step:.2g} m; pass float64 or subtract an origin"
-            yield message, PrecisionWarning
-        scale = doubt_of_scale(low, high)
-        if scale is not None:
-            yield scale, ScaleWarning
-        if report["only_islands"]:
-            message = "points: every point has more copies than neighbours, so labels cannot spread; remove duplicates"
-            yield message, DuplicateWarning
-        leaning = dict.fromkeys(
-            name
-            for each in results
-            for name, seen in zip(camera_names(each.views), each.views, strict=True)
-            # the ground is fitted around the first camera
-            if not _is_own_frame(each.views[0]) and _leans(seen, each)
-        )
-        if leaning:
-            message = (
-                f"T_camera_lidar of {', '.join(leaning)}: z of the lidar does not point up in the image; is it the "
-                "inverse, or is the turn to the optical frame missing (x right, y down, z forward)? If another axis of "
-                "the lidar points up, turn points and T_camera_lidar until z does"
-            )
-            yield message, UprightWarning
-
-
-def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning]]]:
-    """Why nothing is labelled, once for all sweeps with the same cause."""
-    doubts: dict[str, list[str]] = {}
-    for number, result in enumerate(results):
-        doubt = nothing_in_view(result)
-        if doubt is not None:
-            doubts.setdefault(doubt, []).append(f"sweep {number}")
-    for doubt, sweeps in doubts.items():
-        place = f"{some(sweeps)}: " if len(results) > 1 else ""
-        yield f"{place}{doubt}", NoUsablePoints if doubt == NOT_FINITE else NothingInView
-
-
-def _is_own_frame(seen: SeenView) -> bool:
-    """True for a cloud in the frame of the camera, where up is -y."""
-    turn = seen.view.camera.T_camera_lidar
-    return bool(turn[1, 1] > 0.5 and turn[2, 2] > ALONG_Z)
-
-
-def _leans(seen: SeenView, result: Segmentation) -> bool:
-    """True if z of the lidar points down or to the side in an image, by over 60 degrees.
-
-    Where the camera looks along it, the ground must tell: what a drone sees lies below z, and in other frames below
-    what is up in the image.
-    """
-    x, y, z = seen.view.camera.T_camera_lidar[:3, 2]
-    if abs(z) < ALONG_Z:
-        return bool(-y < 0.5 * np.hypot(x, y))
-    if ALONG_Z <= z < STEEPEST or _is_own_frame(seen):
-        return False
-    rows = seen.in_view[:: max(1, len(seen.in_view) // ENOUGH_FOR_GROUND)]
-    points, camera, threads = result.points[rows, :3], seen.view.camera, result.params.threads
-    of_lidar = _share_of_ground(points, camera, threads)
-    own_frame = transformed(points, camera.T_camera_lidar)
-    of_image = _share_of_ground(own_frame, Camera(projection=np.eye(3)), threads)
-    return of_image > max(GROUND_SHARE, 2 * of_lidar)
-
-
-def _share_of_ground(points: Points, camera: Camera, threads: int | None) -> float:
-    heights = ground(points, camera, threads=threads)
-    low, high = GROUND_M
-    return float(np.mean((heights > low) & (heights < high))) if len(heights) else 0.0
 
 
 def _report(

@@ -10,8 +10,8 @@ import ldls
 from batch import runs
 from datasets import layouts
 from ldls import batch
+from ldls.doubts import nothing_in_view
 from ldls.errors import LdlsWarning, NothingInView, NoUsablePoints
-from ldls.label_diffusion import nothing_in_view
 
 CAMERA = ldls.Camera(projection=[[50, 0, 40], [0, 50, 30], [0, 0, 1]])
 AHEAD = np.random.default_rng(0).uniform([-1, -1, 8], [1, 1, 12], (100, 3)).astype(np.float32)

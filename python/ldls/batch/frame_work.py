@@ -16,11 +16,11 @@ from ldls.batch.window import Frames, Outcome, StageError, Window, Work, stage
 from ldls.categories import find_categories
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.datasets.stored_masks import StoredMasks, fill, own_category_names, own_masks
+from ldls.doubts import nothing_in_view
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_result
 from ldls.io.files import folder_hint
 from ldls.io.objects import FrameObjects
-from ldls.label_diffusion import nothing_in_view
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
 from ldls.segmenters import Segmenter, open_segmenter

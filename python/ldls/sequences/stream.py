@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from ldls.camera import Camera
 from ldls.checks import checked
 from ldls.cloud import as_points
+from ldls.doubts import warn_of
 from ldls.errors import InputError, ParameterError
-from ldls.label_diffusion import SAME_OBJECT, segment_views, warn_of
+from ldls.label_diffusion import SAME_OBJECT, segment_views
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Segmentation

@@ -21,8 +21,9 @@ from ldls.camera.rigid import as_transform, brought_together, inverse, rigid
 from ldls.checks import checked
 from ldls.checks.values import as_seconds
 from ldls.cloud import Points, as_points
+from ldls.doubts import warn_of
 from ldls.errors import InputError, ShapeError
-from ldls.label_diffusion import check_finite, diffuse_labels, result_of, warn_of
+from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
 from ldls.view import View, check_names
