@@ -262,6 +262,25 @@ mod tests {
         assert!(largest < 1e-5, "likelihoods differ by {largest}");
     }
 
+    #[test]
+    fn many_products_in_stages_yield_the_likelihoods_of_plain_products() {
+        let points: Vec<[f64; 3]> = (0..2000)
+            .map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0])
+            .collect();
+        let seen: Vec<(u32, u32)> = (0..2000).map(|i| (1 + i / 200 % 9, i % 26)).collect();
+        let (a, b) = system::<f32>(&points, &seen, 1e-4);
+        // three stages, and two products left
+        let (found, convergence) = likelihoods(&a, &b, 10, Some(701), Cancel::never()).unwrap();
+        assert!(convergence.sweeps < 250);
+        let (a, b) = system::<f64>(&points, &seen, 1e-4);
+        let expected = plain_products(&a, &b, 10, 701);
+        let differences = found.iter().zip(&expected);
+        let largest = differences
+            .map(|(found, expected)| (f64::from(*found) - expected).abs())
+            .fold(0.0, f64::max);
+        assert!(largest < 5e-6, "likelihoods differ by {largest}");
+    }
+
     fn clouds() -> impl Strategy<Value = Vec<[f64; 3]>> {
         let scattered = proptest::collection::vec([-5.0..5.0_f64, -5.0..5.0, -1.0..1.0], 1..400);
         let graded =

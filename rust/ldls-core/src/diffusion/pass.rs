@@ -26,6 +26,10 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     z: Values<T, WIDTH>,
     /// Values before the last step, which the next one overwrites.
     previous: Values<T, WIDTH>,
+    /// Values that the last series began with, if not with zeros.
+    initial: Values<T, WIDTH>,
+    /// Steps taken.
+    taken: usize,
     /// What a series may leave out at each point, going by the probe; nothing where the pass has none of both.
     pub(super) errors: Vec<f32>,
     pub(super) convergence: Convergence,
@@ -69,7 +73,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     pub(super) fn steps(series: Option<&Series>, iterations: Option<usize>) -> usize {
         match (series, iterations) {
             // one more for the residual
-            (Some(series), products) => series.degree() + usize::from(products.is_none()),
+            (Some(series), products) => series.sweeps() + usize::from(products.is_none()),
             (None, Some(products)) => products.saturating_sub(1),
             (None, None) => usize::MAX,
         }
@@ -99,6 +103,8 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             activity: Activity::new(schedule, &seeds.groups(cancel)?),
             z,
             previous,
+            initial: Values::none(),
+            taken: 0,
             errors: Vec::new(),
             convergence: Convergence::default(),
         })
@@ -106,9 +112,19 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     fn run_series(&mut self, series: &Series, cancel: &Cancel) -> Result<()> {
         self.advance(&series.steps(), cancel)?;
-        self.convergence.sweeps = series.degree();
-        // the probe has gone through the recurrence as the last term alone
-        self.errors = self.errors_of(series.tail, cancel)?;
+        self.convergence.sweeps = series.sweeps();
+        // the probe has gone through the recurrence as the last term alone, and each stage leaves out as much again
+        let left_out = series.tail * series.stages as f64;
+        self.errors = self.errors_of(left_out, cancel)?;
+        for _ in 1..series.stages {
+            std::mem::swap(&mut self.z, &mut self.initial);
+            if self.z.is_empty() {
+                [self.z, _] = Values::zeros(self.a.len(), self.seeds.plan.groups, cancel)?;
+            }
+            self.advance(&series.steps_on(), cancel)?;
+        }
+        self.initial = Values::none();
+        self.advance(&vec![Step::product(); series.products_left], cancel)?;
         let errors = self.errors.par_iter().with_min_len(ROWS_A_TASK).copied();
         self.convergence.error = errors.reduce(|| 0.0, f32::max).into();
         Ok(())
@@ -116,16 +132,17 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     /// Applies `steps` one after the other; what was z before the last becomes the previous values.
     fn advance(&mut self, steps: &[Step<T>], cancel: &Cancel) -> Result<()> {
-        let values = [&mut self.z, &mut self.previous];
+        let initial = Some(&self.initial).filter(|initial| !initial.is_empty());
         take_steps(
             self.a,
             self.seeds,
             self.schedule,
-            steps,
+            (self.taken, steps),
             &self.activity,
-            values,
+            (initial, [&mut self.z, &mut self.previous]),
             cancel,
         )?;
+        self.taken += steps.len();
         if steps.len() % 2 == 1 {
             std::mem::swap(&mut self.z, &mut self.previous);
         }

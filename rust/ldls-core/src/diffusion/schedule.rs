@@ -159,26 +159,27 @@ impl Schedule {
         &self.targets[start..end]
     }
 
-    /// Calls `work(rows, step)` for steps 0 to `steps` - 1 of every tile of rows, on all threads of the pool.
+    /// Calls `work(rows, step)` for each of `steps` of every tile of rows, on all threads of the pool.
     ///
-    /// At that time every tile next to it that takes part has taken steps 0 to `step` - 1, none has begun with `step` + 1, and
+    /// At that time every tile next to it that takes part has taken the steps before, none has begun with `step` + 1, and
     /// what was written for those is visible.
     ///
     /// # Errors
     /// [`Error::Cancelled`]: some tiles have taken fewer steps then.
     pub(super) fn run(
         &self,
-        steps: usize,
+        steps: Range<usize>,
         cancel: &Cancel,
         work: impl Fn(Range<usize>, usize) + Sync,
     ) -> Result<()> {
         let places = self.offsets.windows(2).enumerate();
-        let phases = (0..steps).step_by(self.round).flat_map(|first| {
+        let first = steps.start / self.round * self.round;
+        let phases = (first..steps.end).step_by(self.round).flat_map(|first| {
             let steps_of_round = places.clone().map(move |(place, range)| {
                 let tiles = &self.order[range[0]..range[1]];
                 (first + place % self.round, tiles)
             });
-            steps_of_round.filter(|(step, _)| *step < steps)
+            steps_of_round.filter(|(step, _)| steps.contains(step))
         });
         let count = |(_, tiles): &(usize, &[u32])| tiles.len();
         phases::run(&phases, count, cancel, |&(step, tiles), turn| {
@@ -318,15 +319,15 @@ mod tests {
             rows in 1_usize..6000,
             reaches in proptest::collection::vec(prop_oneof![0_usize..80, 0_usize..6000], 1..40),
             region in 1_usize..20,
-            steps in 0_usize..30,
+            [before, steps] in [0_usize..20, 0_usize..30],
         ) {
             let schedule = Schedule::in_regions(&graph(rows, &reaches), region, Cancel::never()).unwrap();
             let count = rows.div_ceil(TILE);
             let edges = schedule.tile_edges(Cancel::never()).unwrap();
             let taken: Vec<AtomicUsize> = (0..count).map(|_| AtomicUsize::new(0)).collect();
             let violations = AtomicUsize::new(0);
-            schedule.run(steps, Cancel::never(), |rows, step| {
-                let tile = rows.start / TILE;
+            schedule.run(before..before + steps, Cancel::never(), |rows, step| {
+                let (tile, step) = (rows.start / TILE, step - before);
                 let of_tile = edges.iter().filter(|edge| edge.contains(&(tile as u32)));
                 let ready = of_tile.flatten().all(|&other| {
                     // this step at most: it may be about to take it, or have taken it

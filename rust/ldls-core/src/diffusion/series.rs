@@ -2,7 +2,8 @@
 //!
 //! T products z <- A z + b from z = 0 yield p(A) b with p(x) = 1 + x + ... + x^(T - 1), and endlessly many
 //! yield (1 - x)^(-1). Where the spectrum of A lies near a real interval, a Chebyshev series on that
-//! interval comes as near to p(A) b with far fewer products.
+//! interval comes as near to p(A) b with far fewer products. The more products, the more terms of eigenvalues that lie off it
+//! grow before they shrink, so many products are divided into stages: T of them from any z yield p(A) b + A^T z.
 
 use super::convergence::MOST_SWEEPS;
 use super::schedule::ROWS_A_TASK;
@@ -21,6 +22,9 @@ const MOST_LEFT_OUT: f64 = 1e-4;
 /// and double precision decides the near-ties among them.
 const MOST_LEFT_OUT_OF_SHORT: f64 = 1e-2;
 
+/// Products for which one series stands: terms of more grow, at eigenvalues far from the interval, to where they leave no digits.
+const MOST_PRODUCTS: usize = 256;
+
 /// Coefficients below it are left out of a sum that is at least 1: far less than any tolerance, even a hundred thousand times.
 const NOTHING: f64 = 1e-30;
 
@@ -33,6 +37,12 @@ pub(super) struct Series {
     pub(super) half_width: f64,
     /// `c_0`, `c_1` and so on; the degree is one less than their number.
     pub(super) coefficients: Vec<f64>,
+    /// Those of the power of A that the values of one stage are multiplied by in the next, as many; none of a single stage.
+    power: Vec<f64>,
+    /// How often it is taken, each time from the values of the time before.
+    pub(super) stages: usize,
+    /// Products to be run after it.
+    pub(super) products_left: usize,
     /// Sum of the magnitudes of the coefficients left out.
     pub(super) tail: f64,
     /// What it may leave out of any likelihood: where that is more, it is given up.
@@ -85,21 +95,34 @@ impl Series {
             let most = MOST_SWEEPS;
             return (high < 1.0).then(|| Self::of_resolvent(middle, half_width, tolerance, most));
         };
-        let series = Self::of_geometric_sum(products, middle, half_width, tolerance);
-        Some(series).filter(|series| series.degree() + 1 < products)
+        let series = Self::of_products(products, middle, half_width, tolerance);
+        Some(series).filter(|series| series.sweeps() + 1 < products)
     }
 
-    /// The series of 1 + x + ... + x^(`terms` - 1), for an interval whose middle is not negative.
-    fn of_geometric_sum(terms: usize, middle: f64, half_width: f64, tolerance: f64) -> Self {
-        let mut coefficients = geometric_sum(terms, middle, half_width);
-        // all T_k are 1 at the upper end, where the sum is largest
+    /// The series of so many products, for an interval whose middle is not negative.
+    fn of_products(products: usize, middle: f64, half_width: f64, tolerance: f64) -> Self {
+        let stages = products.div_ceil(MOST_PRODUCTS).max(1);
+        let of_stage = products / stages;
+        let mut coefficients = geometric_sum(of_stage, middle, half_width);
+        let mut power = if stages > 1 {
+            power(of_stage, middle, half_width)
+        } else {
+            Vec::new()
+        };
+        // all T_k are 1 at the upper end, where the sum is largest; values go on as they are, or shrink
         let largest: f64 = coefficients.iter().sum();
         let degree = degree_within(&coefficients, tolerance * largest);
-        let tail = coefficients.drain(degree + 1..).sum();
+        let degree = degree.max(degree_within(&power, tolerance));
+        let tail = coefficients.iter().skip(degree + 1).sum();
+        coefficients.resize(degree + 1, 0.0);
+        power.resize(degree + 1, 0.0);
         Self {
             middle,
             half_width,
             coefficients,
+            power,
+            stages,
+            products_left: products % stages,
             tail,
             most_left_out: MOST_LEFT_OUT,
         }
@@ -125,7 +148,10 @@ impl Series {
         Self {
             middle,
             half_width,
+            power: vec![0.0; coefficients.len()],
             coefficients,
+            stages: 1,
+            products_left: 0,
             tail,
             most_left_out: MOST_LEFT_OUT,
         }
@@ -139,9 +165,29 @@ impl Series {
             let times = if k == 0 { 1.0 } else { 2.0 };
             let along = times / self.half_width;
             let stay = -along * self.middle;
-            Step::new(self.coefficients[k], along, stay, -1.0)
+            // before the first there is nothing
+            let back = if k + 1 == self.degree() { 0.0 } else { -1.0 };
+            Step::new(self.terms(k), along, stay, back)
         };
         (0..self.degree()).rev().map(step).collect()
+    }
+
+    /// The same from the values of the stage before, which are the initial ones: `d_k z_0` comes to each `c_k b`.
+    pub(super) fn steps_on<T: Real>(&self) -> Vec<Step<T>> {
+        let first = Step::new(self.terms(self.degree()), 0.0, 0.0, 0.0);
+        std::iter::once(first).chain(self.steps()).collect()
+    }
+
+    /// What `T_k` has of b, and of the values of the stage before.
+    fn terms(&self, k: usize) -> [f64; 2] {
+        [self.coefficients[k], self.power[k]]
+    }
+
+    /// Sweeps over the graph, those of the products left among them.
+    pub(super) fn sweeps(&self) -> usize {
+        let of_stage = self.degree() + 1;
+        // the first begins with the last term
+        self.stages * of_stage - 1 + self.products_left
     }
 
     /// Highest k of `T_k`.
@@ -174,9 +220,6 @@ fn gershgorin<T: Real>(a: &PointGraph<T>) -> Option<[f64; 2]> {
 /// The coefficients of 1 + x + ... + x^(`terms` - 1) but for those that are next to nothing. None is negative where `middle` is not, so
 /// that none cancels another and the smallest keep their digits.
 fn geometric_sum(terms: usize, middle: f64, half_width: f64) -> Vec<f64> {
-    // 2 t T_k = T_(k + 1) + T_(k - 1), where T_(-1) is T_1: the first counts twice, as those of an even function do
-    let mut sum = vec![2.0];
-    let mut next = Vec::new();
     // what further terms add is next to nothing
     let enough = NOTHING.ln() / (middle + half_width).ln();
     let terms = if enough > 0.0 {
@@ -184,18 +227,36 @@ fn geometric_sum(terms: usize, middle: f64, half_width: f64) -> Vec<f64> {
     } else {
         terms
     };
-    for _ in 1..terms {
-        sum.extend([0.0; 2]);
-        next.clear();
-        next.push(2.0 + middle * sum[0] + half_width * sum[1]);
-        let inner = sum.windows(3);
-        next.extend(inner.map(|c| middle * c[1] + half_width / 2.0 * (c[0] + c[2])));
-        let kept = next.iter().rposition(|c| *c > NOTHING);
-        next.truncate(kept.map_or(1, |last| last + 1));
-        std::mem::swap(&mut sum, &mut next);
-    }
-    sum[0] /= 2.0;
-    sum
+    let sum = (1..terms).fold(vec![2.0], |sum, _| {
+        let mut sum = times_x(sum, middle, half_width);
+        sum[0] += 2.0;
+        sum
+    });
+    halve_first(sum)
+}
+
+/// Those of x^`exponent`, likewise.
+fn power(exponent: usize, middle: f64, half_width: f64) -> Vec<f64> {
+    let power = (0..exponent).fold(vec![2.0], |power, _| times_x(power, middle, half_width));
+    halve_first(power)
+}
+
+/// Those of a polynomial times x, the first of both doubled, but for the last ones that are next to nothing.
+fn times_x(mut coefficients: Vec<f64>, middle: f64, half_width: f64) -> Vec<f64> {
+    // 2 t T_k = T_(k + 1) + T_(k - 1), where T_(-1) is T_1: as those of an even function are, of which the first is there once
+    coefficients.extend([0.0; 2]);
+    let first = middle * coefficients[0] + half_width * coefficients[1];
+    let inner = coefficients.windows(3);
+    let inner = inner.map(|c| middle * c[1] + half_width / 2.0 * (c[0] + c[2]));
+    let mut product: Vec<f64> = std::iter::once(first).chain(inner).collect();
+    let last = product.iter().rposition(|c| *c > NOTHING);
+    product.truncate(last.map_or(1, |last| last + 1));
+    product
+}
+
+fn halve_first(mut coefficients: Vec<f64>) -> Vec<f64> {
+    coefficients[0] /= 2.0;
+    coefficients
 }
 
 /// Least degree behind which the coefficients sum to at most `remainder`.
@@ -222,10 +283,19 @@ mod tests {
     const MIDDLE: f64 = f64::midpoint(HIGH, LOW);
     const HALF_WIDTH: f64 = (HIGH - LOW) / 2.0;
 
-    fn evaluate(series: &Series, x: f64) -> f64 {
+    /// `coefficients` as those of `T_0`, `T_1` and so on, on the interval of `series`.
+    fn sum_of_terms(coefficients: &[f64], series: &Series, x: f64) -> f64 {
         let t = (x - series.middle) / series.half_width;
-        let terms = series.coefficients.iter().enumerate();
+        let terms = coefficients.iter().enumerate();
         terms.map(|(k, c)| c * (k as f64 * t.acos()).cos()).sum()
+    }
+
+    /// What a series makes of 1.
+    fn evaluate(series: &Series, x: f64) -> f64 {
+        let [b, power] = [&series.coefficients, &series.power];
+        let [b, power] = [b, power].map(|coefficients| sum_of_terms(coefficients, series, x));
+        let z = (0..series.stages).fold(0.0, |z, _| b + power * z);
+        (0..series.products_left).fold(z, |z, _| x * z + 1.0)
     }
 
     fn points() -> impl Iterator<Item = f64> {
@@ -282,20 +352,30 @@ mod tests {
 
     #[test]
     fn a_series_equals_the_sum_of_powers() {
-        for (terms, most) in [(1, 0), (2, 1), (7, 6), (200, 64), (5000, 700)] {
-            let series = Series::of_geometric_sum(terms, MIDDLE, HALF_WIDTH, 1e-7);
-            let largest: f64 = (0..terms).map(|k| HIGH.powi(k as i32)).sum();
+        for (products, stages, most) in [
+            (1, 1, 0),
+            (2, 1, 1),
+            (7, 1, 6),
+            (200, 1, 64),
+            (501, 2, 160),
+            (5000, 20, 1600),
+        ] {
+            let series = Series::of_products(products, MIDDLE, HALF_WIDTH, 1e-7);
+            let largest: f64 = (0..products).map(|k| HIGH.powi(k as i32)).sum();
+            // each stage leaves out its share
+            let left_out = 1e-7 * (stages + 1) as f64 * largest;
             for x in points() {
-                let sum: f64 = (0..terms).map(|k| x.powi(k as i32)).sum();
+                let sum: f64 = (0..products).map(|k| x.powi(k as i32)).sum();
                 assert!(
-                    (evaluate(&series, x) - sum).abs() <= 1.1e-7 * largest,
-                    "{terms} terms at {x}"
+                    (evaluate(&series, x) - sum).abs() <= left_out,
+                    "{products} products at {x}"
                 );
             }
+            assert_eq!(series.stages, stages);
             assert!(
-                series.degree() <= most,
-                "{terms} terms took degree {}",
-                series.degree()
+                series.sweeps() <= most,
+                "{products} products took {} sweeps",
+                series.sweeps()
             );
         }
     }

@@ -20,10 +20,12 @@ use std::ops::Range;
 /// Edges of a point with the paper's parameters: 10 neighbours and itself.
 const PAPER_DEGREE: usize = 11;
 
-/// One step next <- seeds * s + along * A z + stay * z + back * next.
+/// One step next <- seeds * s + initial * `z_0` + along * A z + stay * z + back * next, where `z_0` are the values that the first
+/// began with.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step<T> {
     pub(super) seeds: T,
+    pub(super) initial: T,
     pub(super) along: T,
     pub(super) stay: T,
     pub(super) back: T,
@@ -32,13 +34,15 @@ pub(super) struct Step<T> {
 impl<T: Real> Step<T> {
     /// z <- A z + b as it stands.
     pub(super) fn product() -> Self {
-        Self::new(1.0, 1.0, 0.0, 0.0)
+        Self::new([1.0, 0.0], 1.0, 0.0, 0.0)
     }
 
-    pub(super) fn new(seeds: f64, along: f64, stay: f64, back: f64) -> Self {
-        let [seeds, along, stay, back] = [seeds, along, stay, back].map(T::from_f64);
+    pub(super) fn new([seeds, initial]: [f64; 2], along: f64, stay: f64, back: f64) -> Self {
+        let [seeds, initial] = [seeds, initial].map(T::from_f64);
+        let [along, stay, back] = [along, stay, back].map(T::from_f64);
         Self {
             seeds,
+            initial,
             along,
             stay,
             back,
@@ -46,27 +50,30 @@ impl<T: Real> Step<T> {
     }
 }
 
-/// Takes `steps` one after the other, each from the first of `values` to the second, which change places after it.
+/// Takes `steps` one after the other, each from the first of `values` to the second, which change places after it. Before the
+/// first, `taken` others have been; where it began with other values than zeros, these are `initial`.
 pub(super) fn take_steps<T: Lane<WIDTH>, const WIDTH: usize>(
     a: &PointGraph<T>,
     seeds: &Seeds<T>,
     schedule: &Schedule,
-    steps: &[Step<T>],
+    (taken, steps): (usize, &[Step<T>]),
     activity: &Activity,
-    values: [&mut Values<T, WIDTH>; 2],
+    (initial, values): (Option<&Values<T, WIDTH>>, [&mut Values<T, WIDTH>; 2]),
     cancel: &Cancel,
 ) -> Result<()> {
     let values = values.map(SharedValues::new);
-    schedule.run(steps.len(), cancel, |rows, step| {
+    schedule.run(taken..taken + steps.len(), cancel, |rows, step| {
+        let step = step - taken;
         let from_to = [&values[step % 2], &values[(step + 1) % 2]];
         // SAFETY: nobody else is in these rows, and what they have edges from lies in them, in tiles next to them, which
         // neither are behind `step`, so have its z, nor ahead of the step after it, so have not lost it, or in rows that
         // take no more steps, which nobody writes
-        unsafe { sweep(a, seeds, steps[step], activity, from_to, rows) }
+        unsafe { sweep(a, seeds, steps[step], activity, (initial, from_to), rows) }
     })
 }
 
-/// Computes the active groups of the rows in `all`, which are whole blocks, of the second values from the first.
+/// Computes the active groups of the rows in `all`, which are whole blocks, of the second values from the first, and from the
+/// `initial` ones where there are any.
 ///
 /// # Safety
 /// Meanwhile nobody else touches these rows of the second values, or writes a row of the first that lies in `all` or that
@@ -76,7 +83,7 @@ unsafe fn sweep<T: Lane<WIDTH>, const WIDTH: usize>(
     seeds: &Seeds<T>,
     step: Step<T>,
     activity: &Activity,
-    values: [&SharedValues<T, WIDTH>; 2],
+    (initial, values): (Option<&Values<T, WIDTH>>, [&SharedValues<T, WIDTH>; 2]),
     all: Range<usize>,
 ) {
     let blocks = all.start / BLOCK..all.end.div_ceil(BLOCK);
@@ -92,6 +99,14 @@ unsafe fn sweep<T: Lane<WIDTH>, const WIDTH: usize>(
         let rows = rows_of(first..end);
         // SAFETY: as the caller promises
         unsafe { step_active(a, seeds, step, (active, common), values, &rows) };
+        for group in groups_in(active) {
+            let Some(initial) = initial else { break };
+            for (row, initial) in rows.clone().zip(&initial.group(group)[rows.clone()]) {
+                // SAFETY: as the caller promises
+                let next = unsafe { &mut *begins[group].add(row) };
+                (0..WIDTH).for_each(|lane| next[lane] += step.initial * initial[lane]);
+            }
+        }
         for block in first..end {
             for (row, lane, weight) in seeds.others(block) {
                 let (row, begin) = (block * BLOCK + row, begins[lane / WIDTH].cast::<T>());

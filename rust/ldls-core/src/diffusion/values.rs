@@ -46,6 +46,11 @@ impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
         }
     }
 
+    /// True of [`Self::none`].
+    pub(super) fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+
     /// Those of each group at all points.
     pub(super) fn groups(&self) -> impl Iterator<Item = &[Lanes<T, WIDTH>]> {
         self.groups.iter().map(|group| &group[self.first..])
