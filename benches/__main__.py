@@ -21,6 +21,7 @@ SECTIONS = {
     "neighbors": "neighbor_peers.neighbors",
     "growth": "times.growth",
     "instances": "times.instances",
+    "products": "times.products",
     "overlaps": "times.overlaps",
     "threads": "times.threads",
     "batch": "runs.in_memory",

@@ -1,4 +1,4 @@
-"""How the time of a frame spreads over frames, and grows with points, instances, masks that overlap and threads."""
+"""How the time of a frame spreads over frames, and grows with points, instances, products, masks that overlap and threads."""
 
 from __future__ import annotations
 
@@ -75,6 +75,18 @@ def instances(measured: Frame, options: argparse.Namespace) -> Table:
         tiled = tiled_frame(measured.in_view(), 100_000, count)
         run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
         table.add_row(str(count), f"{medians(run, runs=min(options.runs, 5))['ldls'] * 1e3:.1f}")
+    return table
+
+
+def products(measured: Frame, options: argparse.Namespace) -> Table:
+    """Time and sweeps against the number of products."""
+    table = new_table("time against products", ["products", "ms", "sweeps"], f"{options.threads} threads")
+    for count in (10, 200, 500, 1000, None):
+        params = replace(ldls.Params.paper(threads=options.threads), iterations=count)
+        segment = partial(ldls.segment, measured.points, measured.masks, measured.camera, params=params)
+        seconds = medians({"ldls": segment}, runs=min(options.runs, 9))["ldls"]
+        name = "as many as it takes" if count is None else f"{count:,}"
+        table.add_row(name, f"{seconds * 1e3:.1f}", str(segment().report.sweeps))
     return table
 
 

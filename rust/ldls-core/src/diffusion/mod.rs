@@ -281,6 +281,24 @@ mod tests {
         assert!(largest < 5e-6, "likelihoods differ by {largest}");
     }
 
+    #[test]
+    fn endlessly_many_products_are_taken_in_stages_where_their_series_would_grow() {
+        let points: Vec<[f64; 3]> = (0..2000)
+            .map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0])
+            .collect();
+        let seen: Vec<(u32, u32)> = (0..2000).map(|i| (1 + i / 200 % 9, i % 26)).collect();
+        let (a, b) = system::<f32>(&points, &seen, 1e-3);
+        let (found, convergence) = likelihoods(&a, &b, 10, None, Cancel::never()).unwrap();
+        assert!(convergence.converged() && convergence.sweeps < 700);
+        let (a, b) = system::<f64>(&points, &seen, 1e-3);
+        let expected = plain_products(&a, &b, 10, 4000);
+        let differences = found.iter().zip(&expected);
+        let largest = differences
+            .map(|(found, expected)| (f64::from(*found) - expected).abs())
+            .fold(0.0, f64::max);
+        assert!(largest < 1e-3, "likelihoods differ by {largest}");
+    }
+
     fn clouds() -> impl Strategy<Value = Vec<[f64; 3]>> {
         let scattered = proptest::collection::vec([-5.0..5.0_f64, -5.0..5.0, -1.0..1.0], 1..400);
         let graded =

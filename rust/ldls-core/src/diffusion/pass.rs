@@ -53,19 +53,17 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             (Some(series), _) => pass.run_series(series, cancel)?,
             (None, Some(products)) => {
                 pass.advance(&vec![Step::product(); products.saturating_sub(1)], cancel)?;
-                pass.convergence.sweeps = products;
             }
             (None, None) => {
-                pass.convergence.sweeps = 1;
-                while pass.largest_change() > CONVERGED && pass.convergence.sweeps < MOST_SWEEPS {
+                while pass.largest_change() > CONVERGED && pass.taken + 1 < MOST_SWEEPS {
                     pass.advance(&[Step::product()], cancel)?;
-                    pass.convergence.sweeps += 1;
                 }
             }
         }
-        if iterations.is_none() {
+        if iterations.is_none() && pass.convergence.residual.is_none() {
             pass.measure_residual(cancel)?;
         }
+        pass.convergence.sweeps = pass.taken + usize::from(series.is_none());
         Ok(pass)
     }
 
@@ -73,7 +71,9 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     pub(super) fn steps(series: Option<&Series>, iterations: Option<usize>) -> usize {
         match (series, iterations) {
             // one more for the residual
-            (Some(series), products) => series.sweeps() + usize::from(products.is_none()),
+            (Some(series), products) => series
+                .sweeps()
+                .saturating_add(usize::from(products.is_none())),
             (None, Some(products)) => products.saturating_sub(1),
             (None, None) => usize::MAX,
         }
@@ -112,11 +112,11 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     fn run_series(&mut self, series: &Series, cancel: &Cancel) -> Result<()> {
         self.advance(&series.steps(), cancel)?;
-        self.convergence.sweeps = series.sweeps();
-        // the probe has gone through the recurrence as the last term alone, and each stage leaves out as much again
-        let left_out = series.tail * series.stages as f64;
-        self.errors = self.errors_of(left_out, cancel)?;
-        for _ in 1..series.stages {
+        // the probe has gone through the recurrence as the last term alone
+        self.errors = self.errors_of(series.tail, cancel)?;
+        let mut stages = 1;
+        while self.is_to_go_on(series, stages, cancel)? {
+            stages += 1;
             std::mem::swap(&mut self.z, &mut self.initial);
             if self.z.is_empty() {
                 [self.z, _] = Values::zeros(self.a.len(), self.seeds.plan.groups, cancel)?;
@@ -128,6 +128,15 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         let errors = self.errors.par_iter().with_min_len(ROWS_A_TASK).copied();
         self.convergence.error = errors.reduce(|| 0.0, f32::max).into();
         Ok(())
+    }
+
+    /// Whether a stage of `series` follows the first `stages`.
+    fn is_to_go_on(&mut self, series: &Series, stages: usize, cancel: &Cancel) -> Result<bool> {
+        if let Some(all) = series.stages {
+            return Ok(stages < all);
+        }
+        self.measure_residual(cancel)?;
+        Ok(!self.convergence.converged() && self.taken < MOST_SWEEPS)
     }
 
     /// Applies `steps` one after the other; what was z before the last becomes the previous values.
@@ -152,7 +161,6 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     /// One more product, for the residual; the values are those before it.
     fn measure_residual(&mut self, cancel: &Cancel) -> Result<()> {
         self.advance(&[Step::product()], cancel)?;
-        self.convergence.sweeps += 1;
         self.convergence.residual = Some(self.largest_change());
         std::mem::swap(&mut self.z, &mut self.previous);
         Ok(())
