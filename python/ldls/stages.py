@@ -319,8 +319,8 @@ def diffuse(
 
     With `every`, an iterator of them: those after `every`, 2 `every`, ... products, and after the last. The products
     are then run as they stand, in double precision, and no z is kept but the last; every array is the caller's own. On
-    real frames the last differs from what is returned without `every`, a series in single precision, by at most 2e-5
-    of the largest likelihood of a point, and the largest is of the same label.
+    real frames with the paper's parameters the last differs from what is returned without `every`, a series in single
+    precision, by at most 2e-5 of the largest likelihood of a point, and the largest is of the same label.
 
     Args:
         A: (n, n) of `normalize_rows`.

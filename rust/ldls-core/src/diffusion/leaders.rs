@@ -47,6 +47,7 @@ pub(super) fn leaders(
         schedule: &schedule,
         width: WIDTH_F64,
         probe: series.is_some(),
+        sum: false,
         steps,
     };
     let mut leaders = with_room(points.len())?;

@@ -217,9 +217,14 @@ mod tests {
 
     type System<T> = (PointGraph<T>, PixelLabels<T>);
 
-    /// A and b of `points` of which each sees `pixels` windows of two labels, in both precisions.
-    fn system<T: Real>(points: &[[f64; 3]], seen: &[(u32, u32)], lambda: f64) -> System<T> {
-        let neighbors = Neighbors::search(points, 10, Cancel::never()).unwrap();
+    /// A and b of `points`, each joined to `k` others, of which each sees `pixels` windows of two labels, in both precisions.
+    fn system<T: Real>(
+        points: &[[f64; 3]],
+        k: usize,
+        seen: &[(u32, u32)],
+        lambda: f64,
+    ) -> System<T> {
+        let neighbors = Neighbors::search(points, k, Cancel::never()).unwrap();
         let mut a = PointGraph::from_neighbors(points, &neighbors, 1.0, Cancel::never()).unwrap();
         let mut b = PixelLabels {
             offsets: vec![0],
@@ -250,9 +255,9 @@ mod tests {
         let seen: Vec<(u32, u32)> = (0..points.len() as u32)
             .map(|i| (1 + i / 9000 % 12, i % 26))
             .collect();
-        let (a, b) = system::<f32>(&points, &seen, 0.01);
+        let (a, b) = system::<f32>(&points, 10, &seen, 0.01);
         let (found, _) = likelihoods(&a, &b, 13, Some(60), Cancel::never()).unwrap();
-        let (a, b) = system::<f64>(&points, &seen, 0.01);
+        let (a, b) = system::<f64>(&points, 10, &seen, 0.01);
         let expected = plain_products(&a, &b, 13, 60);
         let largest = found
             .iter()
@@ -268,11 +273,11 @@ mod tests {
             .map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0])
             .collect();
         let seen: Vec<(u32, u32)> = (0..2000).map(|i| (1 + i / 200 % 9, i % 26)).collect();
-        let (a, b) = system::<f32>(&points, &seen, 1e-4);
+        let (a, b) = system::<f32>(&points, 10, &seen, 1e-4);
         // three stages, and two products left
         let (found, convergence) = likelihoods(&a, &b, 10, Some(701), Cancel::never()).unwrap();
         assert!(convergence.sweeps < 250);
-        let (a, b) = system::<f64>(&points, &seen, 1e-4);
+        let (a, b) = system::<f64>(&points, 10, &seen, 1e-4);
         let expected = plain_products(&a, &b, 10, 701);
         let differences = found.iter().zip(&expected);
         let largest = differences
@@ -287,10 +292,10 @@ mod tests {
             .map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0])
             .collect();
         let seen: Vec<(u32, u32)> = (0..2000).map(|i| (1 + i / 200 % 9, i % 26)).collect();
-        let (a, b) = system::<f32>(&points, &seen, 1e-3);
+        let (a, b) = system::<f32>(&points, 10, &seen, 1e-3);
         let (found, convergence) = likelihoods(&a, &b, 10, None, Cancel::never()).unwrap();
         assert!(convergence.converged() && convergence.sweeps < 700);
-        let (a, b) = system::<f64>(&points, &seen, 1e-3);
+        let (a, b) = system::<f64>(&points, 10, &seen, 1e-3);
         let expected = plain_products(&a, &b, 10, 4000);
         let differences = found.iter().zip(&expected);
         let largest = differences
@@ -301,12 +306,15 @@ mod tests {
 
     fn clouds() -> impl Strategy<Value = Vec<[f64; 3]>> {
         let scattered = proptest::collection::vec([-5.0..5.0_f64, -5.0..5.0, -1.0..1.0], 1..400);
-        let graded =
-            proptest::collection::vec((0.0..8.0_f64, 0.0..6.3_f64), 1..400).prop_map(|points| {
+        let graded = (
+            proptest::collection::vec((0.0..1.0_f64, 0.0..6.3_f64), 1..400),
+            4.0..8.0_f64,
+        )
+            .prop_map(|(points, powers)| {
                 // density falls by orders of magnitude with the distance from the origin
                 points
                     .iter()
-                    .map(|&(power, angle)| (10_f64.powf(power - 6.0), angle))
+                    .map(|&(share, angle)| (10_f64.powf(powers * (share - 1.0) + 1.0), angle))
                     .map(|(r, angle)| [r * angle.cos(), r * angle.sin(), 0.0])
                     .collect()
             });
@@ -346,18 +354,19 @@ mod tests {
         fn labels_equal_those_of_plain_products_in_double_precision(
             points in clouds(),
             seen in proptest::collection::vec((1_u32..30, 0_u32..26), 1200),
-            iterations in prop_oneof![Just(1_usize), Just(20), Just(200), Just(1000)],
+            k in prop_oneof![Just(5_usize), Just(10), Just(20)],
+            iterations in prop_oneof![Just(1_usize), Just(20), Just(200), Just(500), Just(1000)],
             lambda in prop_oneof![Just(0.001), Just(0.1), Just(1e-5)],
         ) {
             let seen = &seen[..points.len()];
-            let (a, b) = system::<f32>(&points, seen, lambda);
-            let exact = system::<f64>(&points, seen, lambda);
+            let (a, b) = system::<f32>(&points, k, seen, lambda);
+            let exact = system::<f64>(&points, k, seen, lambda);
             let double = |among: Option<&[u32]>| Ok(match among {
                 Some(points) => (exact.0.among(points), exact.1.among(points)),
                 None => exact.clone(),
             });
             let found = diffuse(&a, &b, 30, Some(iterations), double, Cancel::never()).unwrap();
-            let (a, b) = system::<f64>(&points, seen, lambda);
+            let (a, b) = system::<f64>(&points, k, seen, lambda);
             let expected = plain_products(&a, &b, 30, iterations);
             for (i, (label, z)) in found.labels.iter().zip(expected.chunks(30)).enumerate() {
                 let best = z.iter().fold(0.0, |best: f64, &z| best.max(z));

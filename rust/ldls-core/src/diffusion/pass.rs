@@ -30,7 +30,8 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     initial: Values<T, WIDTH>,
     /// Steps taken.
     taken: usize,
-    /// What a series may leave out at each point, going by the probe; nothing where the pass has none of both.
+    /// What a series may leave out at each point, going by the probe, and what rounding does, where the pass has a lane of the sum;
+    /// nothing where it has none of both.
     pub(super) errors: Vec<f32>,
     pub(super) convergence: Convergence,
 }
@@ -125,6 +126,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         }
         self.initial = Values::none();
         self.advance(&vec![Step::product(); series.products_left], cancel)?;
+        self.add_rounding();
         let errors = self.errors.par_iter().with_min_len(ROWS_A_TASK).copied();
         self.convergence.error = errors.reduce(|| 0.0, f32::max).into();
         Ok(())
@@ -190,12 +192,12 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         self.seeds.plan.labels_at(point, group)
     }
 
-    /// Values of each group at all points, and one for each of its lanes, zero for those of the probe.
+    /// Values of each group at all points, and one for each of its lanes, zero for those of no label.
     pub(super) fn groups(&self) -> impl Iterator<Item = (&[Lanes<T, WIDTH>], [T; WIDTH])> {
         self.z.groups().enumerate().map(|(group, values)| {
             let mut counts = [T::from_f64(1.0); WIDTH];
-            let of_probe = self.seeds.plan.probe_lanes();
-            for lane in of_probe.filter(|lane| lane / WIDTH == group) {
+            let beside = self.seeds.plan.beside_labels();
+            for lane in beside.filter(|lane| lane / WIDTH == group) {
                 counts[lane % WIDTH] = T::default();
             }
             (values, counts)
@@ -203,10 +205,10 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     }
 
     fn largest_change(&self) -> f64 {
-        let probe = self.seeds.plan.probe_lanes();
+        let beside: Vec<usize> = self.seeds.plan.beside_labels().collect();
         let of_group = |group: usize| {
             let change_at = |(z, previous): (&Lanes<T, WIDTH>, &Lanes<T, WIDTH>)| {
-                let lanes = (0..WIDTH).filter(|lane| !probe.contains(&(group * WIDTH + lane)));
+                let lanes = (0..WIDTH).filter(|lane| !beside.contains(&(group * WIDTH + lane)));
                 let changes = lanes.map(|lane| (z[lane] - previous[lane]).to_f64().abs());
                 changes.fold(0.0, f64::max)
             };
@@ -232,6 +234,30 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             (tail * (x * x + y * y).sqrt()) as f32
         };
         tabulate(self.a.len(), error, cancel)
+    }
+
+    /// Adds to the errors by how much the values of all labels at a point sum to another number than went through the recurrence as
+    /// their sum.
+    fn add_rounding(&mut self) {
+        let Some(lane) = self.seeds.plan.sum else {
+            return;
+        };
+        let mut errors = std::mem::take(&mut self.errors);
+        let groups: Vec<_> = self.groups().collect();
+        let sum = self.z.group(lane / WIDTH);
+        let rounding = |point: usize| {
+            let of_group = |(values, counts): &(&[Lanes<T, WIDTH>], [T; WIDTH])| {
+                let lanes = (0..WIDTH).map(|lane| (counts[lane] * values[point][lane]).to_f64());
+                lanes.sum::<f64>()
+            };
+            let of_labels: f64 = groups.iter().map(of_group).sum();
+            (sum[point][lane % WIDTH].to_f64() - of_labels).abs() as f32
+        };
+        let of_points = errors.par_iter_mut().enumerate();
+        let of_points = of_points.with_min_len(ROWS_A_TASK);
+        of_points.for_each(|(point, error)| *error += rounding(point));
+        drop(groups);
+        self.errors = errors;
     }
 
     /// True if at most `most_left_out` is left out, no likelihood is negative or larger than the `largest` share of one label, and
@@ -290,6 +316,7 @@ mod tests {
             schedule: &schedule,
             width: 8,
             probe: false,
+            sum: false,
             steps: 0,
         };
         let plan = planner.plan((&a, &b), &[0, 1], never).unwrap().remove(0);

@@ -36,6 +36,8 @@ pub(super) struct Plan {
     pub(super) lanes: Vec<(u32, usize)>,
     /// First lane of the probe, all of which are in the first group, where the pass has it.
     pub(super) probe: Option<usize>,
+    /// Lane of the sum of all labels of the pass, where it has it: there the values differ from the sum of theirs by rounding alone.
+    pub(super) sum: Option<usize>,
     /// Number of groups of lanes.
     pub(super) groups: usize,
     /// Lanes of a group.
@@ -55,6 +57,8 @@ pub(super) struct Planner<'a> {
     /// Whether the first has the probe: all labels times factors, of which only the last term of the series is summed. It shows
     /// how large the terms left out may be.
     pub(super) probe: bool,
+    /// Whether it has a lane of the sum of its labels, too.
+    pub(super) sum: bool,
     /// Most steps of each.
     pub(super) steps: usize,
 }
@@ -74,8 +78,11 @@ impl Planner<'_> {
         cancel: &Cancel,
     ) -> Result<Vec<Plan>> {
         let background = labels.contains(&0);
-        let probe = self.probe.then_some(usize::from(background));
-        let own = usize::from(background) + probe.map_or(0, |_| PROBE_LANES);
+        let mut own = usize::from(background);
+        let probe = self.probe.then_some(own);
+        own += probe.map_or(0, |_| PROBE_LANES);
+        let sum = self.sum.then_some(own);
+        own += usize::from(self.sum);
         let extents = extents(b, labels);
         let is_seeded = |label: &u32| *label > 0 && extents[*label as usize].seeds > 0;
         let seeded: Vec<u32> = labels.iter().copied().filter(is_seeded).collect();
@@ -108,22 +115,17 @@ impl Planner<'_> {
         };
         let passes = lanes.chunks(most_groups * self.width).enumerate();
         let of_pass = |(at, lanes): (usize, &[Shared])| {
-            let probe = probe.filter(|_| at == 0);
+            let [probe, sum] = [probe, sum].map(|lane| lane.filter(|_| at == 0));
             let blocks = if are_shared { blocks } else { 1 };
-            Plan::of_lanes(lanes, probe, self.width, blocks, cancel)
+            let plan = Plan::of_lanes(lanes, self.width, blocks, cancel)?;
+            Ok(Plan { probe, sum, ..plan })
         };
         passes.map(of_pass).collect()
     }
 }
 
 impl Plan {
-    fn of_lanes(
-        lanes: &[Shared],
-        probe: Option<usize>,
-        width: usize,
-        blocks: usize,
-        cancel: &Cancel,
-    ) -> Result<Self> {
+    fn of_lanes(lanes: &[Shared], width: usize, blocks: usize, cancel: &Cancel) -> Result<Self> {
         let groups = lanes.len().div_ceil(width);
         let stride = groups * width;
         let mut labels = filled(NONE, blocks * stride, cancel)?;
@@ -140,7 +142,8 @@ impl Plan {
         }
         Ok(Self {
             lanes: lane_of,
-            probe,
+            probe: None,
+            sum: None,
             groups,
             width,
             labels,
@@ -151,6 +154,11 @@ impl Plan {
     /// The lanes of the probe.
     pub(super) fn probe_lanes(&self) -> Range<usize> {
         self.probe.map_or(0..0, |first| first..first + PROBE_LANES)
+    }
+
+    /// The lanes that stand for no label: those of the probe, and that of the sum.
+    pub(super) fn beside_labels(&self) -> impl Iterator<Item = usize> {
+        self.probe_lanes().chain(self.sum)
     }
 
     /// Label of each lane of `group` at a row, if it has one there.
@@ -210,6 +218,7 @@ mod tests {
             schedule: &Schedule::new(&a, Cancel::never()).unwrap(),
             width: 4,
             probe,
+            sum: false,
             steps,
         };
         let labels: Vec<u32> = (0..seeds.len() as u32).collect();

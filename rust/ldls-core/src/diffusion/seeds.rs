@@ -52,9 +52,14 @@ impl<T: Real> Seeds<T> {
         for &(label, lane) in &plan.lanes {
             lane_of[label as usize] = Some(lane as u8);
         }
-        let of_row = |row: usize| {
+        let of_labels = |row: usize| {
             let seeds = b.row(row);
             seeds.filter_map(|(label, weight)| Some(((*lane_of.get(label)?)?, weight)))
+        };
+        let of_row = |row: usize| {
+            let sum = || of_labels(row).map(|(_, seed)| seed).sum();
+            let of_sum = plan.sum.map(|lane| (lane as u8, sum()));
+            of_labels(row).chain(of_sum.filter(|(_, sum)| *sum > T::default()))
         };
         let mut common = zeros(b.rows().div_ceil(BLOCK), cancel)?;
         let mut in_common = zeros(b.rows(), cancel)?;
@@ -120,7 +125,7 @@ impl<T: Real> Seeds<T> {
         // what is nearly everywhere counts as everywhere
         let background = self.plan.lanes.contains(&(0, BACKGROUND_LANE));
         let everywhere = background.then_some(BACKGROUND_LANE);
-        let everywhere = everywhere.into_iter().chain(self.plan.probe_lanes());
+        let everywhere = everywhere.into_iter().chain(self.plan.beside_labels());
         let everywhere = everywhere.fold(0, |lanes, lane| lanes | 1 << lane);
         let of_block = |block: usize| {
             let common = everywhere | self.common[block];
@@ -329,7 +334,7 @@ mod tests {
             let a = PointGraph::from_csr((0..=rows.len()).collect(), (0..n).collect(), vec![0.5; rows.len()]);
             let (a, never) = (a.unwrap(), Cancel::never());
             let schedule = Schedule::new(&a, never).unwrap();
-            let planner = Planner { schedule: &schedule, width: 8, probe: false, steps: 1 };
+            let planner = Planner { schedule: &schedule, width: 8, probe: false, sum: false, steps: 1 };
             let labels: Vec<u32> = (0..20).collect();
             let plan = planner.plan((&a, &b), &labels, never).unwrap().remove(0);
             let seeds = Seeds::new(&b, plan, never).unwrap();

@@ -18,7 +18,7 @@ use multiversion::target::match_target;
 use std::ops::Range;
 
 /// Edges of a point with the paper's parameters: 10 neighbours and itself.
-const PAPER_DEGREE: usize = 11;
+pub(super) const PAPER_DEGREE: usize = 11;
 
 /// One step next <- seeds * s + initial * `z_0` + along * A z + stay * z + back * next, where `z_0` are the values that the first
 /// began with.
