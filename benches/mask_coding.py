@@ -19,11 +19,11 @@ from benches.tables import add_ratio, new_table
 HEIGHT, WIDTH, COUNT = 1080, 1920, 100
 
 
-def outlines(count: int = COUNT) -> NDArray[np.bool_]:
-    """(count, 1080, 1920) rounded shapes of 40 to 600 pixels, wavy as a network's masks are."""
+def outlines() -> NDArray[np.bool_]:
+    """(`COUNT`, 1080, 1920) rounded shapes of 40 to 600 pixels, wavy as a network's masks are."""
     generator = np.random.default_rng(0)
     v, u = np.ogrid[:HEIGHT, :WIDTH]
-    masks = np.zeros((count, HEIGHT, WIDTH), np.bool_)
+    masks = np.zeros((COUNT, HEIGHT, WIDTH), np.bool_)
     for mask in masks:
         row, column = generator.uniform(0, HEIGHT), generator.uniform(0, WIDTH)
         tall, wide = generator.uniform(20, 300, 2)

@@ -10,7 +10,7 @@ from typing import TypeVar
 Key = TypeVar("Key", bound=Hashable)
 
 
-def medians(candidates: Mapping[Key, Callable[[], object]], *, runs: int = 20) -> dict[Key, float]:
+def medians(candidates: Mapping[Key, Callable[[], object]], *, runs: int) -> dict[Key, float]:
     """Median seconds of each candidate over `runs` rounds, after one round to warm up."""
     seconds: dict[Key, list[float]] = {name: [] for name in candidates}
     for round_number in range(runs + 1):

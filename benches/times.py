@@ -1,4 +1,4 @@
-"""How the time of a frame spreads over frames, and grows with points, instances, products, masks that overlap and threads."""
+"""How times spread over frames, and grow with points, instances, products, masks that overlap and threads."""
 
 from __future__ import annotations
 

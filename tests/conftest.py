@@ -119,6 +119,12 @@ def small_scene():
     return points, masks, pinhole()
 
 
+@pytest.fixture
+def result(small_scene):
+    """The segmentation of the small scene."""
+    return ldls.segment(*small_scene)
+
+
 def pinhole(focal_px=100.0, center=(40.0, 30.0), **options):
     u, v = center
     matrix = [[focal_px, 0, u, 0], [0, focal_px, v, 0], [0, 0, 1, 0]]

@@ -28,14 +28,14 @@ def random_ring(seed):
     return points, views
 
 
-def street_ring(overlap_px=160):
+def street_ring():
     """Points of the simulated street, and its image as those of two cameras that look apart."""
     frame = sample_frame()
     (image,) = frame.images
     pixels, camera = image.masks.to_array(), image.camera
     width = pixels.shape[2]
     views = []
-    for columns in (slice(0, (width + overlap_px) // 2), slice((width - overlap_px) // 2, width)):
+    for columns in (slice(0, width // 2 + 80), slice(width // 2 - 80, width)):
         projection = camera.projection.copy()
         projection[0] -= columns.start * projection[2]
         masks = ldls.InstanceMasks.from_array(pixels[:, :, columns], categories=image.masks.categories)

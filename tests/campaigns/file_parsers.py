@@ -28,7 +28,7 @@ from rosbags.highlevel import anyreader
 from rosbags.typesys.store import Typestore
 
 import ldls
-from campaigns.mutations import changed_bytes, mutated
+from campaigns.mutations import changed_bytes, mutated, npy
 from conftest import pinhole
 from datasets import layouts, ros_samples
 from ldls.batch.journal import JOURNAL_NAME, Journal
@@ -182,12 +182,6 @@ def cloud(columns=4, kind=np.float32, n=N_POINTS):
 
 def rows_of_text(rows, delimiter=" "):
     return "".join(delimiter.join(f"{value:.3f}" for value in row) + "\n" for row in rows.tolist())
-
-
-def npy(array):
-    file = io.BytesIO()
-    np.save(file, array)
-    return file.getvalue()
 
 
 def pcd_header(data, n=N_POINTS, fields="x y z intensity", size="4 4 4 4", kind="F F F F", count="1 1 1 1"):

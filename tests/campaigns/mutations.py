@@ -7,7 +7,7 @@ import struct
 import numpy as np
 
 
-def _npy(array):
+def npy(array):
     file = io.BytesIO()
     np.save(file, array)
     return file.getvalue()
@@ -29,7 +29,7 @@ WORDS = (
 LARGEST_BYTES = 1 << 24
 """Lines doubled again and again end here."""
 ARRAYS = tuple(
-    _npy(np.array(values))
+    npy(np.array(values))
     for values in (
         [], 5, True, 2**63, -(2**40), "", "text", "null", "1" * 5000, "[" * 100_000, '{"a": 1e999}', b"x", 1 + 2j,
         [np.nan, -np.inf], ["a", "b"], np.zeros((0, 3), np.float32), np.zeros((2, 2)), np.zeros((1, 1, 1, 1, 1)),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ldls.io.ros.bags import open_bag
 from ldls.io.ros.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -107,6 +108,20 @@ class Recording:
             roi=region,
             **{n if n in known else n.lower(): np.array(m, np.float64) for n, m in matrices.items()},
         )
+
+
+def storage(path: Path) -> Path:
+    """The one storage file of a bag."""
+    return path if path.is_file() else next(p for p in path.iterdir() if p.suffix != ".yaml")
+
+
+def messages(path: Path, *, recover: bool = False) -> list:
+    """Topic, time and bytes of each message of a bag."""
+    bag = open_bag(path, recover=recover)
+    try:
+        return [(message.topic, message.received_ns, message.raw) for message in bag.messages(bag.topics)]
+    finally:
+        bag.close()
 
 
 def picture(number: int = 0, size=(60, 80)) -> np.ndarray:

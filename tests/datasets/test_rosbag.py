@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from datasets.ros_samples import START_NS, STEP_NS, Recording, picture
+from datasets.ros_samples import START_NS, STEP_NS, Recording, picture, storage
 from ldls.datasets import RosBag, open_source
 from ldls.errors import (
     CalibrationError,
@@ -198,11 +198,6 @@ def test_an_image_of_another_size_than_its_calibration_is_refused(tmp_path):
     image = RosBag(written(tmp_path, size=(480, 640)))[0].images[0]
     with pytest.raises(CalibrationError, match=r"image is \(60, 80\), its CameraInfo says \(480, 640\)"):
         image.read()
-
-
-def storage(path):
-    """The one storage file of a bag."""
-    return path if path.is_file() else next(p for p in path.iterdir() if p.suffix != ".yaml")
 
 
 @pytest.mark.parametrize("kind", KINDS)

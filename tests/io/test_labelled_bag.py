@@ -24,11 +24,6 @@ def order(message):
     return message.received_ns, message.topic
 
 
-@pytest.fixture
-def result(small_scene):
-    return ldls.segment(*small_scene)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_labels_come_back(tmp_path, result, kind):
     path = tmp_path / ("out.bag" if kind == "rosbag1" else "out")
@@ -83,7 +78,7 @@ def test_some_topics_and_what_is_whole_of_a_broken_bag(tmp_path, result):
     assert set(open_bag(tmp_path / "out.bag").topics) == {"/tf_static", "/points_labelled"}
 
 
-def test_what_does_not_go_is_refused(tmp_path, result):
+def test_what_does_not_go_is_refused(tmp_path):
     source = Recording(points_topic="/points_labelled").write(tmp_path / "in.bag")
     with pytest.raises(ParameterError, match="rosbag1, rosbag2, mcap"):
         LabelledBag(tmp_path / "out", "rosbag3")

@@ -12,11 +12,6 @@ from ldls.errors import InputError, UnsupportedFormatError
 from ring_samples import as_views, random_ring
 
 
-@pytest.fixture
-def result(small_scene):
-    return ldls.segment(*small_scene)
-
-
 def read_rows(path):
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))

@@ -10,6 +10,7 @@ FAR = 1e6
 CLOSE = 0.08
 """Colours count as the same up to this sum of differences, channels from 0 to 1."""
 N_PROTOTYPES = 32
+N_CLASSES = 80
 
 
 class Graph:
@@ -125,7 +126,7 @@ def _draw(g, masks, boxes, n, cells, output):
         )
 
 
-def yolo(colours, classes, scores, size, *, layout="yolov8", n_classes=80, notes=None):
+def yolo(colours, classes, scores, size, *, layout="yolov8", notes=None):
     """YOLO that segments: boxes with coefficients (each twice, for suppression to take one away), and prototypes."""
     g = Graph()
     masks, boxes, presence = find_colours(g, "images", colours, size)
@@ -148,13 +149,13 @@ def yolo(colours, classes, scores, size, *, layout="yolov8", n_classes=80, notes
             g("Sub", right, left),
             g("Sub", bottom, top),
         ]
-        one_hot = np.eye(n_classes, dtype=np.float32)[np.asarray(classes)]
+        one_hot = np.eye(N_CLASSES, dtype=np.float32)[np.asarray(classes)]
         if layout == "yolov5":
             rows = g("Concat", *centred, column, one_hot, coefficients, axis=1)
         else:
             rows = g("Concat", *centred, g("Mul", one_hot, column), coefficients, axis=1)
         # the double: a little smaller in score
-        width = (4 + (layout == "yolov5")) + n_classes + N_PROTOTYPES
+        width = (4 + (layout == "yolov5")) + N_CLASSES + N_PROTOTYPES
         damped = np.ones((1, width), np.float32)
         damped[0, 4 : width - N_PROTOTYPES] = 0.95
         rows = g("Concat", rows, g("Mul", rows, damped), axis=0)
@@ -162,7 +163,7 @@ def yolo(colours, classes, scores, size, *, layout="yolov8", n_classes=80, notes
         rows = g("Concat", rows, np.zeros((width, width), np.float32), axis=0)
     rows = g("Transpose", rows, perm=[1, 0]) if layout == "yolov8" else rows
     g("Unsqueeze", rows, np.array([0]), output="output0")
-    numbers = {"end-to-end": 6, "yolov5": 5 + n_classes, "yolov8": 4 + n_classes}[layout] + N_PROTOTYPES
+    numbers = {"end-to-end": 6, "yolov5": 5 + N_CLASSES, "yolov8": 4 + N_CLASSES}[layout] + N_PROTOTYPES
     n = k if layout == "end-to-end" else 2 * k + numbers
     sides = (1, numbers, n) if layout == "yolov8" else (1, n, numbers)
     return g.model(
@@ -175,19 +176,16 @@ def yolo(colours, classes, scores, size, *, layout="yolov8", n_classes=80, notes
     )
 
 
-def constant_detections(boxes, labels, scores, masks, *, batch=None):
+def constant_detections(boxes, labels, scores, masks):
     """A model that finds the same in every image: outputs as torchvision's, whatever is in the arrays."""
     g = Graph()
     names = ("boxes", "labels", "scores", "masks")
     for name, array in zip(names, (boxes, labels, scores, masks), strict=True):
         g("Identity", array, output=name)
-    sides = (3, "height", "width") if batch is None else (batch, 3, "height", "width")
-    return g.model(
-        [("image", TensorProto.FLOAT, sides)], detection_values(("boxes", "labels", "scores", "masks"), None)
-    )
+    return g.model([("image", TensorProto.FLOAT, (3, "height", "width"))], detection_values(names, None))
 
 
-def constant_yolo(rows, prototypes, *, size=(64, 64), notes=None, sides=None):
+def constant_yolo(rows, prototypes, *, notes=None, sides=None):
     """A model of YOLO's outputs that finds the same in every image."""
     g = Graph()
     g("Identity", rows, output="output0")
@@ -196,4 +194,4 @@ def constant_yolo(rows, prototypes, *, size=(64, 64), notes=None, sides=None):
         ("output0", TensorProto.FLOAT, sides or rows.shape),
         ("output1", TensorProto.FLOAT, (1, "mask_count", "mask_height", "mask_width") if sides else prototypes.shape),
     ]
-    return g.model([("images", TensorProto.FLOAT, (1, 3, *size))], outputs, notes=notes)
+    return g.model([("images", TensorProto.FLOAT, (1, 3, 64, 64))], outputs, notes=notes)

@@ -108,7 +108,7 @@ def test_boxes_hold_the_points_of_their_objects(frame, training):
     assert checked >= 5
 
 
-def test_image_boxes_lie_in_the_image_and_around_the_pixels(frame, training):
+def test_image_boxes_lie_in_the_image_and_around_the_pixels(training):
     rows = np.array([line.split()[1:] for line in (training / "label_2/000021.txt").read_text().splitlines()], float)
     left, top, right, bottom = rows[:, 3:7].T
     assert ((left >= 0) & (left <= right) & (right <= 1241) & (top >= 0) & (top <= bottom) & (bottom <= 374)).all()

@@ -18,12 +18,11 @@ from ldls.io.labels.annotations import read_annotations
 from ldls.simulation import SegmenterErrors, robot_drive, write_robot_drive
 from ldls.simulation.drives import ROBOT
 from ldls.simulation.rigs import CameraModel, distorted, undistorted
-from ldls.simulation.scene_object import KITTI_NAMES
+from ldls.simulation.scene_object import KITTI_TYPES
 from ldls.stages import project
 
 KINDS = {"rosbag1": "drive.bag", "rosbag2": "drive", "mcap": "drive"}
 FRAMES, SEED = 4, 0
-RATIONAL = ldls.Distortion("rational_polynomial", (0.1, -0.05, 1e-3, 2e-3, 0.01, 0.2, 0.1, 0.02))
 MODEL = ROBOT.cameras[0].model
 
 
@@ -137,7 +136,7 @@ def test_the_first_frame_of_a_drive_has_the_true_classes():
     assert len(things) > 10
     for thing in things:
         names, counts = np.unique(true[result.labels == thing.label], return_counts=True)
-        assert names[counts.argmax()] == KITTI_NAMES.get(thing.category, thing.name)
+        assert names[counts.argmax()] == KITTI_TYPES.get(thing.category, thing.name)
 
 
 def test_only_the_names_of_a_drive_s_masks_are_without_errors():

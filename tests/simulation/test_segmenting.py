@@ -105,7 +105,7 @@ def test_scores_fall_with_their_noise(truth):
     assert found(truth, score_noise=0.2).scores.mean() < found(truth, score_noise=0.02).scores.mean() < 1
 
 
-def test_masks_of_an_image_of_nothing(truth):
+def test_masks_of_an_image_of_nothing():
     empty = PixelTruth(np.zeros((20, 30), np.int32), np.zeros((20, 30), np.int32), np.zeros(0))
     assert len(true_masks(empty)) == len(segmented(empty, errors=NONE)) == 0
 

@@ -35,10 +35,10 @@ def frame():
     return drive_frame(TURNS, NUMBER)
 
 
-def moved_back(frame, drive):
+def moved_back(frame):
     """Points of a frame in coordinates of the lidar at its stamp."""
     since = 0.1 * NUMBER
-    poses = inverse(poses_after(drive, np.array([since]))[0]) @ poses_after(drive, since + frame.times)
+    poses = inverse(poses_after(TURNS, np.array([since]))[0]) @ poses_after(TURNS, since + frame.times)
     return np.einsum("nij,nj->ni", poses[:, :3, :3], frame.points[:, :3]) + poses[:, :3, 3]
 
 
@@ -68,7 +68,7 @@ def beyond_box_m(points, thing, way_m):
 
 
 def test_points_of_objects_lie_where_these_are_at_their_time(frame):
-    points = moved_back(frame, TURNS)
+    points = moved_back(frame)
     wrong, n_still, n_moving = [], 0, 0
     for number, thing in enumerate(frame.objects, start=1):
         own = frame.truth.instances == number
@@ -92,7 +92,7 @@ def test_images_see_what_stands_still_where_the_calibration_says(frame):
     chosen = np.isin(frame.truth.instances, still)
     shares = []
     for points in (
-        moved_back(frame, TURNS),
+        moved_back(frame),
         frame.points[:, :3],
     ):
         size = image.pixels.instances.shape

@@ -15,11 +15,6 @@ from ldls.viewing.comparison import captions
 from ldls.viewing.depth import depth_picture
 
 
-@pytest.fixture
-def result(small_scene):
-    return ldls.segment(*small_scene)
-
-
 def test_captions_count_what_changed(result) -> None:
     before, after = result.direct_labels, result.labels
     lost = moved = won = 0

@@ -12,11 +12,6 @@ import ldls
 from ldls.palette import instance_colours
 
 
-@pytest.fixture
-def result(small_scene):
-    return ldls.segment(*small_scene)
-
-
 def test_a_result_shows_two_pictures_and_its_objects(result) -> None:
     html = result._repr_html_()
     pictures = [Image.open(io.BytesIO(base64.b64decode(png))) for png in re.findall(r'base64,([^"]+)"', html)]

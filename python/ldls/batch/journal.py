@@ -94,10 +94,6 @@ class Journal:
         """The frames that have a record."""
         return tuple(self._places)
 
-    def get(self, frame: str) -> Record | None:
-        """Return the record of a frame; None if it has none."""
-        return self.kept([frame]).get(frame)
-
     def kept(self, frames: Iterable[str]) -> KeptRecords:
         """The records of those of `frames` that have one, for other processes; good until the journal is finished."""
         return KeptRecords(self._path, {frame: self._places[frame] for frame in frames if frame in self._places})

@@ -21,8 +21,8 @@ from typing import Any, TypeVar
 from ldls.batch.frame_work import FrameWork
 from ldls.batch.window import Frames, Outcome, Window
 
-READERS = 2
-WRITERS = 2
+N_READERS = 2
+N_WRITERS = 2
 SWITCH_INTERVAL_S = 0.0005
 """Seconds for which a thread keeps Python's lock when others want it: the default, 5 ms, is a third of a frame."""
 Item = TypeVar("Item")
@@ -40,7 +40,7 @@ def run_local(work: FrameWork, windows: Sequence[Frames], workers: int) -> Gener
     with _eager_switching():
         try:
             pipeline.start(
-                [(work.read, READERS), (work.segment, workers), (work.write, WRITERS)],
+                [(work.read, N_READERS), (work.segment, workers), (work.write, N_WRITERS)],
                 map(Window.of, windows),
             )
             for _ in windows:
@@ -57,7 +57,7 @@ class _Pipeline:
         self._outcomes: SimpleQueue[Outcome | BaseException] = SimpleQueue()
         # for windows between reading and the end: enough that nobody waits, few enough to bound the memory
         self._places: SimpleQueue[None] = SimpleQueue()
-        for _ in range(2 * workers + READERS + WRITERS):
+        for _ in range(2 * workers + N_READERS + N_WRITERS):
             self._places.put(None)
         self._threads: list[tuple[threading.Thread, SimpleQueue[Any]]] = []
 

@@ -231,8 +231,9 @@ def _stored(journal: Journal, names: Sequence[str], folder: Path) -> Iterator[Re
 def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> list[Frames]:
     """The windows that an earlier run left to do; warns of frames whose files were changed since."""
     frames = [(name, [name for _, name in window]) for window in windows for _, name in window]
+    records = journal.kept(name for name, _ in frames)
     with ThreadPoolExecutor(_ldls.default_threads()) as threads:
-        left = list(threads.map(lambda frame: work.earlier(journal.get(frame[0]), frame[1]), frames))
+        left = list(threads.map(lambda frame: work.earlier(records.get(frame[0]), frame[1]), frames))
     changed = [name for (name, _), earlier in zip(frames, left, strict=True) if earlier is Earlier.CHANGED]
     if changed:
         message = (

@@ -24,10 +24,10 @@ ROUNDS = 8
 LARGEST_M, LARGEST_DEG = 0.2, 2.0
 """No error of a pose from one sweep to the next is as large; such ground is another."""
 
-Points = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 
-def split_standing(xyz: Points) -> tuple[Points, Points]:
+def split_standing(xyz: Floats) -> tuple[Floats, Floats]:
     """Points that stand, and those near by that lie low: the lowest `STANDING_M` of each upright column.
 
     Args:
@@ -41,7 +41,7 @@ def split_standing(xyz: Points) -> tuple[Points, Points]:
 
 
 def levelled(
-    pose: NDArray[np.float64], low: Points, pose_before: NDArray[np.float64], low_before: Points
+    pose: NDArray[np.float64], low: Floats, pose_before: NDArray[np.float64], low_before: Floats
 ) -> NDArray[np.float64]:
     """`pose`, raised, rolled and pitched so that what lies low in its sweep lies as high as in the sweep before.
 
@@ -64,14 +64,14 @@ def levelled(
     return moved if small else pose
 
 
-def _cell_means(low: Points, pose: NDArray[np.float64]) -> tuple[NDArray[np.int64], Points]:
+def _cell_means(low: Floats, pose: NDArray[np.float64]) -> tuple[NDArray[np.int64], Floats]:
     """The cells of the world in which points lie, ascending, and the mean of those in each."""
     world = transformed(low, pose)
     keys, cells, counts = np.unique(cell_keys(world[:, :2], CELL_M), return_inverse=True, return_counts=True)
     return keys, np.stack([np.bincount(cells, axis) / counts for axis in world.T], axis=1)
 
 
-def _plane(xy: Points, z: NDArray[np.float64]) -> tuple[float, float, float]:
+def _plane(xy: Floats, z: NDArray[np.float64]) -> tuple[float, float, float]:
     """Height at the origin, and slopes along x and y, of the plane that most points lie on."""
     columns = np.column_stack([np.ones(len(xy)), xy])
     weights = np.ones(len(xy))

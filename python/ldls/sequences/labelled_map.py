@@ -38,8 +38,8 @@ MOST_ROWS = 20_000_000
 ROWS_AT_ONCE = 1_000_000
 """Rows of new sweeps are kept until there are as many, or a quarter of those of the map, and then added together."""
 
-Numbers = NDArray[np.int64]
-Reals = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 
 class _Rows(NamedTuple):
@@ -53,11 +53,11 @@ class _Rows(NamedTuple):
         confidence: (n,) sum over the points.
     """
 
-    voxels: Numbers
-    objects: Numbers
-    counts: Numbers
-    sums: Reals
-    confidence: Reals
+    voxels: Ints
+    objects: Ints
+    counts: Ints
+    sums: Floats
+    confidence: Floats
 
     def selected(self, keep: NDArray[np.bool_]) -> _Rows:
         """The rows that are to be kept."""
@@ -68,7 +68,7 @@ class _Rows(NamedTuple):
 class _Voxels(NamedTuple):
     """What the map says of each voxel."""
 
-    points: Reals
+    points: Floats
     categories: NDArray[np.int32]
     tracks: NDArray[np.int32]
     confidence: NDArray[np.float32]
@@ -78,9 +78,9 @@ class _Voxels(NamedTuple):
 class _Room:
     """The room of an object along x and y: lowest and highest place over the drive, and its longest sweep."""
 
-    low: Reals
-    high: Reals
-    longest: Reals
+    low: Floats
+    high: Floats
+    longest: Floats
 
     @property
     def moved(self) -> bool:
@@ -121,7 +121,7 @@ class LabelledMap:
         if not 0 < voxel_m <= LARGEST_VOXEL_M:
             raise ParameterError(f"voxel_m: got {voxel_m}, expected metres above 0, at most {LARGEST_VOXEL_M:g}")
         self.voxel_m = float(voxel_m)
-        self._origin: Reals | None = None
+        self._origin: Floats | None = None
         self._rows = _no_rows()
         self._new: list[_Rows] = []
         self._numbers: dict[tuple[int, int], int] = {(0, 0): 0}
@@ -179,12 +179,12 @@ class LabelledMap:
         """(n,) float32 in [0, 1]: confidence of the points with the label of a voxel, summed, over all its points."""
         return self._known().confidence
 
-    def _objects(self, result: Segmentation) -> Numbers:
+    def _objects(self, result: Segmentation) -> Ints:
         """The number in this map of each label of a result."""
         known = [(instance.category, instance.track) for instance in result.instances]
         return np.array([0, *(self._numbers.setdefault(each, len(self._numbers)) for each in known)], np.int64)
 
-    def _widen(self, objects: Numbers, xy: Reals) -> None:
+    def _widen(self, objects: Ints, xy: Floats) -> None:
         for number in np.unique(objects[objects > 0]).tolist():
             low, high = np.percentile(xy[objects == number], [OUTER, 100 - OUTER], axis=0)
             room = self._rooms.setdefault(number, _Room(low, high, high - low))
@@ -217,7 +217,7 @@ class LabelledMap:
         return self._voxels
 
 
-def _voted(rows: _Rows, names: NDArray[np.int32], origin: Reals) -> _Voxels:
+def _voted(rows: _Rows, names: NDArray[np.int32], origin: Floats) -> _Voxels:
     """The voxels of rows; `names` has category and track of each object."""
     if not len(rows.voxels):
         return _Voxels(np.zeros((0, 3)), np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.float32))
@@ -263,16 +263,16 @@ def _no_rows() -> _Rows:
     return _Rows(none, none, none, np.zeros((0, 3)), np.zeros(0))
 
 
-def _origin(pose: Reals, voxel_m: float) -> Reals:
+def _origin(pose: Floats, voxel_m: float) -> Floats:
     """Where the grid begins: the corner of a voxel by the first sweep, so that its world may be large."""
-    place: Reals = pose[:3, 3]
+    place: Floats = pose[:3, 3]
     coarsest = float(np.spacing(np.abs(place)).max())
     if not coarsest < voxel_m / 100:
         raise LimitError(
             f"pose: coordinates up to {np.abs(place).max():.6g} m are {coarsest:.6g} m apart at best, too coarse for "
             f"voxels of {voxel_m:g} m; put the origin of the world near the drive"
         )
-    corner: Reals = np.floor(place / voxel_m) * voxel_m
+    corner: Floats = np.floor(place / voxel_m) * voxel_m
     return corner
 
 

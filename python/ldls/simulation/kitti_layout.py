@@ -30,7 +30,7 @@ from ldls.io.images import png_of
 from ldls.io.labels import write_annotations
 from ldls.io.labels.kitti_objects import in_camera_frame
 from ldls.masks import InstanceMasks
-from ldls.simulation.scene_object import KITTI_NAMES, SceneObject
+from ldls.simulation.scene_object import KITTI_TYPES, SceneObject
 from ldls.simulation.simulated_frame import SimulatedFrame, SimulatedImage
 
 NEAREST_M = 0.5
@@ -166,7 +166,7 @@ def _row(thing: SceneObject, camera: Camera, visible: float) -> str:
     occluded = 0 if visible >= 0.7 else 1 if visible >= 0.35 else 2
     size = (thing.height_m, thing.width_m, thing.length_m)
     numbers = " ".join(f"{n:.2f}" for n in (alpha, *box, *size, x, y, z, turn))
-    return f"{KITTI_NAMES.get(thing.category, 'Misc')} {truncated:.2f} {occluded} {numbers}"
+    return f"{KITTI_TYPES.get(thing.category, 'Misc')} {truncated:.2f} {occluded} {numbers}"
 
 
 def _image_box(thing: SceneObject, camera: Camera) -> tuple[tuple[float, float, float, float], float]:

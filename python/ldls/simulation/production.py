@@ -143,7 +143,7 @@ def make_frames(
     if processes == 1 or len(missing) < 2:
         yield from (_make_frame(fspath(folder), order) for order in missing)
         return
-    with _environment(ONE_THREAD), ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with _one_thread(), ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         futures = [pool.submit(_make_frame, fspath(folder), order) for order in missing]
         try:
             for future in as_completed(futures):
@@ -242,9 +242,9 @@ def _make_frame(folder: str, order: Order) -> FrameSummary:
 
 
 @contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    """The environment with `values` that are not set already, for processes started within."""
-    added = {key: value for key, value in values.items() if key not in os.environ}
+def _one_thread() -> Iterator[None]:
+    """The environment with `ONE_THREAD`, as far as it is not set already, for processes started within."""
+    added = {key: value for key, value in ONE_THREAD.items() if key not in os.environ}
     os.environ.update(added)
     try:
         yield

@@ -16,11 +16,11 @@ BENCH, DOG, CHAIR, POTTED_PLANT = 15, 18, 62, 64
 """COCO's ids of the categories that scenes hold."""
 CYCLIST = KITTI_CATEGORIES["Cyclist"]
 """A person on a bicycle: one object in truth, in which a segmenter of COCO finds a person and a bicycle."""
-KITTI_NAMES = {PERSON: "Pedestrian", CAR: "Car", TRUCK: "Truck", CYCLIST: "Cyclist"}
+KITTI_TYPES = {PERSON: "Pedestrian", CAR: "Car", TRUCK: "Truck", CYCLIST: "Cyclist"}
 CLASS_NAMES = {
     category: COCO_NAMES[category]
     for category in (PERSON, BICYCLE, CAR, MOTORCYCLE, BUS, TRUCK, BENCH, DOG, CHAIR, POTTED_PLANT)
-} | KITTI_NAMES
+} | KITTI_TYPES
 """Class of each category in the truth: KITTI's name where it has one, else COCO's."""
 
 

@@ -9,6 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 pub struct Cancel(AtomicBool);
 
 impl Cancel {
+    /// Points or rows that one thread works on between two looks at the flag.
+    pub const ITEMS_A_LOOK: usize = 1 << 16;
+
     /// The flag of work that nobody stops.
     pub fn never() -> &'static Self {
         static NEVER: Cancel = Cancel(AtomicBool::new(false));

@@ -18,8 +18,6 @@ use std::time::Duration;
 
 /// Label of points that no image sees.
 const OUT_OF_VIEW: i32 = -1;
-/// Points between two looks at the flag where one thread does the work.
-const POINTS_A_BLOCK: usize = 1 << 16;
 /// Points up to which depth is seen and neighbours are searched at the same time; of more the memory of both counts.
 const MOST_SIDE_BY_SIDE: usize = 1 << 20;
 /// Most edges of a graph: what 32 bits index.
@@ -169,7 +167,7 @@ fn in_graph(heights: &[f64], params: &Params, cancel: &Cancel) -> Result<Option<
     }
     let mut in_graph = Vec::new();
     for (point, &height) in heights.iter().enumerate() {
-        if point % POINTS_A_BLOCK == 0 {
+        if point % Cancel::ITEMS_A_LOOK == 0 {
             cancel.check()?;
         }
         if !cleared(height) {
@@ -265,7 +263,7 @@ fn put<T>(
     cancel: &Cancel,
 ) -> Result<()> {
     let mut values = values.into_iter();
-    for rows in rows.chunks(POINTS_A_BLOCK) {
+    for rows in rows.chunks(Cancel::ITEMS_A_LOOK) {
         cancel.check()?;
         for (&row, value) in rows.iter().zip(&mut values) {
             all[row as usize] = value;

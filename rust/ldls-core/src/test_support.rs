@@ -6,11 +6,11 @@ use crate::{
     View,
 };
 
-const IDENTITY: [f64; 16] = [
+pub(crate) const IDENTITY: [f64; 16] = [
     1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
 ];
 
-const PROJECTION: [f64; 12] = [20., 0., 20., 0., 0., 20., 15., 0., 0., 0., 1., 0.];
+pub(crate) const PROJECTION: [f64; 12] = [20., 0., 20., 0., 0., 20., 15., 0., 0., 0., 1., 0.];
 
 /// A camera whose image begins `left` pixels to the left of the axis, 40 x 30 pixels.
 pub(crate) fn camera(left: f64) -> Camera {

@@ -8,9 +8,6 @@ use ldls_laz::Points;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-/// Points between two looks at the flag.
-const BLOCK: usize = 1 << 16;
-
 /// Steps along x y z, row by row, and intensities.
 type Columns = (Vec<i32>, Vec<u16>);
 /// The same for Python.
@@ -46,7 +43,7 @@ fn unpacked(
     let (mut steps, mut intensities) = (Vec::new(), Vec::new());
     while intensities.len() < n_points {
         cancel.check()?;
-        let count = BLOCK.min(n_points - intensities.len());
+        let count = Cancel::ITEMS_A_LOOK.min(n_points - intensities.len());
         let bytes = (steps.len() + 3 * count) * size_of::<i32>();
         let room = steps.try_reserve(3 * count);
         room.and_then(|()| intensities.try_reserve(count))

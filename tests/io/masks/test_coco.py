@@ -20,7 +20,7 @@ def document(**parts):
     } | parts
 
 
-def test_the_coco_tools_read_what_is_written(tmp_path, capsys):
+def test_the_coco_tools_read_what_is_written(tmp_path):
     masks = random_masks(1)
     ldls.save(masks, tmp_path / "masks.json", image_id=7, file_name="000007.png")
     coco = COCO(tmp_path / "masks.json")
@@ -35,7 +35,7 @@ def test_the_coco_tools_read_what_is_written(tmp_path, capsys):
     assert [annotation["id"] for annotation in coco.dataset["annotations"]] == list(range(1, len(masks) + 1))
 
 
-def test_the_coco_tools_read_bare_results(tmp_path, capsys):
+def test_the_coco_tools_read_bare_results(tmp_path):
     masks = random_masks(2)
     ldls.save(masks, tmp_path / "masks.json")
     ldls.save(masks, tmp_path / "results.json", results=True)

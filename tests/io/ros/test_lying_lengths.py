@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from datasets.ros_samples import Recording
+from datasets.ros_samples import Recording, messages, storage
 from ldls.errors import CorruptFileError, FileFormatError, RecoveredFileWarning, TruncatedFileError
 from ldls.io.ros.bags import open_bag
 
@@ -22,20 +22,10 @@ SUFFIXES = {"rosbag1": ".bag", "rosbag2": ".db3", "mcap": ".mcap"}
 def bag(tmp_path, request):
     """A small bag of a kind: the path of its one file, its bytes, and its messages."""
     kind = request.param
-    whole = Recording(kind=kind, sweeps=1, size=(6, 8)).write(tmp_path / "whole")
-    if kind != "rosbag1":
-        whole = next(path for path in whole.iterdir() if path.suffix == SUFFIXES[kind])
+    whole = storage(Recording(kind=kind, sweeps=1, size=(6, 8)).write(tmp_path / "whole"))
     path = tmp_path / f"a{SUFFIXES[kind]}"
     path.write_bytes(whole.read_bytes())
     return path, path.read_bytes(), messages(path)
-
-
-def messages(path, *, recover=False):
-    opened = open_bag(path, recover=recover)
-    try:
-        return [(message.topic, message.received_ns, message.raw) for message in opened.messages(opened.topics)]
-    finally:
-        opened.close()
 
 
 def mcap_lengths(content, start=8, end=None):

@@ -8,23 +8,9 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from datasets.ros_samples import Recording
+from datasets.ros_samples import Recording, messages, storage
 from ldls.errors import FileFormatError, RecoveredFileWarning
 from ldls.io.ros.bags import open_bag
-
-
-def storage(path):
-    """The one storage file of a bag."""
-    return path if path.is_file() else next(p for p in path.iterdir() if p.suffix != ".yaml")
-
-
-def contents(path, *, recover=False):
-    """Topic, time and bytes of each message, as a list."""
-    bag = open_bag(path, recover=recover)
-    try:
-        return [(message.topic, message.received_ns, message.raw) for message in bag.messages(bag.topics)]
-    finally:
-        bag.close()
 
 
 def cuts(size):
@@ -38,7 +24,7 @@ def cuts(size):
 @pytest.mark.parametrize("kind", ["rosbag1", "rosbag2", "mcap"])
 def test_a_bag_cut_anywhere_keeps_its_whole_messages(tmp_path, kind):
     whole = Recording(kind=kind, sweeps=2).write(tmp_path / ("whole.bag" if kind == "rosbag1" else "whole"))
-    recorded, content = contents(whole), storage(whole).read_bytes()
+    recorded, content = messages(whole), storage(whole).read_bytes()
     ends = [content.find(raw) + len(raw) for _, _, raw in recorded]
     path = tmp_path / f"cut{storage(whole).suffix}"
     counted = []
@@ -47,7 +33,7 @@ def test_a_bag_cut_anywhere_keeps_its_whole_messages(tmp_path, kind):
         with pytest.raises(FileFormatError, match="cut"):
             open_bag(path)
         with pytest.warns(RecoveredFileWarning, match=f"{path.name}: .*whole messages before it"):
-            recovered = contents(path, recover=True)
+            recovered = messages(path, recover=True)
         assert not Counter(recovered) - Counter(recorded)
         if kind != "rosbag2":
             # a database keeps long messages in pages all over the file
@@ -65,4 +51,4 @@ def test_blank_pages_at_the_end_are_a_fault_of_the_file(tmp_path, kind):
         path.write_bytes(content[:cut] + bytes(8192))
         with warnings.catch_warnings(), suppress(FileFormatError):
             warnings.simplefilter("ignore", RecoveredFileWarning)
-            contents(path, recover=True)
+            messages(path, recover=True)

@@ -23,6 +23,7 @@ from ldls.errors import CorruptFileError, LimitError, MaskError, ParameterError,
 from ldls.io.files import InputFile, open_file, parsing, whole_file
 from ldls.io.images import MAX_BYTES, check_pixels
 from ldls.masks import InstanceMasks, instance_image
+from ldls.masks.instance_image import CITYSCAPES_DIVISOR
 
 CITYSCAPES = "_instanceIds.png"
 """How the names of Cityscapes' files end."""
@@ -67,7 +68,7 @@ def read(
     given = {"categories": categories, "scores": scores, "names": names, "class_divisor": class_divisor}
     with open_file(path, "PNG image", limit=MAX_BYTES) as file:
         values, texts = _open(file)
-        if CHUNK not in texts and Path(path).name.endswith(CITYSCAPES) and class_divisor in (None, 1000):
+        if CHUNK not in texts and Path(path).name.endswith(CITYSCAPES) and class_divisor in (None, CITYSCAPES_DIVISOR):
             return _cityscapes(values, scores, names)
         if CHUNK not in texts:
             return InstanceMasks(**instance_image.arguments(values, **given))  # type: ignore[arg-type]
@@ -80,7 +81,7 @@ def read(
 
 def _cityscapes(values: NDArray[Any], scores: ArrayLike | None, names: Mapping[int, str] | None) -> InstanceMasks:
     """Things of Cityscapes, by the ids of COCO where it has the class."""
-    arguments = instance_image.arguments(values, scores=scores, class_divisor=1000)
+    arguments = instance_image.arguments(values, scores=scores, class_divisor=CITYSCAPES_DIVISOR)
     ids, own = category_ids(CITYSCAPES_NAMES | dict(names or {}))
     unknown = sorted(set(arguments["categories"]) - ids.keys())
     if unknown:

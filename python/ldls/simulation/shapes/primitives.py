@@ -58,12 +58,10 @@ def tube(start_m: ArrayLike, end_m: ArrayLike, radius_m: float, colour: Colour, 
     return painted(vertices @ frame + start, faces, colour)
 
 
-def ball(
-    centre_m: ArrayLike, half_m: ArrayLike, colour: Colour, material: Material = Material.PLAIN, *, detail: int = 2
-) -> Shape:
+def ball(centre_m: ArrayLike, half_m: ArrayLike, colour: Colour, *, detail: int = 2) -> Shape:
     """An ellipsoid with its axes along x, y and z."""
     vertices, faces = _unit("ball", detail)
-    return painted(vertices * np.asarray(half_m) + np.asarray(centre_m), faces, colour, material)
+    return painted(vertices * np.asarray(half_m) + np.asarray(centre_m), faces, colour)
 
 
 def ring(centre_m: ArrayLike, radius_m: float, thickness_m: float, colour: Colour) -> Shape:

@@ -4,9 +4,6 @@ use crate::memory::{filled, with_room, zeros};
 use crate::projection::nearest_pixel;
 use crate::{Cancel, Result};
 
-/// Points between two looks at the flag.
-const POINTS_A_BLOCK: usize = 1 << 16;
-
 /// Some points by the column of their nearest pixel.
 pub(super) struct Pixels {
     /// Those of column c lie at `offsets[c]..offsets[c + 1]`.
@@ -36,9 +33,9 @@ impl Pixels {
     ) -> Result<Self> {
         let mut seen = with_room(wanted.iter().filter(|&&wanted| wanted).count())?;
         let mut offsets = zeros(width + 1, cancel)?;
-        for (block, uv) in uv.chunks(POINTS_A_BLOCK).enumerate() {
+        for (block, uv) in uv.chunks(Cancel::ITEMS_A_LOOK).enumerate() {
             cancel.check()?;
-            let wanted = (block * POINTS_A_BLOCK..)
+            let wanted = (block * Cancel::ITEMS_A_LOOK..)
                 .zip(uv)
                 .filter(|(point, _)| wanted[*point]);
             for (number, &uv) in wanted {
@@ -57,7 +54,7 @@ impl Pixels {
             offsets[column + 1] += offsets[column];
         }
         let mut points = filled(Point::default(), seen.len(), cancel)?;
-        for block in seen.chunks(POINTS_A_BLOCK) {
+        for block in seen.chunks(Cancel::ITEMS_A_LOOK) {
             cancel.check()?;
             for &(column, point) in block {
                 points[offsets[column]] = point;

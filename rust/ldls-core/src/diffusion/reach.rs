@@ -75,21 +75,11 @@ impl Reach {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Real;
-
-    /// A chain whose every point has edges to itself and to the next one, the last to itself alone.
-    fn chain<T: Real>(n: u32) -> PointGraph<T> {
-        let rows = (0..n).map(|i| if i + 1 < n { vec![i, i + 1] } else { vec![i] });
-        let rows: Vec<Vec<u32>> = rows.collect();
-        let offsets = (0..=n as usize).map(|i| rows[..i].iter().map(Vec::len).sum());
-        let columns = rows.concat();
-        let weights = vec![T::from_f64(0.25); columns.len()];
-        PointGraph::from_csr(offsets.collect(), columns, weights).unwrap()
-    }
+    use crate::test_support::chain;
 
     #[test]
     fn it_ends_as_many_edges_away_as_there_are_steps_and_one_more() {
-        let reach = Reach::of(&chain(90), &[5, 2], 2, Cancel::never());
+        let reach = Reach::of(&chain(&[0.25; 90], &[]).0, &[5, 2], 2, Cancel::never());
         let reach = reach.unwrap().unwrap();
         assert_eq!(reach.points, [5, 2, 6, 3, 7, 4, 8]);
         assert_eq!(reach.ends, [2, 4, 6, 7]);
@@ -97,7 +87,8 @@ mod tests {
 
     #[test]
     fn what_is_much_of_the_graph_is_left_to_a_diffusion_of_all() {
-        let reach = |steps| Reach::of(&chain(40), &[0], steps, Cancel::never()).unwrap();
+        let reach =
+            |steps| Reach::of(&chain(&[0.25; 40], &[]).0, &[0], steps, Cancel::never()).unwrap();
         assert!(reach(30).is_some());
         assert!(reach(200).is_none());
     }

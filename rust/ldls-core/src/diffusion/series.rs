@@ -283,8 +283,6 @@ mod tests {
 
     const LOW: f64 = -0.8;
     const HIGH: f64 = 0.998;
-    const MIDDLE: f64 = f64::midpoint(HIGH, LOW);
-    const HALF_WIDTH: f64 = (HIGH - LOW) / 2.0;
 
     /// `coefficients` as those of `T_0`, `T_1` and so on, on the interval of `series`.
     fn sum_of_terms(coefficients: &[f64], series: &Series, x: f64) -> f64 {

@@ -7,9 +7,6 @@ use crate::memory::{collect, filled, push, tabulate, zeros};
 use crate::{Cancel, Error, Result};
 use std::ops::Range;
 
-/// Points between two looks at the flag.
-const ROWS_A_BLOCK: usize = 1 << 16;
-
 /// Turns every point that is not in the largest connected component of its label into background (0). Edges are
 /// taken as undirected; of components of one size, the one with the lowest point index is kept.
 ///
@@ -55,7 +52,7 @@ pub(crate) fn remove_outliers_by_index(
         push(&mut members, row)?;
     }
     let mut sets = DisjointSets::new(labels.len(), cancel)?;
-    for rows in members.chunks(ROWS_A_BLOCK) {
+    for rows in members.chunks(Cancel::ITEMS_A_LOOK) {
         cancel.check()?;
         for &row in rows {
             let label = labels[row as usize];
@@ -66,7 +63,7 @@ pub(crate) fn remove_outliers_by_index(
         }
     }
     let mut components = filled(Component::NONE, labels.len(), cancel)?;
-    for rows in members.chunks(ROWS_A_BLOCK) {
+    for rows in members.chunks(Cancel::ITEMS_A_LOOK) {
         cancel.check()?;
         for &row in rows {
             components[sets.root(row) as usize].add(indices[row as usize]);
@@ -156,7 +153,7 @@ fn rows_of_each(
         end += component.size;
     }
     let mut rows = zeros(members.len(), cancel)?;
-    for block in members.chunks(ROWS_A_BLOCK) {
+    for block in members.chunks(Cancel::ITEMS_A_LOOK) {
         cancel.check()?;
         for &row in block {
             let component = &mut components[sets.root(row) as usize];

@@ -22,8 +22,6 @@ const MOST_LEVELS: usize = 3;
 /// Noise, in metres, by which a point may lie below the level that it is on.
 const NOISE_M: f64 = 0.03;
 
-/// Points between two looks at the flag.
-const POINTS_A_BLOCK: usize = 1 << 16;
 /// Fewest points for a task of the thread pool.
 const POINTS_A_TASK: usize = 4096;
 
@@ -46,7 +44,7 @@ impl Cells {
         let (mut cells, mut of_places) = (Self::default(), with_room(places.len())?);
         let mut last = ((i64::MIN, i64::MIN), 0);
         for (at, place) in places.iter().enumerate() {
-            if at % POINTS_A_BLOCK == 0 {
+            if at % Cancel::ITEMS_A_LOOK == 0 {
                 cancel.check()?;
             }
             let cell = cell(place);

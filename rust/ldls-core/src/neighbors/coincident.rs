@@ -15,8 +15,6 @@ use std::sync::Arc;
 
 /// Leaves that are looked at to tell whether a cloud is crowded.
 const LEAVES_LOOKED_AT: usize = 512;
-/// Points between two looks at the flag.
-const POINTS_A_BLOCK: usize = 1 << 16;
 /// Places handled by one task of the thread pool.
 const PLACES_A_TASK: usize = 512;
 
@@ -127,7 +125,7 @@ fn number_places(points: &[[f64; 3]], cancel: &Cancel) -> Result<(Vec<[f64; 3]>,
     numbers.try_reserve(points.len()).map_err(no_room)?;
     let mut places = with_room(points.len())?;
     let mut place_of = with_room(points.len())?;
-    for block in points.chunks(POINTS_A_BLOCK) {
+    for block in points.chunks(Cancel::ITEMS_A_LOOK) {
         cancel.check()?;
         for point in block {
             // zeros of both signs are one place

@@ -274,11 +274,7 @@ fn check_rigid(transform: &Matrix4<f64>) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const IDENTITY: [f64; 16] = [
-        1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
-    ];
-    const PROJECTION: [f64; 12] = [100., 0., 50., 0., 0., 100., 40., 0., 0., 0., 1., 0.];
+    use crate::test_support::{IDENTITY, PROJECTION};
 
     #[test]
     fn the_image_reaches_half_a_pixel_beyond_its_outer_centres() {

@@ -280,11 +280,9 @@ mod tests {
     use super::*;
     use crate::Distortion;
     use crate::projection::nearest_pixel;
+    use crate::test_support::IDENTITY;
     use proptest::prelude::*;
 
-    const IDENTITY: [f64; 16] = [
-        1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.,
-    ];
     const PROJECTION: [f64; 12] = [100., 0., 50., 0., 0., 100., 40., 0., 0., 0., 1., 0.];
 
     /// The points in view of an image of 80 x 100 pixels, of those given in single precision.
