@@ -30,9 +30,9 @@ from ldls.io.labels import read_labeling, write_labeling
 
 
 def run(drive, out, **settings):
-    frames = settings.pop("frames", slice(None))
+    of_run = {name: settings.pop(name) for name in ("frames", "objects") if name in settings}
     settings = {"masks": str(drive / "masks"), "sweeps": 1, "track": True, "formats": ("npz",), **settings}
-    return batch.run(drive, out, batch.RunSettings(**settings), frames=frames)
+    return batch.run(drive, out, batch.RunSettings(**settings), **of_run)
 
 
 def rows(out):
@@ -133,9 +133,10 @@ def test_results_with_tracks_are_in_the_formats_that_name_instances(drive, tmp_p
     out, formats = tmp_path / "out", ("panoptic", "lidarseg", "png")
     run(drive, out, formats=formats, frames=slice(3))
     both = {f"tracks/{k:06d}{ending}" for k in range(3) for ending in (".label", "_panoptic.npz")}
-    assert {*tracks(out)} == {*both, "tracks.csv", "tracks/tracks.json"}
+    of_all = {"tracks.csv", "tracks/objects.jsonl", "tracks/tracks.json"}
+    assert {*tracks(out)} == both | of_all
     run(drive, out, formats=("csv",), frames=slice(3))
-    assert {*tracks(out)} - {*both} == {f"tracks/{k:06d}.csv" for k in range(3)} | {"tracks.csv", "tracks/tracks.json"}
+    assert {*tracks(out)} - {*both} == {f"tracks/{k:06d}.csv" for k in range(3)} | of_all
     assert {*both} < {*tracks(out)}, "files that are there stay"
 
 
@@ -161,21 +162,28 @@ def test_files_of_every_format_score_the_same(simulated, tmp_path):
     assert found["npz"]["Car"]["S_assoc"] > 60
 
 
-@pytest.mark.parametrize("frames", [slice(None), slice(2, 6)])
-def test_the_table_of_objects_has_tracks(drive, tmp_path, frames):
-    (drive / "velodyne/000004.bin").write_bytes(b"x")
-    out, path = tmp_path / "out", tmp_path / "objects.csv"
-    run(drive, out)
-    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, track=True, formats=("npz",))
-    batch.run(drive, out, settings, objects=path, frames=frames)
-    names = ("frame", "track", "label", "velocity_x_m_s", "velocity_y_m_s")
-    with path.open(newline="") as file:
-        found = [tuple(row[name] for name in names) for row in csv.DictReader(file)]
-    chosen = {f"{k:06d}" for k in range(8)[frames]}
-    assert len(found) > 5 and found == [
-        tuple(row[name] for name in names) for row in rows(out) if row["frame"] in chosen
-    ]
-    assert all(track != "0" for _, track, *_ in found)
+@pytest.fixture
+def overlooked(drive):
+    """The drive with a frame whose image shows nothing of the objects that the tracker knows, and a broken one."""
+    path = drive / "masks/000005.json"
+    ldls.save(ldls.InstanceMasks([], ldls.read_masks(path).image_size), path)
+    (drive / "velodyne/000006.bin").write_bytes(b"x")
+    return drive
+
+
+@pytest.mark.parametrize("frames", [slice(None), slice(2, 7)])
+@pytest.mark.parametrize("earlier", [None, {"track": False}, {"track": True, "formats": ("label",)}])
+def test_the_table_of_objects_is_that_of_the_tracked_results(overlooked, tmp_path, frames, earlier):
+    out = tmp_path / "out"
+    if earlier is not None:
+        run(overlooked, out, sweeps=0, **earlier)
+    for name in ("objects.csv", "objects.json"):
+        run(overlooked, out, sweeps=0, frames=frames, objects=tmp_path / name)
+        files = {f"{k:06d}": out / f"tracks/{k:06d}.npz" for k in range(8)[frames] if k != 6}
+        results = {frame: ldls.read_result(file) for frame, file in files.items()}
+        ldls.save_objects(results, tmp_path / f"expected-{name}")
+        assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
+    assert len(results["000005"].to_table()) == 2, "of objects that no mask shows"
 
 
 def test_a_map_holds_what_the_tracked_results_leave_standing(drive, tmp_path):
@@ -213,7 +221,7 @@ def test_a_finished_run_is_not_tracked_again(drive, tracked, numbered):
     assert tracks(out) == before
 
 
-@pytest.mark.parametrize("name", ["tracks/000004.label", "tracks.csv", "tracks/tracks.json"])
+@pytest.mark.parametrize("name", ["tracks/000004.label", "tracks.csv", "tracks/objects.jsonl", "tracks/tracks.json"])
 @pytest.mark.parametrize("change", ["missing", "changed"])
 def test_tracks_that_are_not_whole_are_made_again(drive, tracked, numbered, name, change):
     out, before = tracked
@@ -266,7 +274,10 @@ def test_a_frame_without_a_pose_is_left_out_where_each_is_alone(drive, tmp_path)
     line = next(line for line in journal.splitlines() if '"frame":"000005"' in line)
     (out / "journal.jsonl").write_text(journal.replace(line, re.sub(r'"pose":\[\[.*?\]\]', '"pose":null', line)))
     with pytest.warns(LeftOutWarning, match=r"1 frames \(000005\) have no pose"):
-        run(drive, out, sweeps=0, poses=str(tmp_path / "poses.txt"))
+        run(drive, out, sweeps=0, poses=str(tmp_path / "poses.txt"), objects=tmp_path / "objects.csv")
+    with (tmp_path / "objects.csv").open(newline="") as file:
+        found = {(row["frame"], row["track"] != "0") for row in csv.DictReader(file)}
+    assert found == {(f"{k:06d}", k != 5) for k in range(8)}, "its objects are in the table without tracks"
     assert not (out / "tracks/000005.label").exists() and (out / "tracks/000006.label").exists()
 
 

@@ -168,8 +168,7 @@ def run(
         anew = n_finished - n_failed > n_earlier
         unplaced = _write_of_all(tracks, bag, lambda: _stored(journal, opened.names, folder), anew=anew)
         if write_objects is not None:
-            objects_found = objects_of(journal.records(names))
-            write_objects(objects_found if tracks is None else tracks.numbered(objects_found, opened.names))
+            write_objects(objects_of(_found(journal, names, tracks)))
     if unplaced:
         message = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
         warnings.warn(message, LeftOutWarning, stacklevel=2)
@@ -220,6 +219,12 @@ def _write_of_all(
     if bag is not None:
         bag.write([record["frame"] for record in stored()], anew=anew)
     return unplaced
+
+
+def _found(journal: Journal, names: Sequence[str], tracks: RunTracks | None) -> Iterator[Record]:
+    """The records of frames, with their objects as they are tracked, if they are."""
+    records = journal.records(names)
+    return records if tracks is None else tracks.objects(records)
 
 
 def _stored(journal: Journal, names: Sequence[str], folder: Path) -> Iterator[Record]:

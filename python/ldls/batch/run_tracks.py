@@ -5,6 +5,7 @@ The folder of the run then has
 - `tracks/FRAME.ENDING`: the results of the run again, with their tracks: `.label` after SemanticKITTI, where they are
   the upper 16 bits, and of the formats of the run those that name instances;
 - `tracks.csv`: a row for each object with points of each frame;
+- `tracks/objects.jsonl`: a line for each frame: `images` and `objects`, as in the journal, of the result with tracks;
 - `tracks/tracks.json`: a digest of what they were made of, and size and digest of each of these files.
 
 The map of the drive, where one is asked for, is made in the same pass, each time anew.
@@ -17,9 +18,8 @@ import hashlib
 import io
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -36,11 +36,11 @@ from ldls.io.labels.semantic_kitti import MOST_INSTANCES as MOST_TRACKS
 from ldls.io.objects import DECIMALS, FrameObjects
 from ldls.io.results import map_writer
 from ldls.segmentation import Segmentation
-from ldls.segmentation.object_rows import Row
 from ldls.sequences import LabelledMap, Sweep, Tracker
 from ldls.viewing.formats import RESULT, TRACKS, file_name
 
 TRACKS_TABLE, TRACKS_STATE = "tracks.csv", "tracks.json"
+TRACKED_OBJECTS = f"{TRACKS}/objects.jsonl"
 FORMATS = ("npz", "label", "panoptic", "ply", "pcd", "las", "laz", "parquet", "csv")
 """Formats of results that name instances."""
 COLUMNS = (
@@ -101,7 +101,7 @@ class RunTracks:
         formats = [
             word for word in FORMATS if word in self._formats or any(_place(frame, word) in files for frame in frames)
         ]
-        expected = {TRACKS_TABLE, *(_place(frame, word) for frame in frames for word in formats)}
+        expected = {TRACKS_TABLE, TRACKED_OBJECTS, *(_place(frame, word) for frame in frames for word in formats)}
         current = noted["made_of"] == made_of and expected == files.keys()
         current = current and all(is_written(self._folder / name, files[name]) for name in files)
         if current and self._map is None:
@@ -112,7 +112,10 @@ class RunTracks:
         self.folder.mkdir(exist_ok=True)
         sweep(self.folder)
         now: dict[str, list[int | str]] = {}
-        with whole_file(self._folder / TRACKS_TABLE) as file:
+        with (
+            whole_file(self._folder / TRACKS_TABLE) as file,
+            whole_file(self._folder / TRACKED_OBJECTS) as objects_file,
+        ):
             text = io.TextIOWrapper(file, encoding="utf-8", newline="")
             table = csv.writer(text, lineterminator="\n")
             table.writerow(COLUMNS)
@@ -122,11 +125,12 @@ class RunTracks:
                     save(result, path)
                     now[_place(frame, word)] = written(path)
                 table.writerows(_rows(frame, placed, result))
+                objects_file.write(_line(FrameObjects.of(frame, result)))
                 if self._map is not None:
                     places.add(placed, result)
             # the file outlives the wrapper
             text.detach()
-        now[TRACKS_TABLE] = written(self._folder / TRACKS_TABLE)
+        now |= {name: written(self._folder / name) for name in (TRACKS_TABLE, TRACKED_OBJECTS)}
         for name in files.keys() - now.keys():
             (self._folder / name).unlink(missing_ok=True)
         with whole_file(self.folder / TRACKS_STATE) as file:
@@ -135,22 +139,17 @@ class RunTracks:
             save(places, self._map)
         return unplaced
 
-    def numbered(self, objects: Iterable[FrameObjects], names: Sequence[str]) -> Iterator[FrameObjects]:
-        """Yield the objects of frames with the tracks that were written.
+    def objects(self, records: Iterable[Record]) -> Iterator[Record]:
+        """Yield records of the journal, those of frames with tracks with the objects of these instead.
 
         Args:
-            objects: The objects, in the order of their frames.
-            names: Names of all frames of the source, in their order.
+            records: Those of frames of the run, in the order of the source.
         """
-        order = {name: number for number, name in enumerate(names)}
-        with self._table() as rows:
-            of_frames = groupby(rows, key=lambda row: row["frame"])
-            frame, tracked = next(of_frames, (None, iter(())))
-            for each in objects:
-                while frame is not None and order[frame] < order[each.frame]:
-                    frame, tracked = next(of_frames, (None, iter(())))
-                known = {int(row["label"]): row for row in tracked} if frame == each.frame else {}
-                yield replace(each, rows=[_numbered(row, known.get(row["label"])) for row in each.rows])
+        with open_file(self._folder / TRACKED_OBJECTS, "tracked objects") as file:
+            tracked = map(json.loads, file)
+            for record in records:
+                has_tracks = "error" not in record and _is_placed(record)
+                yield next(each for each in tracked if each["frame"] == record["frame"]) if has_tracks else record
 
     def counted(self) -> dict[str, int]:
         """Objects over the drive by the name that each had last, the most frequent first."""
@@ -207,17 +206,15 @@ def _place(frame: str, word: str) -> str:
 def _is_ours(name: str) -> bool:
     """True for the name of a file that tracks have; nothing else is removed."""
     endings = tuple(file_name("", word) for word in FORMATS)
-    return name == TRACKS_TABLE or (
+    return name in (TRACKS_TABLE, TRACKED_OBJECTS) or (
         name.startswith(f"{TRACKS}/") and name.endswith(endings) and len(Path(name).parts) == 2
     )
 
 
-def _numbered(row: Row, known: Mapping[str, str] | None) -> Row:
-    """The row of an object with what the row of the tracks says of it."""
-    if known is None:
-        return row
-    velocity = {name: float(known[name]) for name in ("velocity_x_m_s", "velocity_y_m_s")}
-    return row | {"track": int(known["track"])} | velocity
+def _line(objects: FrameObjects) -> bytes:
+    """The objects of a frame as a line of JSON."""
+    record = {"frame": objects.frame, "images": objects.images, "objects": objects.rows}
+    return json.dumps(record, sort_keys=True, separators=(",", ":")).encode() + b"\n"
 
 
 def _digest(records: Iterable[Record]) -> str:
