@@ -104,6 +104,7 @@ def test_tracks_are_those_of_the_tracker_window_by_window(simulated, tmp_path, s
     assert next(found, None) is None
     last_names = {row["track"]: row["name"] for row in rows(out)}
     assert summary.tracks == Counter(last_names.values())
+    assert summary.objects == Counter(row["name"] for row in rows(out))
     assert summary.tracks["car"] < summary.objects["car"]
     by_frame = [{row["track"] for row in rows(out) if row["frame"] == name} for name in source.names]
     assert len(set.intersection(*by_frame)) >= 3, "objects go on as themselves over all windows"
@@ -178,12 +179,21 @@ def test_the_table_of_objects_is_that_of_the_tracked_results(overlooked, tmp_pat
     if earlier is not None:
         run(overlooked, out, sweeps=0, **earlier)
     for name in ("objects.csv", "objects.json"):
-        run(overlooked, out, sweeps=0, frames=frames, objects=tmp_path / name)
+        summary = run(overlooked, out, sweeps=0, frames=frames, objects=tmp_path / name)
         files = {f"{k:06d}": out / f"tracks/{k:06d}.npz" for k in range(8)[frames] if k != 6}
         results = {frame: ldls.read_result(file) for frame, file in files.items()}
         ldls.save_objects(results, tmp_path / f"expected-{name}")
         assert (tmp_path / name).read_bytes() == (tmp_path / f"expected-{name}").read_bytes()
     assert len(results["000005"].to_table()) == 2, "of objects that no mask shows"
+    assert summary.objects == Counter(row["name"] for result in results.values() for row in result.to_table())
+
+
+def test_tracks_are_counted_in_the_frames_that_were_chosen(drive, tmp_path):
+    for k in range(4, 8):
+        path = drive / f"masks/{k:06d}.json"
+        ldls.save(ldls.read_masks(path).filter(categories=["car"]), path)
+    assert run(drive, tmp_path / "out", sweeps=0).tracks.keys() == {"car", "person"}
+    assert run(drive, tmp_path / "out", sweeps=0, frames=slice(7, 8)).tracks == {"car": 1}
 
 
 def test_a_map_holds_what_the_tracked_results_leave_standing(drive, tmp_path):

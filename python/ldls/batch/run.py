@@ -22,7 +22,16 @@ from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import RunBag
 from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks
 from ldls.batch.settings import RunSettings, source_record
-from ldls.batch.summary import FAILURES_NAME, Summary, count_objects, doubts_of, failures_of, objects_of, write_failures
+from ldls.batch.summary import (
+    FAILURES_NAME,
+    Summary,
+    count_objects,
+    count_tracks,
+    doubts_of,
+    failures_of,
+    objects_of,
+    write_failures,
+)
 from ldls.batch.window import Frames, Outcome
 from ldls.datasets import Source, open_source
 from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, NoUsablePoints, ParameterError, some
@@ -169,6 +178,8 @@ def run(
         unplaced = _write_of_all(tracks, bag, lambda: _stored(journal, opened.names, folder), anew=anew)
         if write_objects is not None:
             write_objects(objects_of(_found(journal, names, tracks)))
+        n_objects = count_objects(_found(journal, names, tracks))
+        n_tracks = count_tracks(_found(journal, names, tracks))
     if unplaced:
         message = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
         warnings.warn(message, LeftOutWarning, stacklevel=2)
@@ -182,8 +193,8 @@ def run(
         n_earlier=n_earlier,
         n_nothing_in_view=sum(map(len, doubts.values())),
         failures=failures,
-        objects=count_objects(journal.records(names)),
-        tracks={} if tracks is None else tracks.counted(),
+        objects=n_objects,
+        tracks=n_tracks,
         seconds=dict(seconds),
         elapsed=elapsed,
     )

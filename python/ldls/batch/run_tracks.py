@@ -17,9 +17,7 @@ import csv
 import hashlib
 import io
 import json
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -150,18 +148,6 @@ class RunTracks:
             for record in records:
                 has_tracks = "error" not in record and _is_placed(record)
                 yield next(each for each in tracked if each["frame"] == record["frame"]) if has_tracks else record
-
-    def counted(self) -> dict[str, int]:
-        """Objects over the drive by the name that each had last, the most frequent first."""
-        with self._table() as rows:
-            names = {row["track"]: row["name"] for row in rows}
-        return dict(Counter(names.values()).most_common())
-
-    @contextmanager
-    def _table(self) -> Iterator[Iterator[dict[str, str]]]:
-        """The rows of the table that was written, by their columns."""
-        with open_file(self._folder / TRACKS_TABLE, "table of tracks") as file:
-            yield csv.DictReader(io.TextIOWrapper(file, encoding="utf-8", newline=""))
 
     def _tracked(self, records: Iterable[Record]) -> Iterator[tuple[str, Sweep, Segmentation]]:
         """Name, sweep and tracked result of each frame, window by window."""

@@ -41,8 +41,9 @@ class Summary:
         n_earlier: Of these, those of earlier runs that were interrupted.
         n_nothing_in_view: Of those done, frames without a finite point, one in view, or one on a mask.
         failures: Frames that failed, in their order.
-        objects: Objects with points, each counted in every frame, by category name.
-        tracks: Objects over the drive where they are numbered, by the name that each had last.
+        objects: Objects with points of the frames wanted, each counted in every frame, by category name; where objects
+            are numbered over the drive, those of the results with tracks.
+        tracks: The same, each counted once, by the name that it has last in these frames; none without tracks.
         seconds: Time of each stage, added up over the frames of this run.
         elapsed: Time of this run in seconds.
     """
@@ -104,3 +105,10 @@ def count_objects(records: Iterable[Mapping[str, Any]]) -> dict[str, int]:
     for record in records:
         total.update(spelled.setdefault(folded(row["name"]), row["name"]) for row in record.get("objects", ()))
     return dict(total.most_common())
+
+
+def count_tracks(records: Iterable[Mapping[str, Any]]) -> dict[str, int]:
+    """Tracks that these frames show, by the name that each has last in them, the most frequent first."""
+    rows = (row for record in records for row in record.get("objects", ()) if row["track"])
+    names = {row["track"]: row["name"] for row in rows}
+    return dict(Counter(names.values()).most_common())
