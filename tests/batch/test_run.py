@@ -217,8 +217,9 @@ def test_a_bag_with_stored_masks(tmp_path, n_cameras):
     settings = batch.RunSettings(masks=str(tmp_path / "masks"))
     for n_earlier in (0, 3):
         # the cloud of this bag lies beside its images
-        with pytest.warns(NothingInView, match="3 of 3 frames"):
+        with pytest.warns(NothingInView, match="3 of 3 frames") as caught:
             summary = batch.run(opened, tmp_path / "out", settings)
+        assert caught[0].filename == __file__
         assert (summary.n_done, summary.n_earlier) == (3, n_earlier)
 
 
@@ -284,8 +285,9 @@ def test_files_that_went_missing_or_shrank_are_made_again(source, undisturbed, t
     run(source, tmp_path)
     (tmp_path / "000003.label").unlink()
     (tmp_path / "000004.label").write_bytes(b"")
-    with pytest.warns(ChangedFileWarning, match=r"files of 1 frames were changed .* \(000004\)"):
+    with pytest.warns(ChangedFileWarning, match=r"files of 1 frames were changed .* \(000004\)") as caught:
         assert run(source, tmp_path).n_earlier == 58
+    assert caught[0].filename == __file__
     assert runs.contents(tmp_path) == undisturbed
 
 
@@ -638,6 +640,44 @@ def test_neither_masks_nor_a_segmenter(few, tmp_path):
 def test_settings_that_contradict_themselves(options, named):
     with pytest.raises(ParameterError, match=named):
         batch.RunSettings(**options)
+
+
+POSES = ldls.Trajectory(np.zeros(1), np.eye(4)[None])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        pytest.param({"sweeps": "2"}, "sweeps: got '2', expected a whole number", id="text for a number"),
+        pytest.param({"sweeps": 1.5}, "sweeps: got 1.5, expected a whole number", id="half a sweep"),
+        pytest.param({"sweeps": True}, "sweeps: got True, expected a whole number", id="a flag for a number"),
+        pytest.param({"poses": POSES}, "poses: got Trajectory(?s:.*), expected text", id="poses for their file"),
+        pytest.param({"track": 1}, "track: got 1, expected True or False", id="a number for a flag"),
+        pytest.param({"formats": "npz"}, "formats: got 'npz', expected a list", id="one format"),
+        pytest.param({"params": None}, "params: expected Params, got NoneType; make", id="no parameters"),
+    ],
+)
+def test_settings_of_another_type(options, said):
+    with pytest.raises(InputError, match=f"^{said}"):
+        batch.RunSettings(**options)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        pytest.param({"settings": None}, "settings: expected RunSettings, got NoneType; make", id="no settings"),
+        pytest.param({"frames": 3}, "frames: expected slice, got int; make one with slice", id="a number of frames"),
+        pytest.param({"frames": slice(0, 1.5)}, "frames: got slice.0, 1.5, None., expected whole", id="half a frame"),
+        pytest.param({"frames": slice(None, None, -1)}, "frames: .* a step from 1, as in slice", id="backwards"),
+        pytest.param({"frames": slice(0, 5, 0)}, "frames: .* a step from 1, as in slice", id="no step"),
+        pytest.param({"workers": "2"}, "workers: got '2', expected a whole number", id="workers"),
+    ],
+)
+def test_arguments_of_another_type_are_refused_before_anything_is_done(few, tmp_path, options, said):
+    arguments = {"settings": replace(STORED, masks=str(few / "masks")), **options}
+    with pytest.raises(InputError, match=f"^{said}"):
+        batch.run(few, tmp_path / "out", **arguments)
+    assert not (tmp_path / "out").exists()
 
 
 def test_unknown_engine(few, tmp_path):

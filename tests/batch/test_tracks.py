@@ -283,8 +283,9 @@ def test_a_frame_without_a_pose_is_left_out_where_each_is_alone(drive, tmp_path)
     journal = (out / "journal.jsonl").read_text()
     line = next(line for line in journal.splitlines() if '"frame":"000005"' in line)
     (out / "journal.jsonl").write_text(journal.replace(line, re.sub(r'"pose":\[\[.*?\]\]', '"pose":null', line)))
-    with pytest.warns(LeftOutWarning, match=r"1 frames \(000005\) have no pose"):
+    with pytest.warns(LeftOutWarning, match=r"1 frames \(000005\) have no pose") as caught:
         run(drive, out, sweeps=0, poses=str(tmp_path / "poses.txt"), objects=tmp_path / "objects.csv")
+    assert caught[0].filename == __file__
     with (tmp_path / "objects.csv").open(newline="") as file:
         found = {(row["frame"], row["track"] != "0") for row in csv.DictReader(file)}
     assert found == {(f"{k:06d}", k != 5) for k in range(8)}, "its objects are in the table without tracks"

@@ -11,6 +11,7 @@ from pathlib import Path, PureWindowsPath
 
 from ldls.batch.run_tracks import TRACKS_STATE, TRACKS_TABLE
 from ldls.batch.window import Frames
+from ldls.checks.values import is_whole
 from ldls.datasets import Source
 from ldls.errors import BatchError, ParameterError, UnsafePathError, some
 from ldls.sequences.trajectory import LONGEST_GAP_S
@@ -38,11 +39,16 @@ def parse_frames(text: str | None) -> slice:
 
 
 def chosen_of(source: Source, frames: slice) -> Frames:
-    """Number in the source and name of each of its `frames`.
+    """Number in the source and name of each of its `frames`, in its order.
 
     Raises:
-        ParameterError: It has none of them.
+        ParameterError: It has none of them, or they are no whole numbers, or go backwards.
     """
+    step = 1 if frames.step is None else frames.step
+    if not all(part is None or is_whole(part) for part in (frames.start, frames.stop, step)) or step < 1:
+        raise ParameterError(
+            f"frames: got {frames}, expected whole numbers and a step from 1, as in slice(100, 500, 5)"
+        )
     chosen = tuple(zip(range(len(source))[frames], source.names[frames], strict=True))
     if not chosen:
         parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]

@@ -33,6 +33,7 @@ from ldls.batch.summary import (
     write_failures,
 )
 from ldls.batch.window import Frames, Outcome
+from ldls.checks import checked
 from ldls.datasets import Source, open_source
 from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, NoUsablePoints, ParameterError, some
 from ldls.io.files import check_outputs, sweep
@@ -47,6 +48,7 @@ Progress = Callable[[int, int, int], None]
 """Called with the frames done, those of them that failed, and all frames."""
 
 
+@checked
 def run(
     source: Source | str | PathLike[str],
     out: str | PathLike[str],
@@ -74,7 +76,7 @@ def run(
         source: A source of `ldls.datasets`, or a path that one is guessed from.
         out: Folder for the results; made if need be.
         settings: How frames are treated.
-        frames: Which frames of the source.
+        frames: Which frames of the source, in its order.
         options: Options of the source's kind, for `ldls.datasets.open_source`. Of a source that is open already, those
             that it was opened with: a run goes on only with the same ones.
         objects: A `.csv` or `.json` file for one table of the objects of all frames, in the order of the frames, as
@@ -95,10 +97,10 @@ def run(
         BatchError: Another run is at work in `out`, or `out` holds frames done by one of other settings, source or
             version, or files that no run wrote in the places of results, as inputs.
         CorruptFileError: The journal in `out` is none.
-        ParameterError: The source has none of the `frames`, masks of one image are given for several, a map is asked
-            for, and no tracks, `objects` or `map_file` is the name of a file of the run, or a segmenter or a file of
-            all masks has no such category.
-        InputError: `objects` or `map_file` is an input.
+        ParameterError: The source has none of the `frames`, or they go backwards, masks of one image are given for
+            several, a map is asked for, and no tracks, `objects` or `map_file` is the name of a file of the run, or a
+            segmenter or a file of all masks has no such category.
+        InputError: An argument is of another type, or `objects` or `map_file` is an input.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
         UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
         PoseError: Sweeps are to be joined or objects tracked, and frames have no stamps or poses.
@@ -182,11 +184,11 @@ def run(
         n_tracks = count_tracks(_found(journal, names, tracks))
     if unplaced:
         message = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
-        warnings.warn(message, LeftOutWarning, stacklevel=2)
+        warnings.warn(message, LeftOutWarning, stacklevel=3)
     doubts = doubts_of(journal.records(names))
     for doubt, frames_in_doubt in doubts.items():
         message = f"{len(frames_in_doubt):,} of {len(names):,} frames ({some(frames_in_doubt)}): {doubt}"
-        warnings.warn(message, NothingInView, stacklevel=2)
+        warnings.warn(message, NothingInView, stacklevel=3)
     return Summary(
         n_frames=len(names),
         n_done=sum("error" not in record for record in journal.records(names)),
@@ -256,7 +258,7 @@ def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> li
             f"{work.out}: files of {len(changed):,} frames were changed since they were written ({some(changed)}); "
             "these frames are done again"
         )
-        warnings.warn(message, ChangedFileWarning, stacklevel=3)
+        warnings.warn(message, ChangedFileWarning, stacklevel=4)
     done = {name for (name, _), earlier in zip(frames, left, strict=True) if earlier is Earlier.DONE}
     return [window for window in windows if any(name not in done for _, name in window)]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import ldls._ldls as _ldls
-from ldls.checks import as_python, hold_python_values
+from ldls.checks import as_python, checked, hold_python_values
 from ldls.datasets.stored_masks import fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
@@ -22,6 +22,7 @@ MOST_SWEEPS = 100
 """More than memory has room for."""
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
     """Settings that hold for every frame of a run.
@@ -45,6 +46,7 @@ class RunSettings:
             are written too; those of `formats` that name instances are there with tracks besides; run_tracks.py.
 
     Raises:
+        InputError: A setting is of another type; ParameterError of numbers, text and flags.
         ParameterError: Both `masks` and `segmenter` are given, there is no format, or an unknown one, or `sweeps` is
             out of its range.
     """

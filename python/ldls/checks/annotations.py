@@ -22,6 +22,8 @@ MAKERS = {
     "Params": "make them with Params(...), as in Params(sigma=0.5)",
     "Trajectory": "make one with Trajectory(stamps, poses), or ldls.read_poses of a file",
     "Segmentation": "ldls.segment and ldls.read_result return them",
+    "RunSettings": 'make them with RunSettings(...), as in RunSettings(masks="masks")',
+    "slice": "make one with slice(start, stop), as in slice(100) for the first hundred",
 }
 """Where instances of a class come from, for messages."""
 
