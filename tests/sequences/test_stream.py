@@ -69,18 +69,24 @@ def test_after_a_second_without_a_sweep_the_next_is_labelled_alone(frames):
     assert [n_sweeps(one, 0.0), n_sweeps(two, 1.0), n_sweeps(three, 2.1)] == [1, 2, 1]
 
 
-def test_a_pose_that_jumps_is_refused_and_forgotten(frames):
+@pytest.mark.parametrize(
+    ("before", "wait_s", "n_sweeps"),
+    [
+        pytest.param(2, 0.1, 2, id="from a sweep that is labelled again"),
+        pytest.param(0, 0.1, 1, id="from one that is not"),
+        pytest.param(2, 2.0, 1, id="after a gap"),
+    ],
+)
+def test_a_pose_that_jumps_is_refused_and_forgotten(frames, before, wait_s, n_sweeps):
     one, two, _, _, _ = frames
-    stream = ldls.LabelDiffusion(one.images[0].camera, PARAMS)
+    stream = ldls.LabelDiffusion(one.images[0].camera, PARAMS, before=before)
+    stream.segment(one.points, one.images[0].masks, pose=one.pose, stamp=one.stamp)
+    following = partial(stream.segment, two.points, two.images[0].masks, stamp=one.stamp + wait_s)
     away = two.pose.copy()
     away[0, 3] += 500
-    for frame, pose, n_sweeps in ((one, one.pose, 1), (two, away, None), (two, two.pose, 2)):
-        call = partial(stream.segment, frame.points, frame.images[0].masks, pose=pose, stamp=frame.stamp)
-        if n_sweeps is None:
-            with pytest.raises(ldls.PoseError, match=r"the lidar moves 50\d.* expected at most 100 m/s"):
-                call()
-        else:
-            assert call().report.n_sweeps == n_sweeps
+    with pytest.raises(ldls.PoseError, match=r"the lidar moves 50\d.* expected at most 100 m/s"):
+        following(pose=away)
+    assert following(pose=two.pose).report.n_sweeps == n_sweeps
 
 
 def test_a_frame_without_pose_is_none_of_the_drive(frames):
@@ -112,8 +118,11 @@ def test_misuse_is_named_and_forgotten(frames):
     ):
         ldls.LabelDiffusion().segment(one.points, image.masks)
     stream.segment(one.points, image.masks, pose=one.pose, stamp=one.stamp)
-    with pytest.raises(ldls.InputError, match="two have the stamp"):
-        stream.segment(one.points, image.masks, pose=one.pose, stamp=one.stamp)
+    alone = ldls.LabelDiffusion(image.camera, PARAMS, before=0)
+    alone.segment(one.points, image.masks, pose=one.pose, stamp=one.stamp)
+    for each in (stream, alone):
+        with pytest.raises(ldls.InputError, match="two have the stamp"):
+            each.segment(one.points, image.masks, pose=one.pose, stamp=one.stamp)
     latest = stream.segment(two.points, two.images[0].masks, pose=two.pose, stamp=two.stamp)
     assert latest.report.n_sweeps == 2
 

@@ -93,7 +93,8 @@ class LabelDiffusion:
 
         Raises:
             InputError: An argument cannot be used; see its subclasses. A sweep that fails is not remembered.
-            PoseError: The pose is farther from that of the sweep before than 100 m/s allow.
+            PoseError: The pose is farther from that of the sweep before, however long ago, than 100 m/s allow; another
+                drive has a stream of its own.
             LimitError: The cloud has more points than the graph can index.
             ImportError: `ldls[eval]` is not installed, which drives need.
         """
@@ -106,11 +107,12 @@ class LabelDiffusion:
             return segment_views(points, views, self.params, nonfinite, keep_origin, share)
         # a copy, for those who give arrays that they use again
         sweep = Sweep(as_points(points).copy(), views, pose, stamp)  # type: ignore[arg-type]
-        goes_on = self._recent and sweep.stamp - self._recent[-1].stamp <= LONGEST_GAP_S
-        recent = (*(self._recent if goes_on else ()), sweep)[-1 - self.before :]
-        check_order(recent)
+        last = (*self._recent[-1:], sweep)
+        check_order(last)
         # refuses a pose that jumps
-        Trajectory(np.array([each.stamp for each in recent]), np.array([each.pose for each in recent]))
+        Trajectory(np.array([each.stamp for each in last]), np.array([each.pose for each in last]))
+        goes_on = sweep.stamp - last[0].stamp <= LONGEST_GAP_S
+        recent = (*(self._recent if goes_on else ()), sweep)[-1 - self.before :]
         results, report = label_sweeps(
             recent,
             params=self.params,
