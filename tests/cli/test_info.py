@@ -37,13 +37,19 @@ def test_a_sound_drive_is_described(tmp_path):
         assert len(np.unique(np.asarray(picture).reshape(-1, 3), axis=0)) > 20, "points are drawn in colours of depth"
 
 
+def _without_points(drive):
+    (drive / "velodyne_points/data/0000000001.bin").unlink()
+    np.save(drive / "velodyne_points/data/0000000001.npy", np.zeros((0, 4), np.float32))
+
+
 @pytest.mark.parametrize(
     ("change", "status", "message"),
     [
         pytest.param(lambda d: (d / "velodyne_points/data/0000000001.bin").write_bytes(b"123"), 1,
                      "3 bytes is not a multiple of 16", id="a cut sweep"),
-        pytest.param(lambda d: (d / "velodyne_points/data/0000000001.bin").write_bytes(b""), 1, "its cloud is empty",
-                     id="an empty sweep"),
+        pytest.param(lambda d: (d / "velodyne_points/data/0000000001.bin").write_bytes(b""), 1,
+                     "empty, expected 4 float32 a point", id="an empty sweep"),
+        pytest.param(_without_points, 1, "its cloud is empty", id="a sweep without a point"),
         pytest.param(lambda d: layouts.write_points(d / "velodyne_points/data/0000000001.bin",
                                                     layouts.cloud() * np.float32(np.nan)), 1,
                      "none of its 100 points is finite", id="a cloud of NaN"),

@@ -21,7 +21,7 @@ def test_what_is_no_regular_file_is_refused(tmp_path, suffix):
             ldls.read_points(path)
 
 
-@pytest.mark.parametrize("suffix", [suffix for suffix in SUFFIXES if suffix != ".bin"])
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_an_empty_file_is_no_cloud(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     path.touch()

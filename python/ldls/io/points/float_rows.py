@@ -26,7 +26,7 @@ NEAR_DEG, FAR_DEG = 5.0, 15.0
 
 
 def read(path: Path, *, columns: int | None = None, recover: bool = False) -> NDArray[np.float32]:
-    """(N, columns) float32: the rows of a `.bin` file; one without a byte is a cloud without a point.
+    """(N, columns) float32: the rows of a `.bin` file.
 
     Args:
         path: The file.
@@ -34,7 +34,7 @@ def read(path: Path, *, columns: int | None = None, recover: bool = False) -> ND
         recover: Whether a truncated file yields its whole rows and a warning instead of an error.
 
     Raises:
-        TruncatedFileError: The size is no whole number of rows.
+        TruncatedFileError: The file is empty, or its size is no whole number of rows.
         FileFormatError: The rows look as if they had another number of columns.
         ParameterError: `columns` is out of range.
     """
@@ -50,6 +50,11 @@ def read(path: Path, *, columns: int | None = None, recover: bool = False) -> ND
 def _rows(path: Path, content: NDArray[np.uint8], columns: int, *, guessed: bool, recover: bool) -> NDArray[np.float32]:
     row_bytes = FLOAT_BYTES * columns
     whole = len(content) // row_bytes * row_bytes
+    if not len(content):
+        message = f"empty, expected {columns} float32 a point"
+        if not recover:
+            raise TruncatedFileError(f"{message}; write it again, or pass recover=True to read a cloud without a point")
+        warnings.warn(f"{path}: {message}", RecoveredFileWarning, stacklevel=4)
     if whole != len(content):
         message = (
             f"{len(content)} bytes is not a multiple of {row_bytes} ({columns} float32 a point); "
