@@ -442,6 +442,8 @@ def replaced(path, old, new):
                      "no stamp of 1 frames, the first is b", id="folder with too few stamps"),
         pytest.param("folder", with_text("stamps.txt", "a 1700000000000\nb 1700000000100\n"), ldls.CorruptFileError,
                      "stamps.txt, line 1: stamp: got 17000.*, expected seconds", id="folder with milliseconds"),
+        pytest.param("folder", with_text("stamps.txt", "c 0.0\na 1.0\nb 2.0\na 3.0\n"), ldls.CorruptFileError,
+                     "stamps.txt, line 4: frame a has a stamp in line 2 already", id="folder with a stamp twice"),
         pytest.param("folder", with_text("stamps.txt", "a 1.0\nb inf\n"), ldls.CorruptFileError,
                      "stamps.txt, line 2: stamp: got inf, expected seconds", id="folder with an endless stamp"),
         pytest.param("folder", without("front"), ldls.SourceError, "points 2, cameras.front 0",

@@ -136,7 +136,16 @@ class FolderSource(FileSource):
         if pattern is None:
             return (None,) * len(self.names)
         path = self._safe(pattern)
-        stamps = dict(_stamp(path, number, line) for number, line in enumerate(read_lines(path), start=1))
+        stamps: dict[str, float] = {}
+        for number, line in enumerate(read_lines(path), start=1):
+            name, stamp = _stamp(path, number, line)
+            if name in stamps:
+                first = [*stamps].index(name) + 1
+                raise CorruptFileError(
+                    f"{path}, line {number}: frame {name} has a stamp in line {first} already, expected one; remove "
+                    "one of these lines"
+                )
+            stamps[name] = stamp
         missing = [name for name in self.names if name not in stamps]
         if missing:
             raise SourceError(f"{path}: has no stamp of {len(missing)} frames, the first is {missing[0]}")
