@@ -1,5 +1,6 @@
 """Runs of `ldls run` in processes of their own, to be killed."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -99,3 +100,14 @@ def contents(folder):
 
 def without_journal(folder):
     return {name: content for name, content in contents(folder).items() if name != "journal.jsonl"}
+
+
+def records(folder):
+    """The record of each frame in the journal."""
+    _, *lines = (folder / "journal.jsonl").read_text().splitlines()
+    return {record["frame"]: record for record in map(json.loads, lines)}
+
+
+def times(folder):
+    """When each file was written, the journal left out."""
+    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir() if path.name != "journal.jsonl"}

@@ -1,9 +1,9 @@
 """Runs that label sweeps of a drive together: the labels, windows, frames that fail, and what is done again."""
 
-import json
 import re
 import shutil
 import signal
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from ldls.batch.plan import windows_of
 from ldls.batch.ray_engine import _noted
 from ldls.batch.ray_worker import RayWorker
 from ldls.datasets import odometry_of, open_source
-from ldls.errors import BatchError, InputError, LeftOutWarning, NothingInView, ParameterError, PoseError
+from ldls.errors import BatchError, InputError, LdlsWarning, LeftOutWarning, NothingInView, ParameterError, PoseError
 
 N_FRAMES = 8
 
@@ -44,18 +44,11 @@ def by_hand(source, masks, frames):
     return ldls.segment_sweeps(sweeps)
 
 
-def records(out):
-    _, *lines = (out / "journal.jsonl").read_text().splitlines()
-    return {record["frame"]: record for record in map(json.loads, lines)}
-
-
 def windows(out):
     """The frames by their last digits, as the journal says that they were labelled together."""
-    return ["".join(name[-1] for name in record["window"]) for record in records(out).values() if "window" in record]
-
-
-def times(out):
-    return {path.name: path.stat().st_mtime_ns for path in out.iterdir() if path.name != "journal.jsonl"}
+    return [
+        "".join(name[-1] for name in record["window"]) for record in runs.records(out).values() if "window" in record
+    ]
 
 
 @pytest.fixture
@@ -90,7 +83,7 @@ def test_labels_are_those_of_segment_sweeps_window_by_window(simulated, tmp_path
         assert (tmp_path / f"out/{name}.label").read_bytes() == (tmp_path / "one.label").read_bytes()
         single = ldls.segment(frame.points, [seen.view for seen in own.views])
         alone += int((single.categories != own.categories).sum())
-        record = records(tmp_path / "out")[name]
+        record = runs.records(tmp_path / "out")[name]
         assert record["stamp"] == frame.stamp and np.array_equal(record["pose"], frame.pose)
     assert alone > 50, "points that one sweep alone labels in another way"
     assert windows(tmp_path / "out") == ["012", "012", "012", "34", "34"]
@@ -161,9 +154,9 @@ def test_a_frame_that_fails_leaves_its_window_alone_until_it_is_mended(drive, wh
 def test_a_frame_that_fails_again_makes_nothing_be_written(drive, tmp_path):
     (drive / "masks/000004.json").unlink()
     run(drive, tmp_path / "out")
-    before, journal = times(tmp_path / "out"), (tmp_path / "out/journal.jsonl").read_bytes()
+    before, journal = runs.times(tmp_path / "out"), (tmp_path / "out/journal.jsonl").read_bytes()
     assert run(drive, tmp_path / "out").n_earlier == 5
-    assert {name: at for name, at in times(tmp_path / "out").items() if "failures" not in name} == {
+    assert {name: at for name, at in runs.times(tmp_path / "out").items() if "failures" not in name} == {
         name: at for name, at in before.items() if "failures" not in name
     }
     assert (tmp_path / "out/journal.jsonl").read_bytes() == journal
@@ -171,12 +164,12 @@ def test_a_frame_that_fails_again_makes_nothing_be_written(drive, tmp_path):
 
 def test_a_file_that_is_missing_is_written_and_no_other(drive, whole, tmp_path, labelled):
     run(drive, tmp_path / "out")
-    before = times(tmp_path / "out")
+    before = runs.times(tmp_path / "out")
     labelled.clear()
     (tmp_path / "out/000004.npz").unlink()
     assert run(drive, tmp_path / "out").n_earlier == 5
     assert labelled == [3]
-    assert {name for name, at in times(tmp_path / "out").items() if before[name] != at} == {"000004.npz"}
+    assert {name for name, at in runs.times(tmp_path / "out").items() if before[name] != at} == {"000004.npz"}
     assert runs.contents(tmp_path / "out") == whole
 
 
@@ -244,6 +237,17 @@ def test_a_gap_in_a_drive_ends_a_window(tmp_path):
     assert windows(tmp_path / "out") == ["01", "01", "234", "234", "234"]
 
 
+def test_sweeps_that_are_all_alone_are_warned_of(tmp_path):
+    drive = drives.small_drive(tmp_path / "drive", 4, period_s=2.0)
+    said = r"no sweep comes within 1 s after the one before \(median gap 2 s\), .*; are stamps in seconds\?"
+    # there are no poses in such a gap, but for those at the stamps
+    with pytest.warns(LdlsWarning, match=said):
+        assert run(drive, tmp_path / "out").n_done == 4
+    assert windows(tmp_path / "out") == ["0", "1", "2", "3"]
+    run(drive, tmp_path / "out", frames=slice(1))
+    run(drive, tmp_path / "alone", sweeps=0)
+
+
 @pytest.mark.parametrize("settings", [{}, {"sweeps": 0, "track": True}])
 def test_without_poses_nothing_is_begun(tmp_path, settings):
     drive = drives.small_drive(tmp_path / "drive", 2, poses=False)
@@ -254,6 +258,32 @@ def test_without_poses_nothing_is_begun(tmp_path, settings):
     with pytest.raises(PoseError, match="have no stamps, expected them"):
         run(drive, tmp_path / "out", **settings)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def gap(simulated, tmp_path):
+    """The simulated drive, whose poses are those of the first two sweeps."""
+    drive = shutil.copytree(simulated.parent, tmp_path / "gap" / simulated.parent.name) / simulated.name
+    for path in sorted(drive.glob("oxts/data/*.txt"))[2:]:
+        path.unlink()
+    return drive
+
+
+def test_poses_of_the_source_are_read_only_where_none_are_given(gap, simulated, tmp_path):
+    masks, path = str(gap / "masks_02"), tmp_path / "poses.txt"
+    with pytest.raises(PoseError, match="0000000002: stamp: no pose at .*; or open the source with poses=False"):
+        open_source(gap)[2]
+    assert run(gap, tmp_path / "plain", masks=masks, sweeps=0).n_done == 2
+    summary = batch.run(gap, tmp_path / "none", batch.RunSettings(masks=masks), options={"poses": False})
+    assert summary.n_done == 5
+    stamps = open_source(simulated, truth=False).stamps
+    path.write_text("".join(f"{stamp:.6f} {0.1 * k} 0 0 0 0 0 1\n" for k, stamp in enumerate(stamps)))
+    (gap / "oxts/data/0000000000.txt").write_bytes(b"")
+    assert not run(gap, tmp_path / "given", masks=masks, poses=str(path)).failures
+    read = runs.records(tmp_path / "given").values()
+    assert not any("oxts" in path for record in read for path in record["inputs"])
+    outcome = runs.resumed([*runs.arguments(gap, tmp_path / "said", "--sweeps", 1, "--poses", path), "--masks", masks])
+    assert outcome.exit_code == 0, outcome.output
 
 
 def test_the_first_frame_that_can_be_read_tells_whether_there_are_poses(drive, tmp_path):
@@ -346,7 +376,7 @@ def test_a_sweep_that_odometry_cannot_use_fails_alone_or_is_between_the_others(s
         summary = run(drive, tmp_path / "other", **settings)
     assert {warning.category for warning in caught} == {LeftOutWarning, NothingInView}
     assert summary.n_done == 5
-    placed = {frame: np.array(record["pose"]) for frame, record in records(tmp_path / "other").items()}
+    placed = {frame: np.array(record["pose"]) for frame, record in runs.records(tmp_path / "other").items()}
     before, after = (placed[frame][:3, 3] for frame in open_source(drive).names[2::2])
     np.testing.assert_allclose(placed[name][:3, 3], (before + after) / 2, atol=1e-6)
 
@@ -373,6 +403,45 @@ def test_a_file_of_poses_needs_no_first_sweep(drive, tmp_path):
     (drive / "velodyne/000000.bin").write_bytes(b"x")
     summary = run(drive, tmp_path / "out", poses=str(tmp_path / "given.txt"))
     assert summary.n_done == N_FRAMES - 1 and [failure.frame for failure in summary.failures] == ["000000"]
+
+
+def test_frames_without_times_are_not_silently_given_those_of_ten_a_second(drive, tmp_path):
+    path = tmp_path / "given.txt"
+    (drive / "times.txt").unlink()
+    path.write_text(drives.tum_poses(N_FRAMES, period_s=0.5))
+    with pytest.warns(
+        LdlsWarning, match=r"given\.txt: frames of .* taken 0\.1 s apart from 0; .* 0\.0+ to 3\.50+ s; add"
+    ):
+        assert run(drive, tmp_path / "out", poses=str(path)).n_done == N_FRAMES
+    path.write_text("".join(f"{1767528000 + 0.1 * k:.6f} {0.3 * k:.6f} 0 0 0 0 0 1\n" for k in range(N_FRAMES)))
+    with pytest.raises(PoseError, match=r"poses from 1767528000\.0+ to .*, which is at none of the frames; add stamps"):
+        run(drive, tmp_path / "none", poses=str(path))
+    assert not (tmp_path / "none").exists()
+    path.write_text(drives.kitti_poses(N_FRAMES))
+    assert run(drive, tmp_path / "kitti", poses=str(path)).n_done == N_FRAMES
+
+
+@pytest.mark.parametrize("missing", ["velodyne/000003.bin", "image_2/000003.png"])
+def test_a_file_of_poses_may_have_those_of_frames_that_are_left_out(drive, tmp_path, missing):
+    path = tmp_path / "given.txt"
+    path.write_text(drives.kitti_poses(N_FRAMES))
+    (drive / missing).unlink()
+    part = missing.split("/")[0]
+    # a sweep that is not there is not missed; an image is
+    opening = (lambda: pytest.warns(LeftOutWarning)) if part == "image_2" else nullcontext
+    with opening():
+        assert not run(drive, tmp_path / "out", poses=str(path)).failures
+    assert runs.records(tmp_path / "out")["000004"]["pose"][0][3] == pytest.approx(4 * drives.STEP_M)
+    lines = path.read_text().splitlines(keepends=True)
+    del lines[3]
+    path.write_text("".join(lines))
+    with opening():
+        assert not run(drive, tmp_path / "kept", poses=str(path)).failures
+    assert runs.records(tmp_path / "kept")["000004"]["pose"][0][3] == pytest.approx(4 * drives.STEP_M)
+    path.write_text("".join(lines[:-1]))
+    expected = rf"has 6 poses for the 7 frames of .*, which left out 1 \(1 no {part}\), expected .* out \(000003\)"
+    with opening(), pytest.raises(PoseError, match=expected):
+        run(drive, tmp_path / "none", poses=str(path))
 
 
 def test_a_file_of_poses_of_another_drive_is_refused(drive, tmp_path):
@@ -440,6 +509,6 @@ def test_poses_that_say_nothing_of_a_sweep_fail_its_frame_alone(timed, tmp_path)
     way = "".join(f"{stamp:.6f} {0.1 * k} 0 0 0 0 0 1\n" for k, stamp in enumerate(source.stamps[2:]))
     (tmp_path / "given.txt").write_text(way)
     run(timed, tmp_path / "out", masks=str(timed / "masks_02"), sweeps=0, poses=str(tmp_path / "given.txt"))
-    failed = {name: record["error"] for name, record in records(tmp_path / "out").items() if "error" in record}
+    failed = {name: record["error"] for name, record in runs.records(tmp_path / "out").items() if "error" in record}
     assert [name[-1] for name in failed] == ["0", "1"]
     assert all("given.txt: stamp: no pose at" in error["message"] for error in failed.values())

@@ -14,8 +14,10 @@ from typer.testing import CliRunner
 
 import ldls
 from batch import drives, runs
+from datasets import layouts
 from ldls import batch
 from ldls.batch import run_tracks
+from ldls.batch.poses import Poses
 from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import (
@@ -325,9 +327,19 @@ def test_sweeps_in_disorder_are_refused_before_anything_is_done(drive, tmp_path)
     (drive / "times.txt").write_text("".join(f"{stamp:e}\n" for stamp in stamps))
     (drive / "poses.txt").unlink()
     (tmp_path / "poses.txt").write_text(drives.tum_poses(8))
-    with pytest.raises(PoseError, match=r"frame 000004 \(0\.240000 s\) comes after 000003 \(0\.250000 s\)"):
+    said = r"frame 000004 \(0\.240000 s\) comes after 000003 .*; mend the stamps of the source$"
+    with pytest.raises(PoseError, match=said):
         run(drive, tmp_path / "out", poses=str(tmp_path / "poses.txt"))
     assert not (tmp_path / "out").exists()
+
+
+def test_scenes_in_disorder_are_told_of_the_option_that_takes_one(tmp_path):
+    source = open_source(layouts.nuscenes(tmp_path))
+    source.stamps = source.stamps[::-1]
+    chosen = tuple(enumerate(source.names))
+    settings = batch.RunSettings(masks="masks", track=True)
+    with pytest.raises(PoseError, match="comes after .*; take one drive by --option scene=NAME"):
+        Poses(source, settings).check(chosen)
 
 
 def test_two_frames_of_one_stamp_are_not_tracked_and_begin_a_window_without_tracks(drive, tmp_path):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import pairwise
@@ -15,11 +16,15 @@ from numpy.typing import NDArray
 from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames
 from ldls.datasets import Frame, Source, odometry_of
+from ldls.datasets.file_source import counts_of
+from ldls.datasets.nuscenes import NuScenesSource
 from ldls.datasets.odometry import PERIOD_S
-from ldls.errors import BatchError, LdlsError, PoseError, within
+from ldls.errors import BatchError, LdlsError, LdlsWarning, PoseError, some, within
 from ldls.io import read_poses
-from ldls.io.files import digest_of
-from ldls.io.poses import tum
+from ldls.io.files import MAX_TEXT_BYTES, digest_of, open_file
+from ldls.io.names import name_order
+from ldls.io.poses import kitti, tum
+from ldls.io.poses.pose_rows import pose_rows
 from ldls.io.poses.read import format_of
 from ldls.sequences import Trajectory
 
@@ -125,11 +130,17 @@ class Poses:
             try:
                 yield
             except PoseError as error:
-                if path.name != FOUND_POSES or not holds_found_poses(path.parent):
+                if not self._are_found:
                     raise
                 raise PoseError(
                     f"{error}; or, if a sweep was mended, give another --out to find the way anew"
                 ) from None
+
+    @property
+    def _are_found(self) -> bool:
+        """True for a file of poses that a run found."""
+        path = Path(str(self._settings.poses))
+        return path.name == FOUND_POSES and holds_found_poses(path.parent)
 
     def check(self, chosen: Frames) -> None:
         """Refuse, before any work, frames without poses where they are needed, or in another order than their stamps.
@@ -137,6 +148,7 @@ class Poses:
         Raises:
             PoseError: There is no stamp or no pose, or stamps do not ascend where objects are tracked.
         """
+        self._check_clock(chosen)
         if not self._settings.sweeps and not self._settings.track:
             return
         named = zip(self._source.names, self.stamps, strict=True)
@@ -155,9 +167,11 @@ class Poses:
                     "ascending stamps to track objects; mend the stamps of the source, or take one of these frames out "
                     "of it"
                 )
+            one_drive = "take one drive by --option scene=NAME"
+            mend = one_drive if self._source.kind == NuScenesSource.kind else "mend the stamps of the source"
             raise PoseError(
                 f"{self._source.path}: frame {other} ({after:.6f} s) comes after {one} ({before:.6f} s), expected "
-                "ascending stamps to track objects; take one drive, as by --option scene=NAME"
+                f"ascending stamps to track objects; {mend}"
             )
         if self._trajectory is None and not self._has_poses(chosen):
             # only sources whose frames may have poses say what these come with
@@ -168,6 +182,26 @@ class Poses:
                 f"{ODOMETRY}"
             )
 
+    def _check_clock(self, chosen: Frames) -> None:
+        """Warn of a file with stamps for frames that have none of their own; refuse one that has a pose of none."""
+        trajectory = self._trajectory
+        if trajectory is None or any(stamp is not None for stamp in _own_stamps(self._source)) or self._are_found:
+            return
+        # a file of KITTI's has no stamps and takes those of the frames
+        if np.array_equal(trajectory.stamps, np.array(self.stamps, np.float64)):
+            return
+        first, last = float(trajectory.stamps[0]), float(trajectory.stamps[-1])
+        message = (
+            f"{self._settings.poses}: frames of {self._source.path} have no times, and are taken {PERIOD_S:g} s apart "
+            f"from 0; the file has poses from {first:.6f} to {last:.6f} s"
+        )
+        stamps = [stamp for index, _ in chosen if (stamp := self.stamps[index]) is not None]
+        if not any(first - trajectory.margin_s <= stamp <= last + trajectory.margin_s for stamp in stamps):
+            raise PoseError(f"{message}, which is at none of the frames; add stamps to the source")
+        warnings.warn(
+            f"{message}; add stamps to the source if its frames are of other times", LdlsWarning, stacklevel=4
+        )
+
     def _has_poses(self, chosen: Frames) -> bool:
         """False if the first frame that can be read and has a stamp has no pose."""
         stamped = [index for index, _ in chosen if self.stamps[index] is not None]
@@ -176,15 +210,19 @@ class Poses:
 
 
 def _stamps(source: Source, settings: RunSettings) -> tuple[float | None, ...]:
-    # sources of others may have no such attribute
-    stamps = tuple(getattr(source, "stamps", (None,) * len(source)))
+    stamps = _own_stamps(source)
     if settings.poses is None or any(stamp is not None for stamp in stamps):
         return stamps
     return tuple(PERIOD_S * number for number in range(len(source)))
 
 
+def _own_stamps(source: Source) -> tuple[float | None, ...]:
+    # sources of others may have no such attribute
+    return tuple(getattr(source, "stamps", (None,) * len(source)))
+
+
 def _trajectory(path: Path, source: Source, times: tuple[float | None, ...]) -> Trajectory:
-    """The way of the lidar by a file; a file of KITTI's has a line for each frame of the source."""
+    """The way of the lidar by a file; one of KITTI's has a line for each frame of the source, or those left out too."""
     if format_of(path) != "kitti":
         return read_poses(path)
     stamps = [stamp for stamp in times if stamp is not None]
@@ -196,7 +234,31 @@ def _trajectory(path: Path, source: Source, times: tuple[float | None, ...]) -> 
     # where none can be read, the first says why
     frame = next(_readable(source, range(len(source))), None) or source[0]
     with within(path):
-        return read_poses(path, stamps=stamps, T_camera_lidar=frame.images[0].camera.T_camera_lidar)
+        T_camera_lidar = frame.images[0].camera.T_camera_lidar
+        return kitti.read(path, stamps=stamps, T_camera_lidar=T_camera_lidar, chosen=_lines(path, source))
+
+
+def _lines(path: Path, source: Source) -> list[int] | slice:
+    """Which poses of a file of KITTI's are those of the frames, by their number in it.
+
+    Raises:
+        PoseError: The source left out frames, and the file has a line neither for each frame that it kept nor for all.
+    """
+    left_out: Mapping[str, str] = getattr(source, "left_out", {})
+    every = sorted([*source.names, *left_out], key=name_order)
+    kept = [number for number, name in enumerate(every) if name not in left_out]
+    with open_file(path, "file of poses", limit=MAX_TEXT_BYTES) as file:
+        n_poses = len(pose_rows(file.text()))
+    if not left_out or n_poses == len(source):
+        return slice(None)
+    # frames in another order than that of their names cannot be told from those left out
+    if n_poses != len(every) or [every[number] for number in kept] != list(source.names):
+        raise PoseError(
+            f"has {n_poses} poses for the {len(source)} frames of {source.path}, which left out {len(left_out)} "
+            f"({counts_of(left_out.values())}), expected a line for each frame, or for each and those left out "
+            f"({some([*left_out])})"
+        )
+    return kept
 
 
 def _readable(source: Source, indices: Iterable[int]) -> Iterator[Frame]:

@@ -12,6 +12,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import ldls._ldls as _ldls
 from ldls.batch.engines import Engine, EngineOptions, open_engine
 from ldls.batch.frame_work import Earlier, FrameWork
@@ -35,10 +37,19 @@ from ldls.batch.summary import (
 from ldls.batch.window import Frames, Outcome
 from ldls.checks import checked
 from ldls.datasets import Source, open_source
-from ldls.errors import ChangedFileWarning, LeftOutWarning, NothingInView, NoUsablePoints, ParameterError, some
+from ldls.errors import (
+    ChangedFileWarning,
+    LdlsWarning,
+    LeftOutWarning,
+    NothingInView,
+    NoUsablePoints,
+    ParameterError,
+    some,
+)
 from ldls.io.files import check_outputs, sweep
 from ldls.io.objects import objects_writer
 from ldls.segmenters.registry import segmenter_file
+from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.viewing.formats import BAG, ENDINGS, RESULT, TRACKS, file_name
 
 GROUP_S = 0.5
@@ -110,7 +121,10 @@ def run(
         KeyboardInterrupt: It was interrupted; failures.jsonl has the frames that failed until then.
     """
     options = dict(options or {})
-    opened = open_source(source, **{"truth": False, **options}) if isinstance(source, str | PathLike) else source
+    if isinstance(source, str | PathLike):
+        opened = open_source(source, **{"truth": False, "poses": settings.poses is None, **options})
+    else:
+        opened = source
     runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
     chosen = chosen_of(opened, frames)
     names = [name for _, name in chosen]
@@ -133,7 +147,7 @@ def run(
     settings = with_odometry(opened, settings, folder)
     poses = Poses(opened, settings)
     poses.check(chosen)
-    windows = windows_of(chosen, poses.stamps, settings.sweeps)
+    windows = _windows(opened, chosen, poses.stamps, settings.sweeps)
     folder.mkdir(parents=True, exist_ok=True)
     with only_run(folder):
         sweep(folder)
@@ -200,6 +214,19 @@ def run(
         seconds=dict(seconds),
         elapsed=elapsed,
     )
+
+
+def _windows(source: Source, chosen: Frames, stamps: Sequence[float | None], sweeps: int) -> list[Frames]:
+    """The windows of `windows_of`; warns if each of several sweeps that were to be joined is alone in its own."""
+    windows = windows_of(chosen, stamps, sweeps)
+    if sweeps and len(windows) == len(chosen) > 1:
+        gap_s = np.median(np.diff([stamp for index, _ in chosen if (stamp := stamps[index]) is not None]))
+        message = (
+            f"{source.path}: no sweep comes within {LONGEST_GAP_S:g} s after the one before (median gap {gap_s:g} s), "
+            "so that each is labelled alone; are stamps in seconds?"
+        )
+        warnings.warn(message, LdlsWarning, stacklevel=3)
+    return windows
 
 
 def _inputs(source: Source, settings: RunSettings) -> Iterator[str | Path | None]:

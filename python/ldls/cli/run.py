@@ -133,7 +133,7 @@ def run(
         track=track,
     )
     options = parse_options(option or [])
-    opened = open_source(source, kind=dataset, **{"truth": False, **options})
+    opened = open_source(source, kind=dataset, **{"truth": False, "poses": poses is None, **options})
     chosen = parse_frames(frames)
     say_own_masks(opened, masks, segmenter)
     finished = failed = 0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ldls.camera import Camera
 from ldls.cloud import Points
 from ldls.datasets.frame import CameraImage, Frame
-from ldls.errors import InputError, LeftOutWarning, SourceError, some, within
+from ldls.errors import InputError, LeftOutWarning, PoseError, SourceError, some, within
 from ldls.io import read_image, read_points
 from ldls.io.labels import read_labeling
 from ldls.io.names import name_order
@@ -113,7 +113,10 @@ class FileSource:
         if self._trajectory is None or stamp is None:
             return None
         with within(f"{self.path}, pose of frame {self.names[index]}"):
-            return self._trajectory.at(stamp)
+            try:
+                return self._trajectory.at(stamp)
+            except PoseError as error:
+                raise PoseError(f"{error}; or open the source with poses=False") from None
 
     def _image(self, camera: str, index: int) -> CameraImage:
         """The image of a camera in a frame."""

@@ -51,6 +51,7 @@ class KittiOdometrySource(FileSource):
         sequence: str | int | None = None,
         camera: int | Sequence[int] = 2,
         truth: bool = True,
+        poses: bool = True,
     ) -> None:
         """Look for the frames.
 
@@ -59,6 +60,7 @@ class KittiOdometrySource(FileSource):
             sequence: Name of the sequence where there are several, as "08" or 8.
             camera: Number of the camera, 0 to 3, or several; 2 is the left colour camera.
             truth: Give frames their truth, where it is there.
+            poses: Give frames their poses, where they are there.
 
         Raises:
             SourceError: A folder is missing, no frame is whole, or there are fewer times than frames.
@@ -76,7 +78,7 @@ class KittiOdometrySource(FileSource):
         calib = path / "calib.txt"
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}
         self.stamps = _read_stamps(path, self.names)
-        self._poses_file = _poses_file(path)
+        self._poses_file = _poses_file(path) if poses else None
         self._trajectory = _trajectory(path, self._poses_file, next(iter(self._cameras.values())))
 
     @classmethod

@@ -73,6 +73,7 @@ class KittiRawSource(FileSource):
         camera: int | Sequence[int] = 2,
         drive: str | None = None,
         truth: bool = True,
+        poses: bool = True,
     ) -> None:
         """Look for the frames.
 
@@ -81,6 +82,7 @@ class KittiRawSource(FileSource):
             camera: Number of the camera, 0 to 3, or several as a ring; 2 is the left colour camera.
             drive: Name of the drive's folder, if `path` is that of a day with several.
             truth: Give frames their truth, where it is there.
+            poses: Give frames their poses, where they are there.
 
         Raises:
             SourceError: A folder is missing, no frame is whole, or there are fewer stamps than frames.
@@ -98,7 +100,7 @@ class KittiRawSource(FileSource):
         images = {name: find_images(path / name / "data") for name in cameras}
         super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
         self.stamps = _stamps(path / LIDAR, self.names)
-        self._trajectory = _trajectory(path)
+        self._trajectory = _trajectory(path) if poses else None
         self._measured = _measured(path) if self._trajectory is not None else ()
         self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}
         self._turns = _turns(path / LIDAR, self.names)

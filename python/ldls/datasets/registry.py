@@ -59,6 +59,7 @@ def open_source(
     *,
     kind: str | None = None,
     truth: bool | str = True,
+    poses: bool = True,
     **options: Any,  # noqa: ANN401
 ) -> Source:
     """The source of frames at a path.
@@ -67,6 +68,7 @@ def open_source(
         path: A folder, or a file such as a bag.
         kind: One of `SOURCES`; by default the only one that recognises the path.
         truth: Give frames their truth, where the source has any; it takes time to read. A text names its kind.
+        poses: Give frames their poses, where the source reads any from files beside its frames.
         options: Those of the kind's class, as `camera` or `scene`.
 
     Raises:
@@ -82,8 +84,8 @@ def open_source(
         hint = f"; did you mean {near[0]}?" if near else ""
         raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(SOURCES)}{hint}")
     source = SOURCES[guess_kind(path) if kind is None else kind]
-    if "truth" in check_options(source.kind, source, options):
-        options["truth"] = truth
+    known = check_options(source.kind, source, options)
+    options |= {name: value for name, value in (("truth", truth), ("poses", poses)) if name in known}
     return source(path, **options)
 
 

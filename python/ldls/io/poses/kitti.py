@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,17 @@ from ldls.sequences import Trajectory
 COLUMNS = "r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz"
 
 
-def read(path: Path, *, stamps: ArrayLike | None = None, T_camera_lidar: Extrinsic | None = None) -> Trajectory:
+def read(
+    path: Path,
+    *,
+    stamps: ArrayLike | None = None,
+    T_camera_lidar: Extrinsic | None = None,
+    chosen: Sequence[int] | slice = slice(None),
+) -> Trajectory:
     """Trajectory of the lidar, whose first pose is that of the world.
 
-    A line is the pose P of camera 0, and T_world_lidar = T_camera_lidar^-1 P T_camera_lidar.
+    A line is the pose P of camera 0, and T_world_lidar = T_camera_lidar^-1 P T_camera_lidar. Stamps are those of the
+    `chosen` poses, by their number in the file.
 
     Raises:
         PoseError: Stamps or transform are not given, are not of these poses, or a pose jumps.
@@ -41,9 +49,10 @@ def read(path: Path, *, stamps: ArrayLike | None = None, T_camera_lidar: Extrins
         poses[:, :3] = rows.reshape(-1, 3, 4)
         for number, pose in zip(lines, poses, strict=True):
             rigid(f"line {number}", pose, CorruptFileError)
-    if np.size(stamps) != len(rows):
+    poses = poses[chosen]
+    if np.size(stamps) != len(poses):
         raise PoseError(
-            f"{path}: has {len(rows)} poses for {np.size(stamps)} stamps, expected a line for each sweep of the drive"
+            f"{path}: has {len(poses)} poses for {np.size(stamps)} stamps, expected a line for each sweep of the drive"
         )
     times = numbers("stamps", stamps, np.float64, ("n",))
     back = np.flatnonzero(np.diff(times) <= 0)
