@@ -33,10 +33,6 @@ def labelled(monkeypatch):
     return done
 
 
-def times(out):
-    return {path.name: path.stat().st_mtime_ns for path in out.iterdir() if path.name != "journal.jsonl"}
-
-
 @pytest.fixture
 def whole(few, tmp_path):
     """The files of a run that had all formats and frames from the start."""
@@ -56,11 +52,11 @@ def whole(few, tmp_path):
 def test_formats_that_are_added_end_with_the_same_bytes(few, tmp_path, whole, labelled, first, then, n_labelled):
     out = tmp_path / "out"
     run(few, out, *first)
-    before = times(out)
+    before = runs.times(out)
     labelled.clear()
     assert run(few, out, *then).n_done == 12
     assert len(labelled) == n_labelled
-    assert {name: times(out)[name] for name in before} == before
+    assert {name: runs.times(out)[name] for name in before} == before
     expected = {name: content for name, content in whole.items() if not name.endswith("jsonl")}
     assert {name: content for name, content in runs.contents(out).items() if not name.endswith("jsonl")} == expected
     assert runs.contents(out)["journal.jsonl"] == whole["journal.jsonl"]
@@ -147,8 +143,7 @@ def test_frames_of_which_the_source_has_no_more_stay_in_the_journal(few, tmp_pat
     for part, ending in (("velodyne", "bin"), ("calib", "txt"), ("image_2", "png")):
         (few / f"{part}/000004.{ending}").unlink()
     assert run(few, out, "npz", "label").n_done == 11
-    frames = [json.loads(line)["frame"] for line in (out / "journal.jsonl").read_text().splitlines()[1:]]
-    assert frames == [*(f"{k:06d}" for k in range(12) if k != 4), "000004"]
+    assert list(runs.records(out)) == [*(f"{k:06d}" for k in range(12) if k != 4), "000004"]
 
 
 @pytest.mark.parametrize(

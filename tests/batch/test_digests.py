@@ -1,7 +1,6 @@
 """Results and inputs that were changed behind a run's back are noticed by their digests."""
 
 import hashlib
-import json
 import os
 from pathlib import Path
 
@@ -17,11 +16,6 @@ from ldls.segmenters import SEGMENTERS, BoxSegmenter
 def run(source, out, **settings):
     settings = {"masks": str(source / "masks"), **settings}
     return batch.run(source, out, batch.RunSettings(**settings))
-
-
-def records(out):
-    _, *lines = (out / "journal.jsonl").read_text().splitlines()
-    return {record["frame"]: record for record in map(json.loads, lines)}
 
 
 def overwrite(path):
@@ -69,7 +63,9 @@ def test_an_input_changed_with_the_same_size_and_time_is_refused(few, tmp_path, 
 @pytest.mark.parametrize(("formats", "is_read"), [(("label",), False), (("label", "png"), True)])
 def test_images_have_a_digest_where_they_are_read(few, tmp_path, formats, is_read):
     run(few, tmp_path / "out", formats=formats)
-    (image,) = [state for path, state in records(tmp_path / "out")["000004"]["inputs"].items() if path.endswith(".png")]
+    (image,) = [
+        state for path, state in runs.records(tmp_path / "out")["000004"]["inputs"].items() if path.endswith(".png")
+    ]
     assert (image[2] is not None) == is_read
 
 
@@ -90,7 +86,7 @@ def test_a_file_that_all_frames_share_is_read_once(few, tmp_path, monkeypatch):
 def test_files_of_many_frames_are_known_by_size_and_time(few, tmp_path, monkeypatch):
     monkeypatch.setattr(known_files, "LARGEST_DIGESTED_BYTES", 1500)
     run(few, tmp_path / "out")
-    states = {Path(path).suffix: state for path, state in records(tmp_path / "out")["000004"]["inputs"].items()}
+    states = {Path(path).suffix: state for path, state in runs.records(tmp_path / "out")["000004"]["inputs"].items()}
     assert states[".bin"][0] > 1500
     assert states[".bin"][2] is None
     assert len(states[".txt"][2]) == 64
@@ -99,7 +95,7 @@ def test_files_of_many_frames_are_known_by_size_and_time(few, tmp_path, monkeypa
 
 def test_the_journal_holds_the_digests_of_the_files(few, tmp_path):
     run(few, tmp_path / "out")
-    record = records(tmp_path / "out")["000004"]
+    record = runs.records(tmp_path / "out")["000004"]
     for path, (size, _, digest) in [*record["inputs"].items()]:
         content = Path(path).read_bytes()
         assert (size, digest) in {(len(content), hashlib.sha256(content).hexdigest()), (len(content), None)}

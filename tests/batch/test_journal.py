@@ -84,7 +84,7 @@ def test_a_record_of_another_shape_is_refused(finished, content):
         again()
 
 
-def test_records_name_no_files_outside_the_folder(finished, few):
+def test_records_name_no_files_outside_the_folder(finished):
     journal, again = finished
     changed = journal.read_bytes().replace(b'"000001.label"', b'"../../etc/x"')
     journal.write_bytes(changed)

@@ -161,6 +161,5 @@ def test_the_journal_has_the_cause(astray, tmp_path):
     with pytest.warns(NothingInView):
         summary = batch.run(astray, tmp_path / "out", batch.RunSettings(masks=str(astray / "masks")))
     assert summary.n_nothing_in_view == 4
-    _, *lines = (tmp_path / "out/journal.jsonl").read_text().splitlines()
-    causes = {record["frame"]: record["nothing_in_view"] for record in map(json.loads, lines)}
+    causes = {frame: record["nothing_in_view"] for frame, record in runs.records(tmp_path / "out").items()}
     assert [frame for frame, cause in causes.items() if cause] == ["000001", "000004", "000006", "000009"]

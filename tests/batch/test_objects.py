@@ -101,7 +101,7 @@ def test_the_command_writes_it_where_it_is_called(few, expected, tmp_path, monke
     assert "objects in objects.csv" in outcome.output
 
 
-def test_boxes_of_kitti_are_a_format(few, settings, tmp_path):
+def test_boxes_of_kitti_are_a_format(few, tmp_path):
     shutil.rmtree(few / "label_2", ignore_errors=True)
     outcome = runs.resumed(runs.arguments(few, tmp_path / "out", "--formats", "kitti-boxes,npz", "--frames", ":2"))
     assert outcome.exit_code == 0, outcome.output

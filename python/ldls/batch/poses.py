@@ -28,7 +28,7 @@ from ldls.io.poses.pose_rows import pose_rows
 from ldls.io.poses.read import format_of
 from ldls.sequences import Trajectory
 
-ODOMETRY = "kiss-icp"
+KISS_ICP = "kiss-icp"
 """What stands in the place of a file where the sweeps themselves are to say how the lidar moved."""
 FOUND_POSES = "poses.txt"
 """File in the folder of the run that these poses are kept in, in TUM's format."""
@@ -44,13 +44,13 @@ def with_odometry(source: Source, settings: RunSettings, folder: Path) -> RunSet
         LdlsError: The sweeps do not say how the lidar moved; see `ldls.datasets.odometry_of`.
         ImportError: `ldls[odometry]` is not installed.
     """
-    if settings.poses != ODOMETRY:
+    if settings.poses != KISS_ICP:
         return settings
     path = folder / FOUND_POSES
     if not holds_found_poses(folder):
         if os.path.lexists(path):
             raise BatchError(
-                f"{path}: is there, no run here wrote it, and poses by {ODOMETRY} would take its place; take them from "
+                f"{path}: is there, no run here wrote it, and poses by {KISS_ICP} would take its place; take them from "
                 f"it by --poses {path}, or give another --out"
             )
         trajectory = odometry_of(source)
@@ -92,7 +92,7 @@ class Poses:
             path = Path(settings.poses)
             if path.is_dir() or not path.exists():
                 found = "a folder" if path.is_dir() else "no such file"
-                raise FileNotFoundError(f"{path}: {found}, expected a file of poses by TUM or KITTI, or {ODOMETRY}")
+                raise FileNotFoundError(f"{path}: {found}, expected a file of poses by TUM or KITTI, or {KISS_ICP}")
             self.sha256 = digest_of(path)
             self._trajectory = _trajectory(path, source, self.stamps)
 
@@ -179,7 +179,7 @@ class Poses:
             raise PoseError(
                 f"{self._source.path}: frames of this source ({self._source.kind}) have no poses, expected them for "
                 f"--sweeps and --track; {f'they come with {own}; else ' if own else ''}give --poses FILE, or --poses "
-                f"{ODOMETRY}"
+                f"{KISS_ICP}"
             )
 
     def _check_clock(self, chosen: Frames) -> None:

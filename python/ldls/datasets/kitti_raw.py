@@ -99,10 +99,10 @@ class KittiRawSource(FileSource):
         points = find_points(path / LIDAR / "data")
         images = {name: find_images(path / name / "data") for name in cameras}
         super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
-        self.stamps = _stamps(path / LIDAR, self.names)
+        self.stamps = _stamps(path / LIDAR / STAMPS, self.names)
         self._trajectory = _trajectory(path) if poses else None
         self._measured = _measured(path) if self._trajectory is not None else ()
-        self._image_stamps = {name: _stamps(path / name, self.names) for name in cameras}
+        self._image_stamps = {name: _stamps(path / name / STAMPS, self.names) for name in cameras}
         self._turns = _turns(path / LIDAR, self.names)
 
     @classmethod
@@ -176,16 +176,16 @@ def _trajectory(path: Path) -> Trajectory | None:
 def _measured(path: Path) -> tuple[Path, ...]:
     """The file of each pose; what has no stamp is none."""
     files = find_files(path / OXTS / "data", (".txt",))
-    stamps = _stamps(path / OXTS, tuple(files))
+    stamps = _stamps(path / OXTS / STAMPS, tuple(files))
     return tuple(file for file, stamp in zip(files.values(), stamps, strict=True) if stamp is not None)
 
 
 def _turns(folder: Path, names: Sequence[str]) -> tuple[tuple[float, float] | None, ...]:
     """When each sweep begins and ends; None where that is not known."""
-    starts, ends = (read_stamps(folder / name, names, clock_seconds, example=CLOCK_EXAMPLE) for name in (START, END))
+    starts, ends = (_stamps(folder / name, names) for name in (START, END))
     pairs = zip(starts, ends, strict=True)
     return tuple(None if start is None or end is None else (start, end) for start, end in pairs)
 
 
-def _stamps(folder: Path, names: Sequence[str]) -> tuple[float | None, ...]:
-    return read_stamps(folder / STAMPS, names, clock_seconds, example=CLOCK_EXAMPLE)
+def _stamps(path: Path, names: Sequence[str]) -> tuple[float | None, ...]:
+    return read_stamps(path, names, clock_seconds, example=CLOCK_EXAMPLE)
