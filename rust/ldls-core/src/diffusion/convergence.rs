@@ -12,7 +12,7 @@ pub struct Convergence {
     pub sweeps: usize,
     /// Largest change of any likelihood that one more product would make, where that bounded the run.
     pub residual: Option<f64>,
-    /// Estimate of the largest error of a likelihood from the terms that the series leaves out.
+    /// Estimate of the largest error of a likelihood from the terms that the series leaves out, and from rounding where that may grow.
     pub error: f64,
     /// Points at which labels were too near to one another for single precision.
     pub refined: usize,

@@ -126,7 +126,11 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         }
         self.initial = Values::none();
         self.advance(&vec![Step::product(); series.products_left], cancel)?;
-        self.add_rounding();
+        let rounding = self.rounding(cancel)?;
+        let errors = self.errors.par_iter_mut().with_min_len(ROWS_A_TASK);
+        errors
+            .zip(rounding)
+            .for_each(|(error, rounding)| *error += rounding);
         let errors = self.errors.par_iter().with_min_len(ROWS_A_TASK).copied();
         self.convergence.error = errors.reduce(|| 0.0, f32::max).into();
         Ok(())
@@ -236,13 +240,12 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         tabulate(self.a.len(), error, cancel)
     }
 
-    /// Adds to the errors by how much the values of all labels at a point sum to another number than went through the recurrence as
-    /// their sum.
-    fn add_rounding(&mut self) {
+    /// By how much the values of all labels at each point sum to another number than went through the recurrence as their sum;
+    /// nothing where there is no lane of that.
+    fn rounding(&self, cancel: &Cancel) -> Result<Vec<f32>> {
         let Some(lane) = self.seeds.plan.sum else {
-            return;
+            return Ok(Vec::new());
         };
-        let mut errors = std::mem::take(&mut self.errors);
         let groups: Vec<_> = self.groups().collect();
         let sum = self.z.group(lane / WIDTH);
         let rounding = |point: usize| {
@@ -253,11 +256,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
             let of_labels: f64 = groups.iter().map(of_group).sum();
             (sum[point][lane % WIDTH].to_f64() - of_labels).abs() as f32
         };
-        let of_points = errors.par_iter_mut().enumerate();
-        let of_points = of_points.with_min_len(ROWS_A_TASK);
-        of_points.for_each(|(point, error)| *error += rounding(point));
-        drop(groups);
-        self.errors = errors;
+        tabulate(self.a.len(), rounding, cancel)
     }
 
     /// True if at most `most_left_out` is left out, no likelihood is negative or larger than the `largest` share of one label, and

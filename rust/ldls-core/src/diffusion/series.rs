@@ -103,8 +103,10 @@ impl Series {
     fn of_products(products: Option<usize>, [low, high]: [f64; 2], tolerance: f64) -> Self {
         let (middle, half_width) = (f64::midpoint(high, low), (high - low) / 2.0);
         let stages = products.map(|products| products.div_ceil(MOST_PRODUCTS).max(1));
-        let of_each = |stages| products.map(|products| (products / stages, products % stages));
-        let (of_stage, products_left) = stages.and_then(of_each).unwrap_or((MOST_PRODUCTS, 0));
+        let (of_stage, products_left) = match (products, stages) {
+            (Some(products), Some(stages)) => (products / stages, products % stages),
+            _ => (MOST_PRODUCTS, 0),
+        };
         let mut coefficients = geometric_sum(of_stage, middle, half_width);
         let mut power = if stages == Some(1) {
             Vec::new()
