@@ -74,7 +74,8 @@ pub fn diffusion(data: &[u8]) -> Outcome {
     };
     let n_labels = 1 + [bytes.below(3), bytes.below(9), bytes.below(40)][bytes.below(3)];
     let (labels, mass) = random_labels(&mut bytes, graph.points(), n_labels);
-    let iterations = [Some(1 + bytes.below(12)), Some(1 + bytes.below(300)), None][bytes.below(3)];
+    let some = [12, 300, 1200].map(|most| Some(1 + bytes.below(most)));
+    let iterations = [some[0], some[1], some[2], None][bytes.below(4)];
     let (a, b) = system::<f32>(&graph, &labels, &mass);
 
     let (found, convergence) =
