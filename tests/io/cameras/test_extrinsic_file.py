@@ -14,6 +14,7 @@ BACK = np.linalg.inv(T)
 PARTS = {"pose_of": "camera", "translation": BACK[:3, 3].tolist(), "rotation": BACK[:3, :3].tolist()}
 QUATERNION = {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5}
 ROS = {"pose_of": "camera", "translation": dict(zip("xyz", PARTS["translation"], strict=True)), "rotation": QUATERNION}
+NAMED = {key: value for key, value in ROS.items() if key != "rotation"}
 FILES = [
     pytest.param("a.txt", f"# lidar to camera\n{ROWS}\n", id="sixteen numbers"),
     pytest.param("a.txt", ROWS.rsplit("\n", 1)[0].replace(" ", ", "), id="twelve numbers with commas"),
@@ -27,6 +28,13 @@ FILES = [
         f'pose_of = "camera"\ntranslation = {PARTS["translation"]}\nquaternion_xyzw = {list(QUATERNION.values())}\n',
         id="TOML",
     ),
+    pytest.param(
+        "a.yaml",
+        f"pose_of: camera\ntranslation: {PARTS['translation']}\nquaternion_xyzw: [-.5, .5, -5e-1, 5e-1]\n",
+        id="YAML, numbers that it takes for text",
+    ),
+    pytest.param("a.json", json.dumps(NAMED | {"quaternion_xyzw": QUATERNION}), id="quaternion by its axes"),
+    pytest.param("a.json", json.dumps(NAMED | {"quaternion_wxyz": QUATERNION}), id="quaternion by its axes, w first"),
 ]
 
 
@@ -47,6 +55,9 @@ def test_a_transform_is_read_from_a_file(tmp_path, name, text):
             "a.json", json.dumps(PARTS | {"quat": 1}), "unknown key 'quat', expected T_camera_lidar", id="key"
         ),
         pytest.param("a.json", json.dumps(PARTS | {"optical": 3}), "optical: ", id="optical"),
+        pytest.param(
+            "a.json", json.dumps(ROS | {"quaternion_xyzw": [0, 0, 0, 1]}), "expected one of", id="two rotations"
+        ),
         pytest.param("a.txt", ROWS.replace("-1.0", "1.0", 1), "deviates|a mirror", id="mirror"),
     ],
 )

@@ -21,6 +21,9 @@ from ldls.io.files import open_file
 
 MAX_BYTES = 1 << 16
 PARTS = ("translation", "pose_of", "quaternion_wxyz", "quaternion_xyzw", "roll_pitch_yaw_deg", "rotation", "optical")
+WORDS = ("pose_of", "optical")
+AXES = {"translation": "xyz", "quaternion_wxyz": "wxyz", "quaternion_xyzw": "xyzw", "rotation": "xyzw"}
+"""Names of the numbers of parts, in their order."""
 MATRICES = ("T_camera_lidar", "T_lidar_camera")
 
 Extrinsic = ArrayLike | str | PathLike[str] | Mapping[str, Any]
@@ -95,17 +98,18 @@ def _from_table(fields: Fields) -> NDArray[np.float64]:
             f"{fields.place}: pose_of is missing; write 'camera' where it is the pose of the camera in the lidar "
             "frame, as in a URDF or /tf, and 'lidar' where it maps lidar to camera coordinates"
         )
-    parts: dict[str, Any] = dict(fields.entries)
-    parts["translation"] = _xyz(fields.get("translation"))
-    rotation = parts.get("rotation")
-    if isinstance(rotation, Mapping) and rotation.keys() == {"x", "y", "z", "w"}:
-        del parts["rotation"]
-        parts["quaternion_xyzw"] = [rotation[axis] for axis in "xyzw"]
+    fields.get("translation")
+    entries = {name: value for name, value in fields.entries.items() if value is not None}
+    rotation = entries.get("rotation")
+    if isinstance(rotation, Mapping) and rotation.keys() == set("xyzw") and "quaternion_xyzw" not in entries:
+        entries["quaternion_xyzw"] = entries.pop("rotation")
+    listed = Fields(fields.place, {name: _in_order(AXES.get(name, ""), value) for name, value in entries.items()})
+    # YAML takes 1e-05 for text, which `numbers` knows
+    parts: dict[str, Any] = {name: value if name in WORDS else listed.numbers(name) for name, value in entries.items()}
     with within(fields.place):
         return extrinsic(**parts)
 
 
-def _xyz(translation: object) -> Any:  # noqa: ANN401
-    """A list, or the names that ROS has."""
-    named = isinstance(translation, Mapping) and translation.keys() == {"x", "y", "z"}
-    return [translation[axis] for axis in "xyz"] if named else translation  # type: ignore[index]
+def _in_order(axes: str, value: object) -> object:
+    """The list of a value that has the names of its axes, as in ROS; any other value as it is."""
+    return [value[axis] for axis in axes] if isinstance(value, Mapping) and value.keys() == set(axes) else value
