@@ -58,6 +58,13 @@ def test_a_transform_is_read_from_a_file(tmp_path, name, text):
         pytest.param(
             "a.json", json.dumps(ROS | {"quaternion_xyzw": [0, 0, 0, 1]}), "expected one of", id="two rotations"
         ),
+        pytest.param("a.txt", "1 0 0 nan 0 1 0 0 0 0 1 0", "expected finite numbers, got nan", id="NaN"),
+        pytest.param(
+            "a.json",
+            '{"optical": true, "optical": false, ' + json.dumps(PARTS)[1:],
+            "'optical' stands there twice",
+            id="twice",
+        ),
         pytest.param("a.txt", ROWS.replace("-1.0", "1.0", 1), "deviates|a mirror", id="mirror"),
     ],
 )

@@ -60,8 +60,17 @@ def _read(path: Path) -> NDArray[np.float64]:
         if path.suffix.lower() == ".toml":
             return _from_table(Fields(str(path), tomllib.loads(text)))
         if text.lstrip().startswith("{"):
-            return _from_table(Fields(str(path), json.loads(text)))
+            return _from_table(Fields(str(path), json.loads(text, object_pairs_hook=_entries)))
         return _from_table(fields_of(text, str(path)))
+
+
+def _entries(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The entries of an object of JSON, which itself takes the last of those of one key."""
+    entries = dict(pairs)
+    if len(entries) < len(pairs):
+        twice = next(key for i, (key, _) in enumerate(pairs) if key in dict(pairs[:i]))
+        raise CalibrationError(f"key '{twice}' stands there twice")
+    return entries
 
 
 def _numbers(words: list[str]) -> NDArray[np.float64] | None:
@@ -78,6 +87,8 @@ def _from_numbers(place: str, numbers: NDArray[np.float64]) -> NDArray[np.float6
             f"{place}: expected the 12 or 16 numbers of T_camera_lidar by rows, got {numbers.size}"
             f"{hint if numbers.size in (6, 7) else ''}"
         )
+    if not np.isfinite(numbers).all():
+        raise CalibrationError(f"{place}: expected finite numbers, got {numbers[~np.isfinite(numbers)][0]}")
     transform = np.eye(4)
     transform.flat[: numbers.size] = numbers
     return rigid(place, transform)
