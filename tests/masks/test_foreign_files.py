@@ -1,5 +1,6 @@
 """Mask files of other programs, beside what their own documentation says of them."""
 
+import functools
 import json
 
 import numpy as np
@@ -165,19 +166,18 @@ def test_a_folder_of_one_png_an_instance(tmp_path):
         ldls.read_masks(tmp_path / "empty")
 
 
-@pytest.mark.parametrize("folder", ["", "panoptic"])
-def test_coco_panoptic(tmp_path, folder):
+def panoptic(path):
+    """The content of a JSON file of one image, whose PNG is written to `path`: a car, road and background."""
     colours = np.zeros((60, 80, 3), np.uint8)
     colours[SQUARE], colours[~SQUARE] = [44, 1, 2], [9, 0, 0]
     colours[0, 0] = [10, 0, 0]
-    (tmp_path / folder).mkdir(exist_ok=True)
-    Image.fromarray(colours).save(tmp_path / folder / "a.png")
+    Image.fromarray(colours).save(path)
     segments = [
         {"id": 44 + 256 + 2 * 65536, "category_id": 3},
         {"id": 9, "category_id": 7},
         {"id": 10, "category_id": 8},
     ]
-    content = {
+    return {
         "images": [{"id": 5, "height": 60, "width": 80, "file_name": "a.jpg"}],
         "annotations": [{"image_id": 5, "file_name": "a.png", "segments_info": segments}],
         "categories": [
@@ -186,14 +186,59 @@ def test_coco_panoptic(tmp_path, folder):
             {"id": 8, "name": "background", "isthing": 1},
         ],
     }
+
+
+@pytest.mark.parametrize("folder", ["", "panoptic"])
+def test_coco_panoptic(tmp_path, folder):
+    (tmp_path / folder).mkdir(exist_ok=True)
+    content = panoptic(tmp_path / folder / "a.png")
     (tmp_path / "panoptic.json").write_text(json.dumps(content))
     masks = ldls.read_masks(tmp_path / "panoptic.json")
     np.testing.assert_array_equal(pixels(masks), [SQUARE])
     assert masks.categories.tolist() == [3]
-    segments[0]["id"] = 1
+
+
+SEGMENT = ("annotations", 0, "segments_info", 0)
+NO_SEGMENT = {"image_id": 5, "file_name": "a.png", "segments_info": []}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        pytest.param({SEGMENT: {"id": 1, "category_id": 3}}, "segment 1 has no pixel in a.png", id="no such segment"),
+        pytest.param({(*SEGMENT, "id"): 9}, r"segments_info\[1\] has id 9, which another of", id="segment twice"),
+        pytest.param({(*SEGMENT, "id"): None}, r"segments_info\[0\] has id None", id="segment without id"),
+        pytest.param({(*SEGMENT, "category_id"): 4}, "category_id 4 is not among the cat", id="no such category"),
+        pytest.param({(*SEGMENT, "category_id"): [3]}, r"category_id \[3\] is not among", id="category of a list"),
+        pytest.param({SEGMENT[:3]: None}, "expected segments_info to be a list", id="no segments"),
+        pytest.param({("categories", 0, "id"): 7}, r"categories\[1\] has id 7, which another", id="category twice"),
+        pytest.param({("categories", 0, "id"): None}, r"categories\[0\] has id None", id="category without id"),
+        pytest.param({("categories",): None}, "expected categories to be a list", id="no list of categories"),
+        pytest.param({("categories",): ...}, "category_id 3 is not among the categories", id="no categories"),
+        pytest.param({("images", 0, "id"): ...}, r"images\[0\] has id None", id="image without id"),
+        pytest.param({("images",): ..., ("annotations", 0, "file_name"): ...}, "image 5 has file_name None", id="PNG"),
+        pytest.param({("annotations", 0, "image_id"): 6}, "image_id is 6, which no image has", id="other image"),
+        pytest.param({("annotations",): [NO_SEGMENT] * 2}, "one annotation of image 5, .* got 2", id="two of an image"),
+    ],
+)
+def test_faults_of_coco_panoptic_are_named(tmp_path, change, message):
+    content = panoptic(tmp_path / "a.png")
+    for (*within, last), value in change.items():
+        place = functools.reduce(lambda inner, key: inner[key], within, content)
+        if value is ...:
+            del place[last]
+        else:
+            place[last] = value
     (tmp_path / "panoptic.json").write_text(json.dumps(content))
-    with pytest.raises(ldls.CorruptFileError, match=r"panoptic\.json: segment 1 has no pixel"):
+    with pytest.raises(ldls.LdlsError, match=rf"panoptic\.json: .*{message}"):
         ldls.read_masks(tmp_path / "panoptic.json")
+
+
+def test_coco_panoptic_does_without_what_nobody_needs(tmp_path):
+    content = panoptic(tmp_path / "a.png")
+    del content["annotations"][0]["image_id"], content["categories"][0]["name"]
+    (tmp_path / "panoptic.json").write_text(json.dumps(content))
+    assert [mask.name for mask in ldls.read_masks(tmp_path / "panoptic.json")] == ["3"]
 
 
 def test_stuff_and_groups_of_cityscapes_are_background(tmp_path):

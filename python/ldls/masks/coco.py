@@ -40,7 +40,7 @@ def arguments(
         MaskError: An annotation cannot be used.
         CorruptFileError: It is not COCO's.
     """
-    annotations, images, own_names = _parts(content)
+    annotations, images, own_names = parts(content)
     names = own_names or names or COCO_NAMES
     image_id = chosen_image(annotations, images, image_id)
     chosen = [a for a in annotations if image_id is None or a.get("image_id") in (None, image_id)]
@@ -82,8 +82,12 @@ def results(masks: Iterable[InstanceMask], image_size: tuple[int, int], image_id
     ]
 
 
-def _parts(content: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, Any]], dict[Any, str]]:
-    """Annotations, images by id, and category names of a data set or a bare list of results."""
+def parts(content: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, Any]], dict[Any, str]]:
+    """Annotations, images by id, and category names of a data set or a bare list of results.
+
+    Raises:
+        CorruptFileError: It is neither.
+    """
     if isinstance(content, list | tuple):
         return _records("results", content), {}, {}
     if not isinstance(content, Mapping) or "annotations" not in content:

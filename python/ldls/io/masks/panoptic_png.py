@@ -16,7 +16,7 @@ from ldls.errors import CorruptFileError, MaskError
 from ldls.io.files import strictly_below
 from ldls.io.images import read_image
 from ldls.masks import InstanceMasks, instance_image
-from ldls.masks.coco import chosen_image
+from ldls.masks.coco import by_id, chosen_image, parts
 
 
 def is_panoptic(content: Mapping[str, Any]) -> bool:
@@ -34,40 +34,55 @@ def read(path: Path, content: Mapping[str, Any], *, image_id: int | str | None =
         image_id: Which image, where there are several.
 
     Raises:
-        MaskError: There is no such image, or several and none was chosen.
-        CorruptFileError: A segment that the PNG does not have, or a category that is not among the categories.
+        MaskError: There is no such image, or several and none was chosen; or a segment's category is not among the
+            categories.
+        CorruptFileError: A segment that the PNG does not have; a segment, category or annotation of the image that is
+            there twice; or the image's annotation, segments or PNG are not said.
         FileNotFoundError: The PNG is not there.
     """
-    annotations = content["annotations"]
-    chosen = chosen_image(annotations, {image["id"]: image for image in content.get("images", ())}, image_id)
-    (annotation,) = [a for a in annotations if a["image_id"] == chosen]
-    categories = {category["id"]: category for category in content["categories"]}
-    names = [strictly_below(folder, annotation["file_name"], place=str(path)) for folder in _folders(path)]
-    colours = read_image(next((name for name in names if name.exists()), names[0]))
+    annotations, images, names = parts(content)
+    annotation = _annotation(annotations, images, image_id)
+    file_name = annotation["file_name"]
+    segments = by_id("segments_info", annotation.get("segments_info"), (int,))
+    paths = [strictly_below(folder, file_name, place=str(path)) for folder in _folders(path)]
+    colours = read_image(next((each for each in paths if each.exists()), paths[0]))
     values = colours.astype(np.int64) @ [1, 256, 65536]
     numbers, rles = instance_image.split(values)
-    segments = {segment["id"]: segment["category_id"] for segment in annotation["segments_info"]}
     missing = sorted(segments.keys() - set(numbers.tolist()))
     if missing:
-        raise CorruptFileError(f"segment {missing[0]} has no pixel in {annotation['file_name']}")
-    unknown = sorted(set(segments.values()) - categories.keys())
-    if unknown:
-        raise MaskError(f"category_id {unknown[0]} is not among the categories")
-    things = [
-        (rle, segments[number])
+        raise CorruptFileError(f"segment {missing[0]} has no pixel in {file_name}")
+    category_of = {number: segment.get("category_id") for number, segment in segments.items()}
+    for number, category in category_of.items():
+        if type(category) is not int or category not in names:
+            raise MaskError(f"segment {number}: category_id {category!r} is not among the categories")
+    categories = by_id("categories", content.get("categories", []), (int,))
+    things = {i for i, category in categories.items() if category.get("isthing", 1) and is_object(names[i])}
+    drawn = [
+        (rle, category_of[number])
         for number, rle in zip(numbers.tolist(), rles, strict=True)
-        if number in segments and _is_thing(categories[segments[number]])
+        if number in category_of and category_of[number] in things
     ]
     return InstanceMasks(
-        [rle for rle, _ in things],
+        [rle for rle, _ in drawn],
         (values.shape[0], values.shape[1]),
-        categories=np.array([category for _, category in things], np.int64),
-        names={category: str(record["name"]) for category, record in categories.items()},
+        categories=np.array([category for _, category in drawn], np.int64),
+        names=names,
     )
 
 
-def _is_thing(category: Mapping[str, Any]) -> bool:
-    return bool(category.get("isthing", 1)) and is_object(str(category["name"]))
+def _annotation(
+    annotations: list[dict[str, Any]], images: Mapping[Any, dict[str, Any]], image_id: int | str | None
+) -> dict[str, Any]:
+    """The only annotation of the image, with the name of its PNG."""
+    chosen = chosen_image(annotations, images, image_id)
+    own = [a for a in annotations if a.get("image_id") in (None, chosen)]
+    if len(own) != 1:
+        raise CorruptFileError(f"expected one annotation of image {chosen!r}, which lists its segments, got {len(own)}")
+    if not isinstance(own[0].get("file_name"), str):
+        raise CorruptFileError(
+            f"the annotation of image {chosen!r} has file_name {own[0].get('file_name')!r}, expected that of its PNG"
+        )
+    return own[0]
 
 
 def _folders(path: Path) -> tuple[Path, Path]:
