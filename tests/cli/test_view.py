@@ -229,6 +229,7 @@ def test_frames_that_fail_are_named_and_passed_over(tmp_path):
         pytest.param(["frame.npz", "--image", "a=image.png"], "no camera a, expected one of camera 0", id="no camera"),
         pytest.param(["frame.npz", "--image", "nothing.png"], "nothing.png", id="no such image"),
         pytest.param(["kitti", "--image", "image.png"], "kitti is a source", id="an image of a source"),
+        pytest.param(["no.npz", "--image", "image.png"], "no.npz: there is no such file", id="no such result"),
         pytest.param(["kitti", "--min-score", "0.5"], "choose among", id="scores without masks"),
         pytest.param(["kitti", "--results", "kitti", "--min-score", "0"], "--min-score", id="scores of labels"),
         pytest.param(["frame.npz", "--picture", "a.png", "--diffusion", "2"], "--rerun", id="diffusion of a picture"),

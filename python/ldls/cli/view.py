@@ -105,8 +105,8 @@ def view(
         refuse({**of_sources, **of_masks}, f"{path} is a result, which has its masks and labels")
         message = view_result(path, image or [], target, name=name, diffusion=diffusion, picture=picture)
     else:
-        refuse({"image": image}, f"{path} is a source, which has its images")
         source, indices = chosen_frames(path, dataset, option or [], frames)
+        refuse({"image": image}, f"{path} is a source, which has its images")
         label = labelled(
             source,
             indices,
