@@ -120,8 +120,9 @@ def test_formats_can_be_chosen_and_an_image_is_not_needed(demo, tmp_path):
     words = arguments(demo[0], tmp_path)
     at = words.index("--image")
     del words[at : at + 2]
-    outcome = run(app, [*words, "--formats", "label,png"])
+    outcome = run(app, [*words, "--formats", "label,png,label"])
     assert outcome.exit_code == 0, outcome.output
+    assert outcome.output.count("points.label") == 1
     assert {path.name for path in tmp_path.iterdir()} == {"points.label", "points.png"}
 
 

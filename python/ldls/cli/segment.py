@@ -111,7 +111,7 @@ def segment(
     from ldls.viewing.formats import check_formats, file_name, write_formats
 
     check_recording(rerun, diffusion)
-    wanted = words(formats)
+    wanted = tuple(dict.fromkeys(words(formats)))
     check_formats(wanted)
     if picture is not None:
         check_picture(picture)
