@@ -18,6 +18,7 @@ from ldls.errors import InputError, ParameterError
 MAKERS = {
     "Camera": "make one with Camera(projection=..., T_camera_lidar=...), or ldls.read_camera of a file",
     "InstanceMasks": "make them with InstanceMasks.from_array, or ldls.read_masks of a file",
+    "KittiObject": "ldls.io.labels.read_kitti_objects returns them",
     "Labeling": "make one with Labeling.from_codes, or ldls.io.labels.read_labeling of a file",
     "Params": "make them with Params(...), as in Params(sigma=0.5)",
     "Trajectory": "make one with Trajectory(stamps, poses), or ldls.read_poses of a file",

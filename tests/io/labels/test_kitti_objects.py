@@ -124,6 +124,11 @@ def test_classes_of_ones_own_and_rows_without_a_box_are_accepted():
     assert found.instances.tolist() == [2]
 
 
+def test_what_is_no_object_is_refused():
+    with pytest.raises(InputError, match=r"objects: expected a list of KittiObject, got int in a list; ldls"):
+        label_by_boxes([1], np.zeros((3, 3)), CAMERA)
+
+
 def test_no_objects_are_all_background():
     found = label_by_boxes([], np.array([[0.0, 0, 10]]), CAMERA)
     assert (found.classes.tolist(), found.ignored.tolist()) == ([0], [False])

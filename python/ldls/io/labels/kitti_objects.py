@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ldls.camera import Camera
 from ldls.camera.rigid import transformed
 from ldls.categories import folded, own_name
+from ldls.checks import checked
 from ldls.cloud import as_points
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
 from ldls.io.files import read_lines, whole_file
@@ -124,6 +125,7 @@ def read_kitti_boxes(path: str | PathLike[str], *, points: ArrayLike, camera: Ca
     return label_by_boxes(read_kitti_objects(path), points, camera)
 
 
+@checked
 def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Camera) -> Labeling:
     """Class of the box that holds each point; its instance is the number of the row, from 1.
 
@@ -135,6 +137,9 @@ def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Ca
         objects: Rows of a label_2 file.
         points: (N, >= 3) in metres in the lidar frame.
         camera: The frame's camera; without an image size, that of most of KITTI's images.
+
+    Raises:
+        InputError: The objects are none, or the points cannot be used.
     """
     cloud = as_points(points)
     in_view, pixels = project(cloud, camera, image_size=camera.image_size or IMAGE_SIZE, keep_origin=True)
