@@ -215,6 +215,12 @@ mod tests {
         z
     }
 
+    fn largest_difference(found: &[f32], expected: &[f64]) -> f64 {
+        let differences = found.iter().zip(expected);
+        let differences = differences.map(|(found, expected)| (f64::from(*found) - expected).abs());
+        differences.fold(0.0, f64::max)
+    }
+
     type System<T> = (PointGraph<T>, PixelLabels<T>);
 
     /// A and b of `points`, each joined to `k` others, of which each sees `pixels` windows of two labels, in both precisions.
@@ -259,49 +265,39 @@ mod tests {
         let (found, _) = likelihoods(&a, &b, 13, Some(60), Cancel::never()).unwrap();
         let (a, b) = system::<f64>(&points, 10, &seen, 0.01);
         let expected = plain_products(&a, &b, 13, 60);
-        let largest = found
-            .iter()
-            .zip(&expected)
-            .map(|(found, expected)| (f64::from(*found) - expected).abs())
-            .fold(0.0, f64::max);
-        assert!(largest < 1e-5, "likelihoods differ by {largest}");
+        assert!(largest_difference(&found, &expected) < 1e-5);
+    }
+
+    /// Points of a strip of 20 times 100, and what each sees.
+    fn strip() -> (Vec<[f64; 3]>, Vec<(u32, u32)>) {
+        let of_point = |i: u32| {
+            let point = [f64::from(i / 20), f64::from(i % 20), 0.0];
+            (point, (1 + i / 200 % 9, i % 26))
+        };
+        (0..2000).map(of_point).unzip()
     }
 
     #[test]
     fn many_products_in_stages_yield_the_likelihoods_of_plain_products() {
-        let points: Vec<[f64; 3]> = (0..2000)
-            .map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0])
-            .collect();
-        let seen: Vec<(u32, u32)> = (0..2000).map(|i| (1 + i / 200 % 9, i % 26)).collect();
+        let (points, seen) = strip();
         let (a, b) = system::<f32>(&points, 10, &seen, 1e-4);
         // three stages, and two products left
         let (found, convergence) = likelihoods(&a, &b, 10, Some(701), Cancel::never()).unwrap();
         assert!(convergence.sweeps < 250);
         let (a, b) = system::<f64>(&points, 10, &seen, 1e-4);
         let expected = plain_products(&a, &b, 10, 701);
-        let differences = found.iter().zip(&expected);
-        let largest = differences
-            .map(|(found, expected)| (f64::from(*found) - expected).abs())
-            .fold(0.0, f64::max);
-        assert!(largest < 5e-6, "likelihoods differ by {largest}");
+        assert!(largest_difference(&found, &expected) < 5e-6);
     }
 
     #[test]
     fn endlessly_many_products_are_taken_in_stages_where_their_series_would_grow() {
-        let points: Vec<[f64; 3]> = (0..2000)
-            .map(|i| [f64::from(i / 20), f64::from(i % 20), 0.0])
-            .collect();
-        let seen: Vec<(u32, u32)> = (0..2000).map(|i| (1 + i / 200 % 9, i % 26)).collect();
+        let (points, seen) = strip();
         let (a, b) = system::<f32>(&points, 10, &seen, 1e-3);
         let (found, convergence) = likelihoods(&a, &b, 10, None, Cancel::never()).unwrap();
         assert!(convergence.converged() && convergence.sweeps < 700);
         let (a, b) = system::<f64>(&points, 10, &seen, 1e-3);
         let expected = plain_products(&a, &b, 10, 4000);
-        let differences = found.iter().zip(&expected);
-        let largest = differences
-            .map(|(found, expected)| (f64::from(*found) - expected).abs())
-            .fold(0.0, f64::max);
-        assert!(largest < 1e-3, "likelihoods differ by {largest}");
+        assert!(largest_difference(&found, &expected) < 1e-3);
     }
 
     fn clouds() -> impl Strategy<Value = Vec<[f64; 3]>> {
