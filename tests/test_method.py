@@ -177,6 +177,24 @@ def random_transform(generator):
     return transform
 
 
+@pytest.mark.parametrize(("neighbors", "iterations"), [(10, 500), (10, 1000), (20, 200), (20, 500)])
+def test_where_rounding_grows_labels_equal_the_oracle(neighbors, iterations):
+    """Density falls outwards by orders of magnitude, and single precision is off by up to a hundredth."""
+    camera = ldls.Camera(projection=[[100, 0, 100], [0, 100, 60], [0, 0, 1]], T_camera_lidar=np.eye(4))
+    params = replace(ldls.Params.paper(), neighbors=neighbors, iterations=iterations, remove_outliers=False)
+    for seed in range(8):
+        generator = np.random.default_rng(seed)
+        radius, angle = 10 ** generator.uniform(-4, 0.5, 600), generator.uniform(0, 2 * np.pi, 600)
+        points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(600, 8)]).astype(np.float32)
+        pixels = np.zeros((60, 120, 200), bool)
+        for mask in pixels:
+            top, left, height, width = generator.integers([0, 0, 2, 2], [118, 198, 100, 100])
+            mask[top : top + height, left : left + width] = True
+        result = ldls.segment(points, ldls.InstanceMasks.from_array(pixels), camera, params=params)
+        expected = oracle.segment(points, pixels, camera.projection @ camera.T_camera_lidar, params)
+        check_winners(result, expected)
+
+
 def test_results_are_the_same_bits_for_any_number_of_threads(frame_571):
     results = [
         ldls.segment(frame_571.points, frame_571.masks, frame_571.camera, params=ldls.Params(threads=threads))
