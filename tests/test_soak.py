@@ -9,11 +9,12 @@ from campaigns import soak
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
 def test_frames_one_after_another_keep_no_memory():
-    samples, refused = soak.soak(400, warm_up=100)
+    samples, refused = soak.soak(2000)
     # one frame in ten is broken, and none else is refused
-    assert refused == 40
-    # a kept cloud would be 36 KB a frame; little noise is left after so few frames
+    assert refused == 200
+    # a kept cloud would be 36 KB a frame; allocators grow by 2 MB at a time, now and then
     assert soak.growth(samples) < 16 * soak.MOST_BYTES_A_FRAME
 
 

@@ -239,10 +239,11 @@ def test_a_gap_in_a_drive_ends_a_window(tmp_path):
 
 def test_sweeps_that_are_all_alone_are_warned_of(tmp_path):
     drive = drives.small_drive(tmp_path / "drive", 4, period_s=2.0)
-    said = r"no sweep comes within 1 s after the one before \(median gap 2 s\), .*; are stamps in seconds\?"
+    said = r"no sweep comes later than .* by 1 s or less \(median gap 2 s\), .*; are stamps in seconds, and frames of"
     # there are no poses in such a gap, but for those at the stamps
-    with pytest.warns(LdlsWarning, match=said):
+    with pytest.warns(LdlsWarning, match=said) as caught:
         assert run(drive, tmp_path / "out").n_done == 4
+    assert caught[0].filename == __file__
     assert windows(tmp_path / "out") == ["0", "1", "2", "3"]
     run(drive, tmp_path / "out", frames=slice(1))
     run(drive, tmp_path / "alone", sweeps=0)
@@ -271,7 +272,7 @@ def gap(simulated, tmp_path):
 
 def test_poses_of_the_source_are_read_only_where_none_are_given(gap, simulated, tmp_path):
     masks, path = str(gap / "masks_02"), tmp_path / "poses.txt"
-    with pytest.raises(PoseError, match="0000000002: stamp: no pose at .*; or open the source with poses=False"):
+    with pytest.raises(PoseError, match="0000000002: stamp: no pose at .*; or read no poses, by --option poses=false"):
         open_source(gap)[2]
     assert run(gap, tmp_path / "plain", masks=masks, sweeps=0).n_done == 2
     summary = batch.run(gap, tmp_path / "none", batch.RunSettings(masks=masks), options={"poses": False})
@@ -411,8 +412,9 @@ def test_frames_without_times_are_not_silently_given_those_of_ten_a_second(drive
     path.write_text(drives.tum_poses(N_FRAMES, period_s=0.5))
     with pytest.warns(
         LdlsWarning, match=r"given\.txt: frames of .* taken 0\.1 s apart from 0; .* 0\.0+ to 3\.50+ s; add"
-    ):
-        assert run(drive, tmp_path / "out", poses=str(path)).n_done == N_FRAMES
+    ) as caught:
+        assert run(drive, tmp_path / "out", poses=path).n_done == N_FRAMES
+    assert caught[0].filename == __file__
     path.write_text("".join(f"{1767528000 + 0.1 * k:.6f} {0.3 * k:.6f} 0 0 0 0 0 1\n" for k in range(N_FRAMES)))
     with pytest.raises(PoseError, match=r"poses from 1767528000\.0+ to .*, which is at none of the frames; add stamps"):
         run(drive, tmp_path / "none", poses=str(path))

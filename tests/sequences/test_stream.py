@@ -84,8 +84,9 @@ def test_a_pose_that_jumps_is_refused_and_forgotten(frames, before, wait_s, n_sw
     following = partial(stream.segment, two.points, two.images[0].masks, stamp=one.stamp + wait_s)
     away = two.pose.copy()
     away[0, 3] += 500
-    with pytest.raises(ldls.PoseError, match=r"the lidar moves 50\d.* expected at most 100 m/s"):
+    with pytest.raises(ldls.PoseError, match=r"the lidar moves 50\d.* expected at most 100 m/s") as refused:
         following(pose=away)
+    assert ("begin another LabelDiffusion" in str(refused.value)) == (wait_s > 1)
     assert following(pose=two.pose).report.n_sweeps == n_sweeps
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
+from os import fspath
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ class FrameWork:
                 f"masks, segmenter: give one of them, got neither, and {source.path} names no masks of its own"
                 + folder_hint(source.path, "masks", option="masks=")
             )
-        self._stored = None if settings.masks is None else StoredMasks(settings.masks)
+        self._stored = None if settings.masks is None else StoredMasks(fspath(settings.masks))
         if self._stored is not None:
             self._stored.check_names(source)
         self._segmenter: Callable[[str, CameraImage], Segmenter] | None = None

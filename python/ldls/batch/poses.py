@@ -148,7 +148,7 @@ class Poses:
         Raises:
             PoseError: There is no stamp or no pose, or stamps do not ascend where objects are tracked.
         """
-        self._check_clock(chosen)
+        self._check_clock()
         if not self._settings.sweeps and not self._settings.track:
             return
         named = zip(self._source.names, self.stamps, strict=True)
@@ -182,24 +182,24 @@ class Poses:
                 f"{KISS_ICP}"
             )
 
-    def _check_clock(self, chosen: Frames) -> None:
+    def _check_clock(self) -> None:
         """Warn of a file with stamps for frames that have none of their own; refuse one that has a pose of none."""
         trajectory = self._trajectory
         if trajectory is None or any(stamp is not None for stamp in _own_stamps(self._source)) or self._are_found:
             return
-        # a file of KITTI's has no stamps and takes those of the frames
-        if np.array_equal(trajectory.stamps, np.array(self.stamps, np.float64)):
+        if format_of(Path(str(self._settings.poses))) == "kitti":
+            # which has no stamps, and takes those of the frames
             return
         first, last = float(trajectory.stamps[0]), float(trajectory.stamps[-1])
         message = (
             f"{self._settings.poses}: frames of {self._source.path} have no times, and are taken {PERIOD_S:g} s apart "
             f"from 0; the file has poses from {first:.6f} to {last:.6f} s"
         )
-        stamps = [stamp for index, _ in chosen if (stamp := self.stamps[index]) is not None]
+        stamps = [stamp for stamp in self.stamps if stamp is not None]
         if not any(first - trajectory.margin_s <= stamp <= last + trajectory.margin_s for stamp in stamps):
             raise PoseError(f"{message}, which is at none of the frames; add stamps to the source")
         warnings.warn(
-            f"{message}; add stamps to the source if its frames are of other times", LdlsWarning, stacklevel=4
+            f"{message}; add stamps to the source if its frames are of other times", LdlsWarning, stacklevel=5
         )
 
     def _has_poses(self, chosen: Frames) -> bool:
@@ -245,11 +245,13 @@ def _lines(path: Path, source: Source) -> list[int] | slice:
         PoseError: The source left out frames, and the file has a line neither for each frame that it kept nor for all.
     """
     left_out: Mapping[str, str] = getattr(source, "left_out", {})
+    if not left_out:
+        return slice(None)
     every = sorted([*source.names, *left_out], key=name_order)
     kept = [number for number, name in enumerate(every) if name not in left_out]
     with open_file(path, "file of poses", limit=MAX_TEXT_BYTES) as file:
         n_poses = len(pose_rows(file.text()))
-    if not left_out or n_poses == len(source):
+    if n_poses == len(source):
         return slice(None)
     # frames in another order than that of their names cannot be told from those left out
     if n_poses != len(every) or [every[number] for number in kept] != list(source.names):

@@ -222,14 +222,14 @@ def _windows(source: Source, chosen: Frames, stamps: Sequence[float | None], swe
     if sweeps and len(windows) == len(chosen) > 1:
         gap_s = np.median(np.diff([stamp for index, _ in chosen if (stamp := stamps[index]) is not None]))
         message = (
-            f"{source.path}: no sweep comes within {LONGEST_GAP_S:g} s after the one before (median gap {gap_s:g} s), "
-            "so that each is labelled alone; are stamps in seconds?"
+            f"{source.path}: no sweep comes later than the one before by {LONGEST_GAP_S:g} s or less (median gap "
+            f"{gap_s:g} s), so that each is labelled alone; are stamps in seconds, and frames of --frames close enough?"
         )
-        warnings.warn(message, LdlsWarning, stacklevel=3)
+        warnings.warn(message, LdlsWarning, stacklevel=4)
     return windows
 
 
-def _inputs(source: Source, settings: RunSettings) -> Iterator[str | Path | None]:
+def _inputs(source: Source, settings: RunSettings) -> Iterator[str | PathLike[str] | None]:
     """Files that a run reads, and the folder of its masks."""
     yield from (settings.masks, settings.poses, segmenter_file(settings.segmenter))
     for index in range(len(source)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ class RunSettings:
             out of its range.
     """
 
-    masks: str | None = None
+    masks: str | PathLike[str] | None = None
     segmenter: str | None = None
     min_score: float | None = None
     categories: tuple[int | str, ...] | None = None
@@ -59,7 +60,7 @@ class RunSettings:
     formats: tuple[str, ...] = ("npz", "label")
     same_object: float | None = None
     sweeps: int = 0
-    poses: str | None = None
+    poses: str | PathLike[str] | None = None
     track: bool = False
 
     def __post_init__(self) -> None:
@@ -94,7 +95,7 @@ class RunSettings:
         Raises:
             ParameterError: The place of masks or boxes does not tell frames or cameras apart.
         """
-        name, place = "masks", self.masks
+        name, place = "masks", None if self.masks is None else fspath(self.masks)
         if self.segmenter is not None and self.segmenter.partition(":")[0] in OF_ONE_IMAGE:
             name, place = "segmenter", self.segmenter
         # what of masks has no {frame} is a folder, or a file of all images

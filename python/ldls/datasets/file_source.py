@@ -116,7 +116,7 @@ class FileSource:
             try:
                 return self._trajectory.at(stamp)
             except PoseError as error:
-                raise PoseError(f"{error}; or open the source with poses=False") from None
+                raise PoseError(f"{error}; or read no poses, by --option poses=false") from None
 
     def _image(self, camera: str, index: int) -> CameraImage:
         """The image of a camera in a frame."""

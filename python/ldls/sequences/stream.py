@@ -12,7 +12,7 @@ from ldls.camera import Camera
 from ldls.checks import checked
 from ldls.cloud import as_points
 from ldls.doubts import warn_of
-from ldls.errors import InputError, ParameterError
+from ldls.errors import InputError, ParameterError, PoseError
 from ldls.label_diffusion import SAME_OBJECT, segment_views
 from ldls.masks import InstanceMasks
 from ldls.params import Params
@@ -109,9 +109,12 @@ class LabelDiffusion:
         sweep = Sweep(as_points(points).copy(), views, pose, stamp)  # type: ignore[arg-type]
         last = (*self._recent[-1:], sweep)
         check_order(last)
-        # refuses a pose that jumps
-        Trajectory(np.array([each.stamp for each in last]), np.array([each.pose for each in last]))
         goes_on = sweep.stamp - last[0].stamp <= LONGEST_GAP_S
+        try:
+            Trajectory(np.array([each.stamp for each in last]), np.array([each.pose for each in last]))
+        except PoseError as error:
+            elsewhere = "" if goes_on else "; or begin another LabelDiffusion where another drive begins"
+            raise PoseError(f"{error}{elsewhere}") from None
         recent = (*(self._recent if goes_on else ()), sweep)[-1 - self.before :]
         results, report = label_sweeps(
             recent,

@@ -53,7 +53,7 @@ def _rows(path: Path, content: NDArray[np.uint8], columns: int, *, guessed: bool
     if not len(content):
         message = f"empty, expected {columns} float32 a point"
         if not recover:
-            raise TruncatedFileError(f"{message}; write it again, or pass recover=True to read a cloud without a point")
+            raise TruncatedFileError(f"{message}; write it again")
         warnings.warn(f"{path}: {message}", RecoveredFileWarning, stacklevel=4)
     if whole != len(content):
         message = (

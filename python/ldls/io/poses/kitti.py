@@ -49,7 +49,7 @@ def read(
         poses[:, :3] = rows.reshape(-1, 3, 4)
         for number, pose in zip(lines, poses, strict=True):
             rigid(f"line {number}", pose, CorruptFileError)
-    poses = poses[chosen]
+    poses, numbers_of = poses[chosen], np.array(lines)[chosen]
     if np.size(stamps) != len(poses):
         raise PoseError(
             f"{path}: has {len(poses)} poses for {np.size(stamps)} stamps, expected a line for each sweep of the drive"
@@ -59,7 +59,8 @@ def read(
     if len(back):
         at = int(back[0])
         raise PoseError(
-            f"{path}: line {at + 1} is the pose at {times[at]:.6f} s, and line {at + 2} that at {times[at + 1]:.6f} s, "
+            f"{path}: line {numbers_of[at]} is the pose at {times[at]:.6f} s, and line {numbers_of[at + 1]} that at "
+            f"{times[at + 1]:.6f} s, "
             "expected ascending times; mend these, which stand in another file"
         )
     with within(path), np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
