@@ -219,8 +219,9 @@ def run(
 def _windows(source: Source, chosen: Frames, stamps: Sequence[float | None], sweeps: int) -> list[Frames]:
     """The windows of `windows_of`; warns if each of several sweeps that were to be joined is alone in its own."""
     windows = windows_of(chosen, stamps, sweeps)
-    if sweeps and len(windows) == len(chosen) > 1:
-        gap_s = np.median(np.diff([stamp for index, _ in chosen if (stamp := stamps[index]) is not None]))
+    known = [stamp for index, _ in chosen if (stamp := stamps[index]) is not None]
+    if sweeps and len(windows) == len(chosen) and len(known) > 1:
+        gap_s = np.median(np.diff(known))
         message = (
             f"{source.path}: no sweep comes later than the one before by {LONGEST_GAP_S:g} s or less (median gap "
             f"{gap_s:g} s), so that each is labelled alone; are stamps in seconds, and frames of --frames close enough?"
