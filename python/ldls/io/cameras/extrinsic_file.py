@@ -109,6 +109,7 @@ def _from_table(fields: Fields) -> NDArray[np.float64]:
             f"{fields.place}: pose_of is missing; write 'camera' where it is the pose of the camera in the lidar "
             "frame, as in a URDF or /tf, and 'lidar' where it maps lidar to camera coordinates"
         )
+    # the one part that must be there
     fields.get("translation")
     entries = {name: value for name, value in fields.entries.items() if value is not None}
     rotation = entries.get("rotation")

@@ -49,7 +49,7 @@ def read(
         poses[:, :3] = rows.reshape(-1, 3, 4)
         for number, pose in zip(lines, poses, strict=True):
             rigid(f"line {number}", pose, CorruptFileError)
-    poses, numbers_of = poses[chosen], np.array(lines)[chosen]
+    poses, lines_of = poses[chosen], np.array(lines)[chosen]
     if np.size(stamps) != len(poses):
         raise PoseError(
             f"{path}: has {len(poses)} poses for {np.size(stamps)} stamps, expected a line for each sweep of the drive"
@@ -59,7 +59,7 @@ def read(
     if len(back):
         at = int(back[0])
         raise PoseError(
-            f"{path}: line {numbers_of[at]} is the pose at {times[at]:.6f} s, and line {numbers_of[at + 1]} that at "
+            f"{path}: line {lines_of[at]} is the pose at {times[at]:.6f} s, and line {lines_of[at + 1]} that at "
             f"{times[at + 1]:.6f} s, "
             "expected ascending times; mend these, which stand in another file"
         )

@@ -1,7 +1,8 @@
 //! How far off the values of a series may be at a point.
 //!
 //! What a series leaves out is about as large as its last term, which the probe has gone through as. That differs by
-//! orders of magnitude from one part of a cloud to another, and where it passes zero at a point it does not around it.
+//! orders of magnitude from one part of a cloud to another, and where it passes zero at a point it does not around it. So does
+//! what rounding leaves of a sum of all labels.
 
 use crate::graph::PointGraph;
 
@@ -9,23 +10,23 @@ use crate::graph::PointGraph;
 /// none at which those of the two best labels differ by more than twice as much.
 const SAFETY: f64 = 2.5;
 
-/// What the series may leave out at each point, going by the probe there.
+/// By how much the values at each point may be off, going by the probe and the sum of all labels there.
 #[derive(Debug)]
 pub(super) struct Errors<'a> {
     pub(super) a: &'a PointGraph,
     /// Nothing where no series was used.
-    pub(super) probed: Vec<f32>,
+    pub(super) estimates: Vec<f32>,
 }
 
 impl Errors<'_> {
-    /// By how much values at a point may be off, going by the probe at all points within two edges.
+    /// By how much values at a point may be off, going by the estimates at all points within two edges.
     pub(super) fn at(&self, point: usize) -> f64 {
-        if self.probed.is_empty() {
+        if self.estimates.is_empty() {
             return 0.0;
         }
         let next = |from| self.a.row(from).map(|(to, _)| to);
         let around = next(point).flat_map(next).chain([point]);
-        SAFETY * f64::from(around.map(|at| self.probed[at]).fold(0.0, f32::max))
+        SAFETY * f64::from(around.map(|at| self.estimates[at]).fold(0.0, f32::max))
     }
 }
 
@@ -38,9 +39,9 @@ mod tests {
         let rows = [vec![0, 1], vec![1, 2], vec![2, 3], vec![3]];
         let offsets = vec![0, 2, 4, 6, 7];
         let a = PointGraph::from_csr(offsets, rows.concat(), vec![0.25; 7]).unwrap();
-        let errors = |probed| Errors { a: &a, probed };
-        let probed = errors(vec![0.25, 0.0, 0.5, 1.0]);
-        assert_eq!([0, 1, 3].map(|point| probed.at(point)), [1.25, 2.5, 2.5]);
+        let errors = |estimates| Errors { a: &a, estimates };
+        let estimated = errors(vec![0.25, 0.0, 0.5, 1.0]);
+        assert_eq!([0, 1, 3].map(|point| estimated.at(point)), [1.25, 2.5, 2.5]);
         assert_eq!(errors(Vec::new()).at(0), 0.0);
     }
 }

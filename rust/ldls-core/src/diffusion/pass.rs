@@ -26,7 +26,7 @@ pub(super) struct Pass<'a, T, const WIDTH: usize> {
     z: Values<T, WIDTH>,
     /// Values before the last step, which the next one overwrites.
     previous: Values<T, WIDTH>,
-    /// Values that the last series began with, if not with zeros.
+    /// Values that this leg of the series began with, but for the first, which begins with zeros.
     initial: Values<T, WIDTH>,
     /// Steps taken.
     taken: usize,
@@ -88,7 +88,8 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         scale: T,
         cancel: &Cancel,
     ) -> Result<Self> {
-        let [mut z, previous] = Values::zeros(a.len(), seeds.plan.groups, cancel)?;
+        let mut z = Values::zeros(0, a.len(), seeds.plan.groups, cancel)?;
+        let previous = Values::zeros(1, a.len(), seeds.plan.groups, cancel)?;
         for group in 0..seeds.plan.groups {
             let tasks = z.group_mut(group).par_chunks_mut(ROWS_A_TASK).enumerate();
             tasks.try_for_each(|(task, rows)| {
@@ -115,12 +116,12 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         self.advance(&series.steps(), cancel)?;
         // the probe has gone through the recurrence as the last term alone
         self.errors = self.errors_of(series.tail, cancel)?;
-        let mut stages = 1;
-        while self.is_to_go_on(series, stages, cancel)? {
-            stages += 1;
+        let mut legs = 1;
+        while self.is_to_go_on(series, legs, cancel)? {
+            legs += 1;
             std::mem::swap(&mut self.z, &mut self.initial);
             if self.z.is_empty() {
-                [self.z, _] = Values::zeros(self.a.len(), self.seeds.plan.groups, cancel)?;
+                self.z = Values::zeros(2, self.a.len(), self.seeds.plan.groups, cancel)?;
             }
             self.advance(&series.steps_on(), cancel)?;
         }
@@ -136,10 +137,10 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         Ok(())
     }
 
-    /// Whether a stage of `series` follows the first `stages`.
-    fn is_to_go_on(&mut self, series: &Series, stages: usize, cancel: &Cancel) -> Result<bool> {
-        if let Some(all) = series.stages {
-            return Ok(stages < all);
+    /// Whether a leg of `series` follows the first `legs`.
+    fn is_to_go_on(&mut self, series: &Series, legs: usize, cancel: &Cancel) -> Result<bool> {
+        if let Some(all) = series.legs {
+            return Ok(legs < all);
         }
         self.measure_residual(cancel)?;
         Ok(!self.convergence.converged() && self.taken < MOST_SWEEPS)

@@ -32,7 +32,7 @@ pub(super) fn for_each_pass(
     );
     let schedule = schedule?;
     // how far rounding goes is known of one series on graphs of the paper's degree, and measured where it may grow more
-    let is_usual = |series: &Series| series.stages == Some(1) && a.degree() == Some(PAPER_DEGREE);
+    let is_usual = |series: &Series| series.legs == Some(1) && a.degree() == Some(PAPER_DEGREE);
     let largest = b.largest_shares();
     let mut convergence = Convergence::default();
     // a probe shows how large the terms left out may be

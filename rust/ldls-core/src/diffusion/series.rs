@@ -3,7 +3,8 @@
 //! T products z <- A z + b from z = 0 yield p(A) b with p(x) = 1 + x + ... + x^(T - 1), and endlessly many
 //! yield (1 - x)^(-1). Where the spectrum of A lies near a real interval, a Chebyshev series on that
 //! interval comes as near to p(A) b with far fewer products. The more products, the more terms of eigenvalues that lie off it
-//! grow before they shrink, so many products are divided into stages: T of them from any z yield p(A) b + A^T z.
+//! grow before they shrink, so many products are divided into legs: T products from any z
+//! yield p(A) b + A^T z.
 
 use super::schedule::ROWS_A_TASK;
 use super::sweep::Step;
@@ -24,7 +25,7 @@ const MOST_LEFT_OUT_OF_SHORT: f64 = 1e-2;
 /// Products for which one series stands: terms of more grow, at eigenvalues far from the interval, to where they leave no digits.
 const MOST_PRODUCTS: usize = 256;
 
-/// Ratio of one term of 1 / (1 - x) to the one before from which on they grow likewise, and stages are taken instead.
+/// Ratio of one term of 1 / (1 - x) to the one before from which on they grow likewise, and legs are taken instead.
 const MOST_RATIO: f64 = 0.87;
 
 /// Coefficients below it are left out of a sum that is at least 1: far less than any tolerance, even a hundred thousand times.
@@ -39,10 +40,10 @@ pub(super) struct Series {
     pub(super) half_width: f64,
     /// `c_0`, `c_1` and so on; the degree is one less than their number.
     pub(super) coefficients: Vec<f64>,
-    /// Those of the power of A that the values of one stage are multiplied by in the next, as many; none of a single stage.
+    /// Those of the power of A that the values of one leg are multiplied by in the next, as many; none of a single leg.
     power: Vec<f64>,
     /// How often it is taken, each time from the values of the time before; `None` until they change next to nothing.
-    pub(super) stages: Option<usize>,
+    pub(super) legs: Option<usize>,
     /// Products to be run after it.
     pub(super) products_left: usize,
     /// Sum of the magnitudes of the coefficients left out.
@@ -102,16 +103,16 @@ impl Series {
     /// The series of so many products, for an interval whose middle is not negative.
     fn of_products(products: Option<usize>, [low, high]: [f64; 2], tolerance: f64) -> Self {
         let (middle, half_width) = (f64::midpoint(high, low), (high - low) / 2.0);
-        let stages = products.map(|products| products.div_ceil(MOST_PRODUCTS).max(1));
-        let (of_stage, products_left) = match (products, stages) {
-            (Some(products), Some(stages)) => (products / stages, products % stages),
+        let legs = products.map(|products| products.div_ceil(MOST_PRODUCTS).max(1));
+        let (of_leg, products_left) = match (products, legs) {
+            (Some(products), Some(legs)) => (products / legs, products % legs),
             _ => (MOST_PRODUCTS, 0),
         };
-        let mut coefficients = geometric_sum(of_stage, middle, half_width);
-        let mut power = if stages == Some(1) {
+        let mut coefficients = geometric_sum(of_leg, middle, half_width);
+        let mut power = if legs == Some(1) {
             Vec::new()
         } else {
-            power(of_stage, middle, half_width)
+            power(of_leg, middle, half_width)
         };
         // all T_k are 1 at the upper end, where the sum is largest; values go on as they are, or shrink
         let largest: f64 = coefficients.iter().sum();
@@ -125,10 +126,10 @@ impl Series {
             half_width,
             coefficients,
             power,
-            stages,
+            legs,
             products_left,
-            // of the values of the stage before as much is left out again; what these lack grows less and less
-            tail: if stages == Some(1) { tail } else { 2.0 * tail },
+            // of the values of the leg before as much is left out again; what these lack grows less and less
+            tail: if legs == Some(1) { tail } else { 2.0 * tail },
             most_left_out: MOST_LEFT_OUT,
         }
     }
@@ -154,7 +155,7 @@ impl Series {
             half_width,
             power: vec![0.0; coefficients.len()],
             coefficients,
-            stages: Some(1),
+            legs: Some(1),
             products_left: 0,
             tail,
             most_left_out: MOST_LEFT_OUT,
@@ -176,23 +177,23 @@ impl Series {
         (0..self.degree()).rev().map(step).collect()
     }
 
-    /// The same from the values of the stage before, which are the initial ones: `d_k z_0` comes to each `c_k b`.
+    /// The same from the values of the leg before, which are the initial ones: `d_k z_0` comes to each `c_k b`.
     pub(super) fn steps_on<T: Real>(&self) -> Vec<Step<T>> {
         let first = Step::new(self.terms(self.degree()), 0.0, 0.0, 0.0);
         std::iter::once(first).chain(self.steps()).collect()
     }
 
-    /// What `T_k` has of b, and of the values of the stage before.
+    /// What `T_k` has of b, and of the values of the leg before.
     fn terms(&self, k: usize) -> [f64; 2] {
         [self.coefficients[k], self.power[k]]
     }
 
     /// Most sweeps over the graph, those of the products left among them.
     pub(super) fn sweeps(&self) -> usize {
-        let of_stage = self.degree() + 1;
+        let of_leg = self.degree() + 1;
         // the first begins with the last term
-        let of_stages = self.stages.map(|stages| stages * of_stage - 1);
-        of_stages.map_or(usize::MAX, |sweeps| sweeps + self.products_left)
+        let of_legs = self.legs.map(|legs| legs * of_leg - 1);
+        of_legs.map_or(usize::MAX, |sweeps| sweeps + self.products_left)
     }
 
     /// Highest k of `T_k`.
@@ -297,7 +298,7 @@ mod tests {
     fn evaluate(series: &Series, x: f64) -> f64 {
         let [b, power] = [&series.coefficients, &series.power];
         let [b, power] = [b, power].map(|coefficients| sum_of_terms(coefficients, series, x));
-        let z = (0..series.stages.unwrap()).fold(0.0, |z, _| b + power * z);
+        let z = (0..series.legs.unwrap()).fold(0.0, |z, _| b + power * z);
         (0..series.products_left).fold(z, |z, _| x * z + 1.0)
     }
 
@@ -355,7 +356,7 @@ mod tests {
 
     #[test]
     fn a_series_equals_the_sum_of_powers() {
-        for (products, stages, most) in [
+        for (products, legs, most) in [
             (1, 1, 0),
             (2, 1, 1),
             (7, 1, 6),
@@ -365,8 +366,8 @@ mod tests {
         ] {
             let series = Series::of_products(Some(products), [LOW, HIGH], 1e-7);
             let largest: f64 = (0..products).map(|k| HIGH.powi(k as i32)).sum();
-            // each stage leaves out its share
-            let left_out = 1e-7 * (stages + 1) as f64 * largest;
+            // each leg leaves out its share
+            let left_out = 1e-7 * (legs + 1) as f64 * largest;
             for x in points() {
                 let sum: f64 = (0..products).map(|k| x.powi(k as i32)).sum();
                 assert!(
@@ -374,7 +375,7 @@ mod tests {
                     "{products} products at {x}"
                 );
             }
-            assert_eq!(series.stages, Some(stages));
+            assert_eq!(series.legs, Some(legs));
             assert!(
                 series.sweeps() <= most,
                 "{products} products took {} sweeps",

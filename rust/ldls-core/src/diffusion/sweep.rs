@@ -99,12 +99,13 @@ unsafe fn sweep<T: Lane<WIDTH>, const WIDTH: usize>(
         let rows = rows_of(first..end);
         // SAFETY: as the caller promises
         unsafe { step_active(a, seeds, step, (active, common), values, &rows) };
-        for group in groups_in(active) {
-            let Some(initial) = initial else { break };
-            for (row, initial) in rows.clone().zip(&initial.group(group)[rows.clone()]) {
-                // SAFETY: as the caller promises
-                let next = unsafe { &mut *begins[group].add(row) };
-                (0..WIDTH).for_each(|lane| next[lane] += step.initial * initial[lane]);
+        if let Some(initial) = initial {
+            for group in groups_in(active) {
+                for (row, initial) in rows.clone().zip(&initial.group(group)[rows.clone()]) {
+                    // SAFETY: as the caller promises
+                    let next = unsafe { &mut *begins[group].add(row) };
+                    (0..WIDTH).for_each(|lane| next[lane] += step.initial * initial[lane]);
+                }
             }
         }
         for block in first..end {

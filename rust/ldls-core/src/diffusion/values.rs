@@ -26,16 +26,19 @@ pub(super) struct Values<T, const WIDTH: usize> {
 }
 
 impl<T: Real, const WIDTH: usize> Values<T, WIDTH> {
-    /// Zeros, for values and for those before them.
-    pub(super) fn zeros(points: usize, groups: usize, cancel: &Cancel) -> Result<[Self; 2]> {
-        let shifted = |first: usize| {
-            // threads share out what the allocator has to clear
-            let group = |_| memory::zeros(first + points, cancel);
-            let groups = (0..groups).into_par_iter().map(group);
-            let groups = groups.collect::<Result<_>>()?;
-            Ok(Self { groups, first })
-        };
-        Ok([shifted(0)?, shifted(SHIFT)?])
+    /// Zeros, for the array of this `number` among those of a pass.
+    pub(super) fn zeros(
+        number: usize,
+        points: usize,
+        groups: usize,
+        cancel: &Cancel,
+    ) -> Result<Self> {
+        let first = number % 2 * SHIFT;
+        // threads share out what the allocator has to clear
+        let group = |_| memory::zeros(first + points, cancel);
+        let groups = (0..groups).into_par_iter().map(group);
+        let groups = groups.collect::<Result<_>>()?;
+        Ok(Self { groups, first })
     }
 
     /// None at all.
