@@ -2,6 +2,7 @@
 
 use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
 use super::lanes::{Lane, Lanes};
+use super::plan::PROBE_GROUP;
 use super::schedule::{Activity, ROWS_A_TASK, Schedule};
 use super::seeds::Seeds;
 use super::series::Series;
@@ -80,7 +81,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         }
     }
 
-    /// z = `scale` * s, with the probe's seeds as they are.
+    /// z = `scale` * s, and of the probe half of its seeds, as much as the values before lack.
     fn new(
         a: &'a PointGraph<T>,
         schedule: &'a Schedule,
@@ -89,12 +90,19 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         cancel: &Cancel,
     ) -> Result<Self> {
         let mut z = Values::zeros(0, a.len(), seeds.plan.groups, cancel)?;
-        let previous = Values::zeros(1, a.len(), seeds.plan.groups, cancel)?;
+        let mut previous = Values::zeros(1, a.len(), seeds.plan.groups, cancel)?;
+        let half = T::from_f64(0.5);
         for group in 0..seeds.plan.groups {
-            let tasks = z.group_mut(group).par_chunks_mut(ROWS_A_TASK).enumerate();
-            tasks.try_for_each(|(task, rows)| {
+            let tasks = z.group_mut(group).par_chunks_mut(ROWS_A_TASK);
+            let tasks = tasks.zip(previous.group_mut(group).par_chunks_mut(ROWS_A_TASK));
+            tasks.enumerate().try_for_each(|(task, (z, previous))| {
                 cancel.check()?;
-                seeds.put(group, task * ROWS_A_TASK, rows, scale);
+                let first = task * ROWS_A_TASK;
+                seeds.put(group, first, z, scale);
+                if group == PROBE_GROUP {
+                    seeds.put_probe(first, z, half);
+                    seeds.put_probe(first, previous, T::default() - half);
+                }
                 Ok::<(), Error>(())
             })?;
         }
@@ -114,7 +122,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
 
     fn run_series(&mut self, series: &Series, cancel: &Cancel) -> Result<()> {
         self.advance(&series.steps(), cancel)?;
-        // the probe has gone through the recurrence as the last term alone
+        // the probe has gone through the recurrence as the mean of the last two terms
         self.errors = self.errors_of(series.tail, cancel)?;
         let mut legs = 1;
         while self.is_to_go_on(series, legs, cancel)? {
@@ -233,9 +241,9 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         let Some(first) = self.seeds.plan.probe.filter(|_| tail > 0.0) else {
             return Ok(Vec::new());
         };
-        let values = self.z.group(first / WIDTH);
+        let values = self.z.group(PROBE_GROUP);
         let error = |point: usize| {
-            let [x, y] = [0, 1].map(|lane| values[point][first % WIDTH + lane].to_f64());
+            let [x, y] = [0, 1].map(|lane| values[point][first + lane].to_f64());
             (tail * (x * x + y * y).sqrt()) as f32
         };
         tabulate(self.a.len(), error, cancel)
@@ -330,6 +338,42 @@ mod tests {
                 one: 1.0,
             },
         )
+    }
+
+    #[test]
+    fn the_probe_shows_the_mean_of_the_last_two_terms() {
+        // points that are joined to themselves alone
+        let own = [0.9, 0.5, 0.2];
+        let a = PointGraph::from_csr(vec![0, 1, 2, 3], vec![0, 1, 2], own.to_vec()).unwrap();
+        let b = PixelLabels {
+            offsets: vec![0, 1, 2, 3],
+            labels: vec![1, 1, 1],
+            weights: vec![0.1; 3],
+            mass: vec![0.1; 3],
+        };
+        let (never, products) = (Cancel::never(), Some(200));
+        let series = Series::of_graph(&a, products, 1e-7).pop().unwrap();
+        let schedule = Schedule::new(&a, never).unwrap();
+        let planner = Planner {
+            schedule: &schedule,
+            width: 4,
+            probe: true,
+            sum: false,
+            steps: 200,
+        };
+        let plan = planner.plan((&a, &b), &[1], never).unwrap().remove(0);
+        let seeds = Seeds::new(&b, plan, never).unwrap();
+        let pass = Pass::<f64, 4>::run(&a, &schedule, &seeds, Some(&series), products, never);
+        for (own, error) in own.into_iter().zip(pass.unwrap().errors) {
+            let angle = ((own - series.middle) / series.half_width).acos();
+            let term = |k: usize| (k as f64 * angle).cos();
+            let mean = f64::midpoint(term(series.degree()), term(series.degree() - 1));
+            let expected = 0.1 * series.tail * mean.abs();
+            assert!(
+                (f64::from(error) - expected).abs() < 1e-6 * series.tail,
+                "{own}"
+            );
+        }
     }
 
     #[test]

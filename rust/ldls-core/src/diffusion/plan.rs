@@ -26,6 +26,8 @@ const AWAKE_A_GROUP: f64 = 1.0 / 16.0;
 pub(super) const BACKGROUND_LANE: usize = 0;
 /// Lanes of the probe.
 pub(super) const PROBE_LANES: usize = 2;
+/// The group of lanes that they are in.
+pub(super) const PROBE_GROUP: usize = 0;
 /// Label of a lane where it has none.
 const NONE: u32 = u32::MAX;
 
@@ -34,7 +36,7 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Plan {
     /// Each label, and the lane that it has wherever it comes.
     pub(super) lanes: Vec<(u32, usize)>,
-    /// First lane of the probe, all of which are in the first group, where the pass has it.
+    /// First lane of the probe, where the pass has it.
     pub(super) probe: Option<usize>,
     /// Lane of the sum of all labels of the pass, where it has it: there the values differ from the sum of theirs by rounding alone.
     pub(super) sum: Option<usize>,
@@ -54,8 +56,8 @@ pub(super) struct Planner<'a> {
     pub(super) schedule: &'a Schedule,
     /// Lanes of a group.
     pub(super) width: usize,
-    /// Whether the first has the probe: all labels times factors, of which only the last term of the series is summed. It shows
-    /// how large the terms left out may be.
+    /// Whether the first has the probe: all labels times factors, of which only the mean of the last two terms of the series is
+    /// summed. It shows how large the terms left out may be.
     pub(super) probe: bool,
     /// Whether it has a lane of the sum of its labels, too.
     pub(super) sum: bool,

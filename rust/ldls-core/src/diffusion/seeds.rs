@@ -137,8 +137,8 @@ impl<T: Real> Seeds<T> {
         tabulate(self.common.len(), of_block, cancel)
     }
 
-    /// Puts those of `group` times `scale`, and those of the probe as they are, to the `values` of some rows, the first of which
-    /// is `first`, that of a block.
+    /// Puts those of `group` times `scale`, but for the probe's, to the `values` of some rows, the first of which is `first`, that of
+    /// a block.
     pub(super) fn put<const WIDTH: usize>(
         &self,
         group: usize,
@@ -158,9 +158,18 @@ impl<T: Real> Seeds<T> {
                 }
             }
         }
-        for (at, lane) in self.plan.probe_lanes().filter_map(lane_of).enumerate() {
+    }
+
+    /// Puts those of the probe times `scale` to the `values` of its group at some rows, the first of which is `first`.
+    pub(super) fn put_probe<const WIDTH: usize>(
+        &self,
+        first: usize,
+        values: &mut [Lanes<T, WIDTH>],
+        scale: T,
+    ) {
+        for (at, lane) in self.plan.probe_lanes().enumerate() {
             let values = values.iter_mut().zip(&self.probe[first..]);
-            values.for_each(|(value, seeds)| value[lane] = seeds[at]);
+            values.for_each(|(value, seeds)| value[lane] = scale * seeds[at]);
         }
     }
 

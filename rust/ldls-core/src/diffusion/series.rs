@@ -46,7 +46,7 @@ pub(super) struct Series {
     pub(super) legs: Option<usize>,
     /// Products to be run after it.
     pub(super) products_left: usize,
-    /// Sum of the magnitudes of the coefficients left out.
+    /// Sum of the coefficients left out, none of which is negative.
     pub(super) tail: f64,
     /// What it may leave out of any likelihood: where that is more, it is given up.
     pub(super) most_left_out: f64,
@@ -118,9 +118,8 @@ impl Series {
         let largest: f64 = coefficients.iter().sum();
         let degree = degree_within(&coefficients, tolerance * largest);
         let degree = degree.max(degree_within(&power, tolerance));
-        let tail: f64 = coefficients.iter().skip(degree + 1).sum();
-        coefficients.resize(degree + 1, 0.0);
-        power.resize(degree + 1, 0.0);
+        let tail = cut(&mut coefficients, degree);
+        cut(&mut power, degree);
         Self {
             middle,
             half_width,
@@ -149,7 +148,9 @@ impl Series {
         let mut coefficients: Vec<f64> =
             (0..=degree).map(|k| scale * ratio.powi(k as i32)).collect();
         coefficients[0] /= 2.0;
-        let tail = scale * ratio.powi(degree as i32 + 1) / (1.0 - ratio);
+        let next = scale * ratio.powi(degree as i32 + 1);
+        coefficients[degree] -= next / (1.0 + ratio);
+        let tail = next / (1.0 - ratio);
         Some(Self {
             middle,
             half_width,
@@ -169,18 +170,20 @@ impl Series {
             // the last step takes X once, all others twice
             let times = if k == 0 { 1.0 } else { 2.0 };
             let along = times / self.half_width;
-            let stay = -along * self.middle;
-            // before the first there is nothing
-            let back = if k + 1 == self.degree() { 0.0 } else { -1.0 };
-            Step::new(self.terms(k), along, stay, back)
+            Step::new(self.terms(k), along, -along * self.middle, -1.0)
         };
         (0..self.degree()).rev().map(step).collect()
     }
 
     /// The same from the values of the leg before, which are the initial ones: `d_k z_0` comes to each `c_k b`.
     pub(super) fn steps_on<T: Real>(&self) -> Vec<Step<T>> {
-        let first = Step::new(self.terms(self.degree()), 0.0, 0.0, 0.0);
-        std::iter::once(first).chain(self.steps()).collect()
+        let mut steps = self.steps();
+        if let Some(step) = steps.first_mut() {
+            // before the first two there are values of that leg
+            step.back = T::default();
+        }
+        steps.insert(0, Step::new(self.terms(self.degree()), 0.0, 0.0, 0.0));
+        steps
     }
 
     /// What `T_k` has of b, and of the values of the leg before.
@@ -277,6 +280,18 @@ fn degree_within(coefficients: &[f64], remainder: f64) -> usize {
     0
 }
 
+/// Leaves only terms up to that of `degree`; the sum of the others, none of which is negative. At eigenvalues below the interval, where
+/// `T_k` grow, these alternate in sign: to about as much as they sum to there comes to the last term that is left.
+fn cut(coefficients: &mut Vec<f64>, degree: usize) -> f64 {
+    let left_out = coefficients.iter().skip(degree + 1);
+    let tail = left_out.clone().sum();
+    let signs = [-1.0, 1.0].into_iter().cycle();
+    let alternating: f64 = left_out.zip(signs).map(|(c, sign)| sign * c).sum();
+    coefficients.resize(degree + 1, 0.0);
+    coefficients[degree] += alternating;
+    tail
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -289,9 +304,18 @@ mod tests {
 
     /// `coefficients` as those of `T_0`, `T_1` and so on, on the interval of `series`.
     fn sum_of_terms(coefficients: &[f64], series: &Series, x: f64) -> f64 {
-        let t = (x - series.middle) / series.half_width;
         let terms = coefficients.iter().enumerate();
-        terms.map(|(k, c)| c * (k as f64 * t.acos()).cos()).sum()
+        terms.map(|(k, c)| c * term(k, series, x)).sum()
+    }
+
+    /// `T_k` on the interval of `series`, or where x lies below it.
+    fn term(k: usize, series: &Series, x: f64) -> f64 {
+        let t = (x - series.middle) / series.half_width;
+        if t < -1.0 {
+            let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+            return sign * (k as f64 * (-t).acosh()).cosh();
+        }
+        (k as f64 * t.acos()).cos()
     }
 
     /// What a series makes of 1.
@@ -381,6 +405,28 @@ mod tests {
                 "{products} products took {} sweeps",
                 series.sweeps()
             );
+        }
+    }
+
+    #[test]
+    fn below_the_interval_it_leaves_out_as_little_as_the_mean_of_the_last_two_terms() {
+        let (products, resolvent) = (
+            Series::of_products(Some(200), [LOW, HIGH], 1e-7),
+            Series::of_resolvent([LOW, 0.99], 1e-7).unwrap(),
+        );
+        let sum = |x: f64| (0..200).map(|k| x.powi(k)).sum::<f64>();
+        let inverse = |x: f64| 1.0 / (1.0 - x);
+        let cases: [(&Series, &dyn Fn(f64) -> f64); 2] =
+            [(&products, &sum), (&resolvent, &inverse)];
+        for (series, exact) in cases {
+            for step in 1..=40 {
+                let x = LOW - f64::from(step) * 1e-3;
+                let last = term(series.degree(), series, x);
+                let mean = f64::midpoint(last, term(series.degree() - 1, series, x));
+                let left_out = (evaluate(series, x) - exact(x)).abs();
+                assert!(left_out <= series.tail * mean.abs(), "{left_out} at {x}");
+                assert!(mean.abs() < 0.3 * last.abs(), "at {x}");
+            }
         }
     }
 
