@@ -102,9 +102,9 @@ pub fn segment(
         let Some(places) = among else {
             return normalize(nearest, pixels()?, heights, params, cancel);
         };
-        let (pixels, nearest) = rayon::join(pixels, || nearest.among(places, cancel));
+        let nearest = nearest.among(places, cancel)?;
         let heights = arrange(places, heights, cancel)?;
-        normalize(&nearest?, pixels?, &heights, params, cancel)
+        normalize(&nearest, pixels()?, &heights, params, cancel)
     };
     let diffused = timed(&mut t.diffusion, || {
         diffuse(&a, &b, scene.n_labels(), params.iterations, exact, cancel)

@@ -16,17 +16,17 @@ use rayon::prelude::*;
 
 /// Share of the largest value within which values in double precision are equal: what rounding leaves of equal ones.
 const EQUAL: f64 = 1e-13;
-/// By how many times what the series leaves out of two values together may be more than the probe says.
+/// By how many times what the series leaves out of two values together may be more than estimated.
 const SAFETY: f64 = 5.0;
 
-/// The leader of `candidates`, ascending, at each of `points`, with `series` in the place of the products where there is one. `exact`
+/// The leader of `candidates`, ascending, at each of `points`, where the `least` value is at best, with `series` in the place of the products where there is one. `exact`
 /// is that of [`super::diffuse`].
 ///
 /// # Errors
 /// [`crate::Error::OutOfMemory`], [`crate::Error::Cancelled`], and whatever `exact` returns.
 pub(super) fn leaders(
     a: &PointGraph,
-    points: &[u32],
+    (points, least): (&[u32], f32),
     candidates: &[u32],
     (series, iterations): (Option<&Series>, Option<usize>),
     exact: impl Fn(Option<&[u32]>) -> Result<(PointGraph<f64>, PixelLabels<f64>)>,
@@ -35,7 +35,7 @@ pub(super) fn leaders(
     let steps = Pass::<f64, WIDTH_F64>::steps(series, iterations);
     // endlessly many products reach everything, and ask for a residual of all points
     let reach = match iterations {
-        Some(_) => Reach::of(a, points, steps, cancel)?,
+        Some(_) => Reach::of(a, (points, least), steps, cancel)?,
         None => None,
     };
     let (exact_a, b) = exact(reach.as_ref().map(|reach| reach.points.as_slice()))?;
@@ -50,8 +50,15 @@ pub(super) fn leaders(
         sum: false,
         steps,
     };
+    // where the probe passes zero, as much may be left out as elsewhere
+    let largest = b.weights.par_iter().copied().reduce(|| 0.0, f64::max);
+    let least_error = series.map_or(0.0, |series| series.tail * largest);
+    let leader = Leader {
+        least_error,
+        ..Leader::default()
+    };
     let mut leaders = with_room(points.len())?;
-    leaders.resize(points.len(), Leader::default());
+    leaders.resize(points.len(), leader);
     for plan in planner.plan((&exact_a, &b), candidates, cancel)? {
         let seeds = Seeds::new(&b, plan, cancel)?;
         let pass: Pass<f64, WIDTH_F64> =
@@ -60,7 +67,14 @@ pub(super) fn leaders(
         // of a part, values of points farther away are not those of all steps
         let is_sound = |series: &Series| pass.is_sound(series.most_left_out, b.largest_shares());
         if reach.is_none() && !series.is_none_or(is_sound) {
-            return self::leaders(a, points, candidates, (None, iterations), exact, cancel);
+            return self::leaders(
+                a,
+                (points, least),
+                candidates,
+                (None, iterations),
+                exact,
+                cancel,
+            );
         }
         let offer = |(at, leader): (usize, &mut Leader)| {
             // points are the first of those that they reach
@@ -85,6 +99,8 @@ pub(super) struct Leader {
     next: f64,
     /// What the series may leave out, going by the probe.
     error: f64,
+    /// What it may leave out anywhere, if no term grows.
+    least_error: f64,
 }
 
 impl Leader {
@@ -128,7 +144,10 @@ impl Leader {
     /// True if what the series may leave out does not matter.
     pub(super) fn is_sure(&self) -> bool {
         match self.equal.len() {
-            1 => SAFETY * self.error <= self.lead(),
+            1 => {
+                let errors = [self.error, self.least_error];
+                errors.iter().all(|error| SAFETY * error <= self.lead())
+            }
             _ => self.error <= EQUAL * self.value(),
         }
     }
@@ -169,6 +188,12 @@ mod tests {
         };
         let ahead = |error| with_error(&[(1, 0.5), (2, 0.25)], error).is_sure();
         assert_eq!([0.05, 0.051, f64::NAN].map(ahead), [true, false, false]);
+        let where_probe_is_zero = |least_error| Leader {
+            least_error,
+            ..leader(&[(1, 0.5), (2, 0.25)])
+        };
+        let ahead = |least_error| where_probe_is_zero(least_error).is_sure();
+        assert_eq!([0.05, 0.051].map(ahead), [true, false]);
         let equal = |error| with_error(&[(1, 0.5), (2, 0.5)], error).is_sure();
         assert_eq!([5e-14, 6e-14, f64::NAN].map(equal), [true, false, false]);
     }
@@ -215,7 +240,14 @@ mod tests {
         let labels_after = |products: usize, points: &[u32]| {
             let (a, _) = system::<f32>();
             let run = (None, Some(products));
-            let found = leaders(&a, points, &[0, 1, 2, 3], run, exact, Cancel::never());
+            let found = leaders(
+                &a,
+                (points, 1.0),
+                &[0, 1, 2, 3],
+                run,
+                exact,
+                Cancel::never(),
+            );
             let found = found.unwrap().into_iter();
             found.map(|leader| leader.label()).collect::<Vec<u32>>()
         };

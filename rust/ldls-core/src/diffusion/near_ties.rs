@@ -1,8 +1,8 @@
 //! The points at which single precision cannot decide between labels.
 //!
 //! At most of many seeds alone show the winner, as where several masks show all that anything flows from. What seeds leave open, and
-//! where they are few all, is decided in double precision: with a series that leaves out next to nothing, or where a probe says that it
-//! leaves out as much as labels differ by, with the products.
+//! where they are few all, is decided in double precision: with a series, where a probe says that it leaves out as much as labels
+//! differ by with one that leaves out less, and at last with the products.
 
 use super::errors::Errors;
 use super::lanes::WIDTH_F32;
@@ -17,9 +17,14 @@ use crate::masks::PixelLabels;
 use crate::{Cancel, Result};
 use std::collections::BTreeMap;
 
-/// What the series of one round after the other leave out, as a share of the largest value: the first tells labels apart that differ,
-/// the next knows equal ones, for which it leaves out less than rounding does. What neither is sure of is left for the products.
-const ROUNDS: [Option<f64>; 3] = [Some(1e-14), Some(1e-18), None];
+/// What the series of one round after the other leave out, as a share of the largest value: the first tells labels apart that single
+/// precision sees [`APART`], the second those that differ at all, the third knows equal ones, for which it leaves out less than
+/// rounding does. What none is sure of is left for the products.
+const ROUNDS: [Option<f64>; 4] = [Some(1e-8), Some(1e-14), Some(1e-18), None];
+/// The round in which equal labels are known, and before which seeds are looked at.
+const EQUAL_ROUND: usize = 2;
+/// By which share of its value the best label must be ahead in single precision for the first round: closer ones are equal as a rule.
+const APART: f32 = 2e-6;
 /// Points up to which they are a few: what flows to these is diffused in double precision in the time that it takes to look at all
 /// seeds. More are those of masks that lie over one another, most of whose labels are equal.
 const FEW: usize = 1 << 8;
@@ -36,20 +41,20 @@ pub(super) fn decide(
     cancel: &Cancel,
 ) -> Result<usize> {
     let error = |point: u32| errors.at(point as usize);
-    let mut ties = winners.near_ties(largest, error)?;
+    let (mut ties, ahead) = winners.near_ties(largest, error)?;
     let best = &mut winners.best;
     let contested = ties.values().map(Vec::len).sum();
     if contested == 0 {
         return Ok(0);
     }
     let rounds = match iterations {
-        Some(_) if contested <= FEW => 0..3,
-        Some(_) => 1..3,
+        Some(_) if contested > FEW => EQUAL_ROUND..ROUNDS.len(),
+        Some(_) => usize::from(ahead < APART)..ROUNDS.len(),
         // endlessly many end where they change little, which says no more than a series
-        None => 1..2,
+        None => EQUAL_ROUND..EQUAL_ROUND + 1,
     };
     for round in rounds {
-        if round > 0 {
+        if round >= EQUAL_ROUND {
             let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
             settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
         }
@@ -60,8 +65,11 @@ pub(super) fn decide(
         let series = ROUNDS[round].and_then(within);
         let candidates = candidates(&ties);
         let points: Vec<u32> = ties.values().flatten().copied().collect();
+        let values = points.iter().map(|&point| best[point as usize].value);
+        let least = values.fold(f32::INFINITY, f32::min);
         let products = (series.as_ref(), iterations);
-        let mut leaders = leaders(a, &points, &candidates, products, &exact, cancel)?.into_iter();
+        let mut leaders =
+            leaders(a, (&points, least), &candidates, products, &exact, cancel)?.into_iter();
         // all of them are asked about in this order
         let mut is_open = |point: &u32| {
             let leader = leaders.next().unwrap_or_default();

@@ -102,7 +102,8 @@ impl Winners {
         })
     }
 
-    /// All near-ties, where each value may be off by the `error` of the point, none by more than the `largest`.
+    /// All near-ties, where each value may be off by the `error` of the point, none by more than the `largest`, and the least share of
+    /// its value by which the best label of one is ahead.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
@@ -110,14 +111,16 @@ impl Winners {
         &mut self,
         largest: f64,
         error: impl Fn(u32) -> f64 + Sync,
-    ) -> Result<NearTies> {
+    ) -> Result<(NearTies, f32)> {
         let (best, rounding) = (&self.best, self.rounding);
         let of_share = |rivals: &mut Vec<Rival>| {
             rivals.sort_by_key(|rival| rival.point);
-            let (mut ties, mut labels) = (NearTies::new(), Vec::new());
+            let (mut ties, mut labels, mut ahead) = (NearTies::new(), Vec::new(), 1.0_f32);
             for rivals in rivals.chunk_by(|one, other| one.point == other.point) {
                 let point = rivals[0].point;
-                let best = best[point as usize].value;
+                let Best {
+                    label, value: best, ..
+                } = best[point as usize];
                 let within = |error: f64| {
                     let rivals = rivals.iter();
                     rivals.filter(move |rival| may_win(rival.value, best, rounding, error))
@@ -133,23 +136,29 @@ impl Winners {
                 labels.sort_unstable();
                 labels.dedup();
                 if labels.len() > 1 {
+                    let others = within(error).filter(|rival| rival.label != label);
+                    let next = others.map(|rival| rival.value).fold(0.0, f32::max);
+                    ahead = ahead.min((best - next) / best);
                     match ties.get_mut(&labels) {
                         Some(points) => push(points, point)?,
                         None => _ = ties.insert(labels.clone(), vec![point]),
                     }
                 }
             }
-            Ok(ties)
+            Ok((ties, ahead))
         };
         let shares = self.rivals.par_iter_mut().map(of_share);
-        let mut all = NearTies::new();
-        for (labels, points) in shares.collect::<Result<Vec<_>>>()?.into_iter().flatten() {
-            let of_labels = all.entry(labels).or_default();
-            for point in points {
-                push(of_labels, point)?;
+        let (mut all, mut least) = (NearTies::new(), 1.0);
+        for (ties, ahead) in shares.collect::<Result<Vec<_>>>()? {
+            least = ahead.min(least);
+            for (labels, points) in ties {
+                let of_labels = all.entry(labels).or_default();
+                for point in points {
+                    push(of_labels, point)?;
+                }
             }
         }
-        Ok(all)
+        Ok((all, least))
     }
 }
 
@@ -234,8 +243,8 @@ pub(super) fn candidates(ties: &NearTies) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// Near-ties of points with these labels and values, each of which may be off by as much.
-    fn ties_of(points: &[&[(u32, f32)]], error: f64) -> NearTies {
+    /// Near-ties of points with these labels and values, each of which may be off by as much, and how far the best is ahead.
+    fn ties_of(points: &[&[(u32, f32)]], error: f64) -> (NearTies, f32) {
         let (mut winners, mut rivals) = (Winners::default(), Vec::new());
         for (point, values) in (0..).zip(points) {
             let mut best = Best::default();
@@ -254,10 +263,8 @@ mod tests {
     }
 
     fn tied(points: &[&[(u32, f32)]], error: f64) -> Vec<u32> {
-        let mut tied = ties_of(points, error)
-            .into_values()
-            .collect::<Vec<_>>()
-            .concat();
+        let (ties, _) = ties_of(points, error);
+        let mut tied = ties.into_values().collect::<Vec<_>>().concat();
         tied.sort_unstable();
         tied
     }
@@ -289,6 +296,18 @@ mod tests {
     }
 
     #[test]
+    fn the_best_is_as_far_ahead_as_at_the_near_tie_where_that_is_least() {
+        let points: [&[(u32, f32)]; 3] = [
+            &[(1, 0.25), (2, 0.5), (3, 0.375)],
+            &[(1, 1.0), (2, 0.5)],
+            &[(1, 0.25), (2, 0.01)],
+        ];
+        let ahead = |error| ties_of(&points, error).1;
+        assert_eq!([0.25, 0.1, 0.0].map(ahead), [0.25, 0.25, 1.0]);
+        assert_eq!(ties_of(&[&[(1, 0.5), (2, 0.5)]], 0.0).1, 0.0);
+    }
+
+    #[test]
     fn a_label_that_nothing_reached_is_no_rival() {
         assert!(tied(&[&[(1, 0.5), (2, 0.0)]], 1.0).is_empty());
         assert!(tied(&[&[]], 1.0).is_empty());
@@ -301,10 +320,10 @@ mod tests {
             &[(1, 0.5), (4, 0.5), (6, 0.5), (8, 0.5)],
             &[(1, 0.5), (4, 0.5), (1, 0.5)],
         ];
-        let ties = ties_of(&points, 0.0);
+        let (ties, _) = ties_of(&points, 0.0);
         assert_eq!(ties[&vec![1, 4]], [0, 2]);
         assert_eq!(ties[&vec![1, 4, 6, 8]], [1]);
         assert_eq!(candidates(&ties), [1, 4, 6, 8]);
-        assert_eq!(candidates(&ties_of(&points[..1], 0.21)), [1, 4, 6]);
+        assert_eq!(candidates(&ties_of(&points[..1], 0.21).0), [1, 4, 6]);
     }
 }
