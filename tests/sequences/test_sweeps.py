@@ -39,7 +39,7 @@ def moments(seed):
 
 def poses(seed, n=3):
     turns = Rotation.random(n, random_state=seed).as_matrix()
-    places = np.random.default_rng(seed).uniform(-9, 9, (n, 3))
+    places = np.random.default_rng(seed).uniform(-2, 2, (n, 3))
     return [from_parts(turn, place) for turn, place in zip(turns, places, strict=True)]
 
 
@@ -270,6 +270,14 @@ def test_sweeps_in_another_order_than_their_stamps_are_refused():
         ldls.segment_sweeps([first, third, second])
     with pytest.raises(ldls.InputError, match=r"sweeps: two have the stamp 0.0 s; leave one of them out"):
         ldls.segment_sweeps([first, replace(second, stamp=0.0)])
+
+
+def test_sweeps_that_jump_are_refused():
+    first, second, _ = sweeps_of(1)
+    pose = second.pose.copy()
+    pose[0, 3] += 5000
+    with pytest.raises(ldls.PoseError, match=r"the lidar moves 50\d\d.* expected at most 100 m/s"):
+        ldls.segment_sweeps([first, replace(second, pose=pose)])
 
 
 @pytest.mark.parametrize(

@@ -522,7 +522,14 @@ def test_misuse_is_named():
         tracker.track([sweep, later], [*results, *ldls.segment_sweeps([later], params=PARAMS)])
     with pytest.raises(ldls.ShapeError, match="result: has 125 points, the sweep 250; give its own"):
         tracker.track([sweep_at(0.5, [((6, 0), True), ((6, 2), True)])], results)
-    tracker.track([sweep], results)
+    moved = replace(sweep, points=sweep.points + np.float32(0.5))
+    for refuses in (tracker.track, ldls.LabelledMap().add):
+        given = ([moved], results) if refuses == tracker.track else (moved, results[0])
+        with pytest.raises(ldls.InputError, match="result: is of as many other points than those of the sweep"):
+            refuses(*given)
+    tracker.track([moved], [replace(result, points=moved.points) for result in results])
+    tracker = ldls.Tracker()
+    tracker.track([replace(sweep, points=sweep.points.copy())], results)
     with pytest.raises(ldls.InputError, match=r"two have the stamp 0\.5 s"):
         tracker.track([sweep], results)
 

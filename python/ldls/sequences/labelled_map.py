@@ -138,7 +138,8 @@ class LabelledMap:
 
         Raises:
             ShapeError: The result is of another number of points.
-            InputError: An object has points and no track, so that nobody knows whether it moves.
+            InputError: The result is of other points, or an object has points and no track, so that nobody knows
+                whether it moves.
             LimitError: A point is too far from the first sweep to be numbered, or the map has too many voxels. The map
                 stays as it was.
         """

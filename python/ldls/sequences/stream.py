@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
@@ -17,9 +16,9 @@ from ldls.label_diffusion import SAME_OBJECT, segment_views
 from ldls.masks import InstanceMasks
 from ldls.params import Params
 from ldls.segmentation import Segmentation
-from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, check_order, label_sweeps
+from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, check_drive, label_sweeps
 from ldls.sequences.tracker import Tracker
-from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory
+from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.view import View
 
 BEFORE = 2
@@ -108,10 +107,9 @@ class LabelDiffusion:
         # a copy, for those who give arrays that they use again
         sweep = Sweep(as_points(points).copy(), views, pose, stamp)  # type: ignore[arg-type]
         last = (*self._recent[-1:], sweep)
-        check_order(last)
         goes_on = sweep.stamp - last[0].stamp <= LONGEST_GAP_S
         try:
-            Trajectory(np.array([each.stamp for each in last]), np.array([each.pose for each in last]))
+            check_drive(last)
         except PoseError as error:
             elsewhere = "" if goes_on else "; or begin another LabelDiffusion where another drive begins"
             raise PoseError(f"{error}{elsewhere}") from None

@@ -26,6 +26,7 @@ from ldls.errors import InputError, ShapeError
 from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
+from ldls.sequences.trajectory import Trajectory
 from ldls.view import View, check_names
 
 SAME_OBJECT = 0.1
@@ -104,6 +105,7 @@ def segment_sweeps(
     Raises:
         InputError: There is no sweep, one is not later than the one before it, or one cannot be used; see its
             subclasses.
+        PoseError: Two in a row are farther from each other than 100 m/s allow.
         LimitError: The sweeps together have more points than the graph can index.
     """
     results, report = label_sweeps(
@@ -124,7 +126,7 @@ def label_sweeps(
     """What `segment_sweeps` does without its warnings, and what the core reports of all sweeps together."""
     if not sweeps:
         raise InputError("sweeps: got none, expected one or more")
-    check_order(sweeps)
+    check_drive(sweeps)
     if nonfinite == "raise":
         for sweep in sweeps:
             check_finite(sweep.points)
@@ -170,14 +172,32 @@ def check_order(sweeps: Sequence[Sweep], after: float = -math.inf) -> None:
             raise InputError(f"sweeps: one of {stamp} s comes after one of {before} s; sort them by their stamps")
 
 
-def check_points(sweep: Sweep, result: Segmentation) -> None:
-    """Refuse a result of another sweep, by its number of points.
+def check_drive(sweeps: Sequence[Sweep]) -> None:
+    """Refuse sweeps that are not of one drive, each later than the one before.
 
     Raises:
-        ShapeError: It has more or fewer.
+        InputError: One is not later.
+        PoseError: Two in a row are farther from each other than a lidar moves.
+    """
+    check_order(sweeps)
+    Trajectory(np.array([sweep.stamp for sweep in sweeps]), np.array([sweep.pose for sweep in sweeps]))
+
+
+def check_points(sweep: Sweep, result: Segmentation) -> None:
+    """Refuse a result of another sweep.
+
+    Raises:
+        ShapeError: It has more or fewer points.
+        InputError: They are others.
     """
     if len(result.labels) != len(sweep.points):
         raise ShapeError(f"result: has {len(result.labels)} points, the sweep {len(sweep.points)}; give its own")
+    places = [points[:, :3] for points in (result.points, sweep.points)]
+    if result.points is not sweep.points and not np.array_equal(*places, equal_nan=True):
+        raise InputError(
+            "result: is of as many other points than those of the sweep; give its own, or where these were moved, "
+            "dataclasses.replace(result, points=sweep.points)"
+        )
 
 
 def _check_coordinates(points: Points) -> None:

@@ -80,7 +80,7 @@ class Tracker:
 
         Raises:
             InputError: There is no sweep, or not one result a sweep; a sweep is not later than the one before it, or
-                results are not of one call of `segment_sweeps`.
+                results are not of one call of `segment_sweeps`, or one is of other points.
             ShapeError: A result has more or fewer points than its sweep.
         """
         if len(sweeps) != len(results) or not sweeps:
