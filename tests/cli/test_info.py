@@ -198,6 +198,14 @@ def test_whether_there_are_poses_is_said_and_what_they_come_with(tmp_path):
     assert "in 3 of 3 frames" in run(bag, "--option", "world=odom").output
 
 
+def test_poses_that_an_option_leaves_out_are_not_said_to_be_missing(tmp_path):
+    pytest.importorskip("rosbags")
+    drives = [layouts.kitti_raw(tmp_path / "raw", n_frames=2), layouts.nuscenes(tmp_path / "nuscenes")]
+    drives += [layouts.kitti_odometry(tmp_path / "odometry"), ros_samples.Recording().write(tmp_path / "small.bag")]
+    for drive in drives:
+        assert "none; they are left out by --option poses=false" in run(drive, "--option", "poses=false").output
+
+
 def test_a_bag_without_clouds_is_refused_with_its_topics(tmp_path):
     pytest.importorskip("rosbags")
     with BagWriter(tmp_path / "other.bag", "rosbag1") as bag:

@@ -23,6 +23,8 @@ INFO = {"dataset": "--dataset", "option": "--option"}
         pytest.param("kind: got 'foo'; did you mean folder?", INFO, "--dataset: got 'foo'; did you mean folder?",
                      id="argument of a source"),
         pytest.param("truth: got 3", INFO, "--option truth: got 3", id="option of a source"),
+        pytest.param("poses: got 'maybe'", INFO | {"poses": "--poses"}, "--option poses: got 'maybe'",
+                     id="option of a source that is named as one of the command"),
         pytest.param("kind: got 'foo'", SEGMENT, "kind: got 'foo'", id="no option of the command"),
         pytest.param("a.bin: cut; pass recover=True to read it", INFO,
                      "a.bin: cut; pass --option recover=true to read it", id="mend"),

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rosbags")
 
 from datasets.ros_samples import START_NS, STEP_NS, Recording, transforms
-from ldls.datasets import RosBag
+from ldls.datasets import RosBag, open_source
 from ldls.errors import CalibrationError, PoseError
 from ldls.io.ros.messages import ODOMETRY, POINTS, TRANSFORMS, Header, Topic, make, make_header
 from ldls.io.ros.point_cloud2 import encode
@@ -87,6 +87,15 @@ def test_without_a_world_nothing_has_a_pose(tmp_path):
     assert opened(written(tmp_path, {"/odom": [{"stamp_ns": START_NS, "xyzw": (0, 0, 0, 0)}]}), None)[0].pose is None
 
 
+def test_poses_that_are_left_out_are_not_read(tmp_path):
+    path = written(tmp_path, {"/odom": [{"stamp_ns": START_NS, "xyzw": (0, 0, 0, 0)}]})
+    options = {"image_topics": (), "world": "odom"}
+    with pytest.raises(PoseError):
+        open_source(path, **options)[0]
+    frame = pickle.loads(pickle.dumps(open_source(path, poses=False, **options)))[0]
+    assert frame.pose is None and frame.trajectory is None
+
+
 def test_worlds_are_the_frames_that_transforms_lead_to_and_the_topics(tmp_path):
     """Static transforms lead to no world."""
     path = written(
@@ -97,7 +106,8 @@ def test_worlds_are_the_frames_that_transforms_lead_to_and_the_topics(tmp_path):
     )
     bag = opened(path, None)
     assert bag.worlds() == ["odom", "map", "/lio"]
-    assert bag.poses_from == "--option world=odom or --option world=map or --option world=/lio"
+    options = "--option world=odom or --option world=map or --option world=/lio"
+    assert bag.why_no_poses == f"they come with {options}"
     for world in bag.worlds():
         assert opened(path, world)[1].pose is not None
 
@@ -115,7 +125,7 @@ def test_worlds_are_told_by_names_alone(tmp_path, monkeypatch):
 
 def test_a_bag_without_any_way_has_no_worlds(tmp_path):
     bag = opened(written(tmp_path, {}), None)
-    assert (bag.worlds(), bag.poses_from) == ([], "")
+    assert (bag.worlds(), bag.why_no_poses) == ([], "")
 
 
 def test_transforms_come_before_odometry_and_a_topic_before_transforms(tmp_path):

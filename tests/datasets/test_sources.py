@@ -237,6 +237,9 @@ def test_poses_of_nuscenes_are_those_of_the_lidar_on_the_car(tmp_path):
     expected[:3, 3] = [5, 0, 1.8]
     np.testing.assert_allclose(second.pose, expected, atol=1e-9)
     assert first.pose[0, 3] == 0
+    without = open_source(tmp_path, poses=False)[1]
+    assert without.pose is None
+    np.testing.assert_array_equal(without.images[0].camera.T_camera_lidar, second.images[0].camera.T_camera_lidar)
 
 
 @pytest.mark.parametrize(

@@ -174,11 +174,11 @@ class Poses:
                 f"ascending stamps to track objects; {mend}"
             )
         if self._trajectory is None and not self._has_poses(chosen):
-            # only sources whose frames may have poses say what these come with
-            own = getattr(self._source, "poses_from", "")
+            # only sources whose frames may have poses say why there are none
+            why = getattr(self._source, "why_no_poses", "")
             raise PoseError(
                 f"{self._source.path}: frames of this source ({self._source.kind}) have no poses, expected them for "
-                f"--sweeps and --track; {f'they come with {own}; else ' if own else ''}give --poses FILE, or --poses "
+                f"--sweeps and --track; {f'{why}; else ' if why else ''}give --poses FILE, or --poses "
                 f"{KISS_ICP}"
             )
 

@@ -225,9 +225,9 @@ def _poses(source: Source, facts: Sequence[FrameFacts]) -> str:
     posed = sum(each.has_pose for each in facts)
     if posed:
         return f"in {posed} of {len(facts)} frames"
-    # only sources whose frames may have poses say what these come with
-    own = getattr(source, "poses_from", "")
-    return f"none; they come with {own}" if own else "none of its own"
+    # only sources whose frames may have poses say why there are none
+    why = getattr(source, "why_no_poses", "")
+    return f"none; {why}" if why else "none of its own"
 
 
 def _range(low: str, high: str) -> str:

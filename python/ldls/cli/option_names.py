@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 
 OF_SOURCES = (
-    "camera", "drive", "image_topics", "info_topics", "lidar", "max_offset_s", "recover", "scene", "sequence", "split",
-    "truth", "version", "world",
+    "camera", "drive", "image_topics", "info_topics", "lidar", "max_offset_s", "poses", "recover", "scene", "sequence",
+    "split", "truth", "version", "world",
 )  # fmt: skip
 """Arguments of sources, which --option takes."""
 WORDS: Mapping[str, Mapping[str, str]] = {
@@ -64,4 +64,5 @@ def _with_value(found: re.Match[str], options: Mapping[str, str]) -> str:
 def _words(argument: str, options: Mapping[str, str]) -> str | None:
     """Words for an argument; None where the command has no option for it."""
     others = (words for option, words in WORDS.get(argument, {}).items() if option in options.values())
-    return options.get(argument) or next(others, None)
+    # what --option takes first: errors of poses=maybe are not about --poses
+    return next(others, None) or options.get(argument)

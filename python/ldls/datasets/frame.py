@@ -17,6 +17,9 @@ from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
 from ldls.sequences import Trajectory
 
+POSES_LEFT_OUT = "they are left out by --option poses=false"
+"""What sources opened with `poses=False` have as `why_no_poses`."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CameraImage:

@@ -17,7 +17,7 @@ from ldls.camera import Camera
 from ldls.checks import checked
 from ldls.checks.values import as_seconds
 from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
-from ldls.datasets.frame import CameraImage
+from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
 from ldls.datasets.kitti_common import camera_numbers
 from ldls.io import read_camera, read_poses
 from ldls.io.files import read_lines
@@ -41,7 +41,7 @@ class KittiOdometrySource(FileSource):
 
     kind = "kitti-odometry"
     looks_for = "velodyne/ and calib.txt, in the folder, or in NN/ or sequences/NN/ below it"
-    poses_from = "poses.txt and times.txt"
+    why_no_poses = "they come with poses.txt and times.txt"
 
     @checked
     def __init__(
@@ -79,6 +79,8 @@ class KittiOdometrySource(FileSource):
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}
         self.stamps = _read_stamps(path, self.names)
         self._poses_file = _poses_file(path) if poses else None
+        if not poses:
+            self.why_no_poses = POSES_LEFT_OUT
         self._trajectory = _trajectory(path, self._poses_file, next(iter(self._cameras.values())))
 
     @classmethod

@@ -26,7 +26,7 @@ from ldls.datasets.file_source import (
     find_points,
     image_from_file,
 )
-from ldls.datasets.frame import CameraImage
+from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
 from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import CorruptFileError, SourceError
 from ldls.io import read_camera, read_poses
@@ -63,7 +63,7 @@ class KittiRawSource(FileSource):
 
     kind = "kitti-raw"
     looks_for = "velodyne_points/, in the folder or in one *_sync/ below it"
-    poses_from = "oxts/ and the day's calib_imu_to_velo.txt"
+    why_no_poses = "they come with oxts/ and the day's calib_imu_to_velo.txt"
 
     @checked
     def __init__(
@@ -101,6 +101,8 @@ class KittiRawSource(FileSource):
         super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
         self.stamps = _stamps(path / LIDAR / STAMPS, self.names)
         self._trajectory = _trajectory(path) if poses else None
+        if not poses:
+            self.why_no_poses = POSES_LEFT_OUT
         self._measured = _measured(path) if self._trajectory is not None else ()
         self._image_stamps = {name: _stamps(path / name / STAMPS, self.names) for name in cameras}
         self._turns = _turns(path / LIDAR, self.names)

@@ -18,7 +18,7 @@ from ldls.checks import checked
 from ldls.cloud import Points
 from ldls.datasets import nuscenes_tables as tables
 from ldls.datasets.file_source import check_truth, choose, counts_of, image_from_file, warn_left_out
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame
 from ldls.datasets.nuscenes_tables import Reading
 from ldls.errors import SourceError
 from ldls.io import read_points
@@ -49,6 +49,7 @@ class NuScenesSource:
 
     kind = "nuscenes"
     looks_for = "v1.0-*/sample_data.json"
+    why_no_poses = POSES_LEFT_OUT
 
     @checked
     def __init__(
@@ -59,6 +60,7 @@ class NuScenesSource:
         version: str | None = None,
         lidar: str | None = None,
         truth: bool = True,
+        poses: bool = True,
     ) -> None:
         """Read the tables, a row at a time; what is kept is some 6 kB a frame.
 
@@ -68,6 +70,7 @@ class NuScenesSource:
             version: Name of the tables' folder, as "v1.0-mini", if there are several.
             lidar: Channel of the lidar; LIDAR_TOP, or the only one there is, without it.
             truth: Give frames their truth, where it is there.
+            poses: Give frames their poses; cameras have the car's motion by these in any case.
 
         Raises:
             SourceError: A table is missing, no frame is whole, or there is no such scene.
@@ -97,7 +100,7 @@ class NuScenesSource:
         warn_left_out(self.path, self.left_out.values(), len(samples))
         self._frames = tuple(readings[token] for token in samples if token not in missing)
         self.stamps: tuple[float | None, ...] = tuple(frame[self._lidar].stamp_us / 1e6 for frame in self._frames)
-        self._tables = folder
+        self._tables, self._posed = folder, poses
         self._poses = tables.read_poses(folder, {taken.pose for frame in self._frames for taken in frame.values()})
         sweeps = {frame[self._lidar].token for frame in self._frames} if truth else set()
         self._truths = {name: tables.read_truth_files(folder, name, sweeps) for name in TRUTHS}
@@ -128,7 +131,7 @@ class NuScenesSource:
             name=self.names[index],
             points=points,
             stamp=self.stamps[index],
-            pose=self._pose(sweep),
+            pose=self._pose(sweep) if self._posed else None,
             images=tuple(self._image(channel, frame[channel], sweep) for channel in self.camera_names),
             truth=self._read_truth(sweep.token, points),
         )

@@ -68,7 +68,7 @@ def open_source(
         path: A folder, or a file such as a bag.
         kind: One of `SOURCES`; by default the only one that recognises the path.
         truth: Give frames their truth, where the source has any; it takes time to read. A text names its kind.
-        poses: Give frames their poses, where the source reads any from files beside its frames.
+        poses: Give frames their poses, where the source has any.
         options: Those of the kind's class, as `camera` or `scene`.
 
     Raises:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ldls.camera import Camera
 from ldls.camera.camera_info import MESSAGE_FIELDS
 from ldls.checks import checked
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame
 from ldls.datasets.ros_odometry import Odometry, odometry_topics, read_odometry
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
 from ldls.datasets.ros_topics import choose_topics
@@ -88,6 +88,7 @@ class RosBag:
         T_camera_lidar: Extrinsic | Mapping[str, Extrinsic] | None = None,
         fields: Mapping[str, str] | None = None,
         world: str | None = None,
+        poses: bool = True,
         recover: bool = False,
     ) -> None:
         """Open a bag and pair its stamps.
@@ -106,6 +107,7 @@ class RosBag:
             world: Frame in which frames have their pose and trajectory, as "odom" or "map": by /tf, or where that does
                 not connect it with the cloud's frame by messages of nav_msgs/Odometry; a topic of these, as
                 "/odometry", has them come from it. Without a world there are none, and neither is read for them.
+            poses: Give frames their poses, where there is a world.
             recover: If true, a truncated bag yields its whole messages and a warning instead of an error.
 
         Raises:
@@ -122,7 +124,8 @@ class RosBag:
         if unknown:
             raise ParameterError(f"fields: got {', '.join(unknown)}, expected {', '.join((*READ_FIELDS, TIME))}")
         self.path, self.max_offset_s = Path(path), max_offset_s
-        self.recover, self.world = recover, world
+        self.recover, self.world = recover, world if poses else None
+        self._posed = poses
         self._fields = dict(fields or {})
         self._bag = open_bag(self.path, recover=recover)
         self.topics = choose_topics(self._bag, points_topic, image_topics, info_topics)
@@ -152,9 +155,12 @@ class RosBag:
         self.names = tuple(f"{number:06d}" for number in range(len(stamps))) if repeated else tuple(stamps)
 
     @property
-    def poses_from(self) -> str:
+    def why_no_poses(self) -> str:
         """The options that give frames poses, by what the bag has, for messages."""
-        return " or ".join(f"--option world={world}" for world in self.worlds())
+        if not self._posed:
+            return POSES_LEFT_OUT
+        options = " or ".join(f"--option world={world}" for world in self.worlds())
+        return f"they come with {options}" if options else ""
 
     def worlds(self) -> list[str]:
         """Return what `world` can be: frames that /tf leads to, the nearest first, and topics of Odometry.
