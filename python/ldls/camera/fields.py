@@ -121,7 +121,7 @@ class Fields:
         return values
 
     def _rows_and_columns(self, matrix: Fields) -> NDArray[np.float64]:
-        values = matrix.numbers("data")
+        values = matrix.numbers("data", mend="write a list of numbers, or rows: 1, cols: 2, data: [1.0, 0.5]")
         rows, columns = matrix.whole_number("rows"), matrix.whole_number("cols")
         if rows is None or columns is None:
             return values

@@ -5,7 +5,7 @@ import pytest
 
 import ldls
 from datasets import layouts
-from ldls.io.cameras.extrinsic_file import as_extrinsic
+from ldls.io.cameras.extrinsic_file import EXAMPLE, as_extrinsic
 
 T = np.array(layouts.T, float)
 ROWS = "\n".join(" ".join(map(str, row)) for row in T.tolist())
@@ -54,6 +54,15 @@ def test_a_transform_is_read_from_a_file(tmp_path, name, text):
         pytest.param(
             "a.json", json.dumps(PARTS | {"quat": 1}), "unknown key 'quat', expected T_camera_lidar", id="key"
         ),
+        pytest.param("a.json", json.dumps({"R": 1}), "unknown key 'R'.*; name the parts, as translation: ", id="none"),
+        pytest.param("a.json", '{"pose_of": "camera"}', "'translation' missing; .*; name the parts, as", id="no part"),
+        pytest.param("a.json", json.dumps(ROS | {"translation": {"a": 1}}),
+                     r"translation: found keys a, expected .* as {x: 0.0, y: 0.0, z: 0.0}", id="axes"),
+        pytest.param("a.json", json.dumps(NAMED | {"quaternion_wxyz": {}}),
+                     r"found keys none, expected .* {w: 1.0, x: 0.0,", id="no axes"),
+        pytest.param("a.json", '{"T_camera_lidar": {"matrix": 1}}',
+                     r"T_camera_lidar: key 'data' missing; found matrix; write .* rows: 1, cols: 2, data: \[1.0, 0.5\]",
+                     id="matrix"),
         pytest.param("a.json", json.dumps(PARTS | {"optical": 3}), "optical: ", id="optical"),
         pytest.param(
             "a.json", json.dumps(ROS | {"quaternion_xyzw": [0, 0, 0, 1]}), "expected one of", id="two rotations"
@@ -67,11 +76,17 @@ def test_a_transform_is_read_from_a_file(tmp_path, name, text):
         ),
         pytest.param("a.txt", ROWS.replace("-1.0", "1.0", 1), "deviates|a mirror", id="mirror"),
     ],
-)
+)  # fmt: skip
 def test_faults_are_named_with_their_file(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
     with pytest.raises(ldls.LdlsError, match=rf"{name}.*({message})"):
         as_extrinsic(tmp_path / name)
+
+
+def test_the_example_of_errors_is_a_transform(tmp_path):
+    pytest.importorskip("yaml", reason="the extra yaml is not installed")
+    (tmp_path / "a.yaml").write_text(f"--- {{{EXAMPLE.removeprefix('name the parts, as ')}}}")
+    np.testing.assert_array_equal(as_extrinsic(tmp_path / "a.yaml")[:3, 3], [-0.1, 0, 0.2])
 
 
 def test_a_camera_takes_the_file_beside_it(tmp_path):

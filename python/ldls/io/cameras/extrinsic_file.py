@@ -24,6 +24,7 @@ PARTS = ("translation", "pose_of", "quaternion_wxyz", "quaternion_xyzw", "roll_p
 WORDS = ("pose_of", "optical")
 AXES = {"translation": "xyz", "quaternion_wxyz": "wxyz", "quaternion_xyzw": "xyzw", "rotation": "xyzw"}
 """Names of the numbers of parts, in their order."""
+EXAMPLE = "name the parts, as translation: [0.1, 0.0, -0.2], quaternion_xyzw: [0.0, 0.0, 0.0, 1.0], pose_of: camera"
 MATRICES = ("T_camera_lidar", "T_lidar_camera")
 
 Extrinsic = ArrayLike | str | PathLike[str] | Mapping[str, Any]
@@ -82,10 +83,9 @@ def _numbers(words: list[str]) -> NDArray[np.float64] | None:
 
 def _from_numbers(place: str, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     if numbers.size not in (12, 16):
-        hint = "; name the parts: translation: [x, y, z], quaternion_xyzw: [...], pose_of: camera"
         raise CalibrationError(
             f"{place}: expected the 12 or 16 numbers of T_camera_lidar by rows, got {numbers.size}"
-            f"{hint if numbers.size in (6, 7) else ''}"
+            f"{f'; {EXAMPLE}' if numbers.size in (6, 7) else ''}"
         )
     if not np.isfinite(numbers).all():
         raise CalibrationError(f"{place}: expected finite numbers, got {numbers[~np.isfinite(numbers)][0]}")
@@ -102,7 +102,8 @@ def _from_table(fields: Fields) -> NDArray[np.float64]:
     unknown = [str(key) for key in fields.entries if key not in PARTS]
     if unknown:
         raise CalibrationError(
-            f"{fields.place}: unknown key {unknown[0]!r}, expected {' or '.join(MATRICES)}, or {', '.join(PARTS)}"
+            f"{fields.place}: unknown key {unknown[0]!r}, expected {' or '.join(MATRICES)}, or {', '.join(PARTS)}; "
+            f"{EXAMPLE}"
         )
     if fields.find("pose_of") is None:
         raise CalibrationError(
@@ -110,18 +111,25 @@ def _from_table(fields: Fields) -> NDArray[np.float64]:
             "frame, as in a URDF or /tf, and 'lidar' where it maps lidar to camera coordinates"
         )
     # the one part that must be there
-    fields.get("translation")
+    fields.get("translation", mend=EXAMPLE)
     entries = {name: value for name, value in fields.entries.items() if value is not None}
     rotation = entries.get("rotation")
     if isinstance(rotation, Mapping) and rotation.keys() == set("xyzw") and "quaternion_xyzw" not in entries:
         entries["quaternion_xyzw"] = entries.pop("rotation")
-    listed = Fields(fields.place, {name: _in_order(AXES.get(name, ""), value) for name, value in entries.items()})
-    # YAML takes 1e-05 for text, which `numbers` knows
-    parts: dict[str, Any] = {name: value if name in WORDS else listed.numbers(name) for name, value in entries.items()}
     with within(fields.place):
+        listed = Fields(fields.place, {name: _in_order(name, value) for name, value in entries.items()})
+        # YAML takes 1e-05 for text, which `numbers` knows
+        parts: dict[str, Any] = {name: v if name in WORDS else listed.numbers(name) for name, v in entries.items()}
         return extrinsic(**parts)
 
 
-def _in_order(axes: str, value: object) -> object:
-    """The list of a value that has the names of its axes, as in ROS; any other value as it is."""
-    return [value[axis] for axis in axes] if isinstance(value, Mapping) and value.keys() == set(axes) else value
+def _in_order(name: str, value: object) -> object:
+    """The list of a part that has the names of its axes, as in ROS; any other value as it is."""
+    axes = AXES.get(name)
+    if axes is None or not isinstance(value, Mapping) or "data" in value:
+        return value
+    if value.keys() != set(axes):
+        found = " ".join(map(str, value)) or "none"
+        example = ", ".join(f"{axis}: {float(axis == 'w')}" for axis in axes)
+        raise CalibrationError(f"{name}: found keys {found}, expected a list of numbers, or keys as {{{example}}}")
+    return [value[axis] for axis in axes]
