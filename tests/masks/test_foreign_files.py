@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 import ldls
-from ldls.errors import LeftOutWarning
+from ldls.errors import LdlsWarning, LeftOutWarning
 
 SQUARE = np.zeros((60, 80), bool)
 SQUARE[15:30, 20:40] = True
@@ -241,6 +241,22 @@ def test_coco_panoptic_does_without_what_nobody_needs(tmp_path):
     assert [mask.name for mask in ldls.read_masks(tmp_path / "panoptic.json")] == ["3"]
 
 
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        pytest.param((60, 81), r"\(60, 81\) \(height, width\), its .*a\.png is \(60, 80\), .*own PNG$", id="another"),
+        pytest.param((80, 60), r"\(80, 60\) .*; swapped\?", id="swapped"),
+    ],
+)
+def test_coco_panoptic_of_another_size_than_its_png_is_warned_of(tmp_path, size, message):
+    content = panoptic(tmp_path / "a.png")
+    content["images"][0].update(zip(("height", "width"), size, strict=True))
+    (tmp_path / "panoptic.json").write_text(json.dumps(content))
+    with pytest.warns(LdlsWarning, match=rf"panoptic\.json: image 5 is {message}") as caught:
+        assert ldls.read_masks(tmp_path / "panoptic.json").image_size == (60, 80)
+    assert caught[0].filename == __file__
+
+
 def test_stuff_and_groups_of_cityscapes_are_background(tmp_path):
     values = np.where(SQUARE, 26001, 26).astype(np.uint16)
     values[0], values[1] = 25002, 7
@@ -258,7 +274,7 @@ def test_an_empty_segmentation_is_left_out(tmp_path):
         assert len(ldls.read_masks(tmp_path / "a.json")) == 1
 
 
-@pytest.mark.filterwarnings("ignore::ldls.errors.LeftOutWarning")
+@pytest.mark.filterwarnings("ignore::ldls.errors.LdlsWarning")
 @pytest.mark.parametrize(
     ("name", "options", "names"),
     [

@@ -5,6 +5,7 @@ Source: https://cocodataset.org/#format-data.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ldls.categories import is_object
-from ldls.errors import CorruptFileError, MaskError
+from ldls.errors import CorruptFileError, LdlsWarning, MaskError
 from ldls.io.files import strictly_below
 from ldls.io.images import read_image
 from ldls.masks import InstanceMasks, instance_image
@@ -29,7 +30,7 @@ def read(path: Path, content: Mapping[str, Any], *, image_id: int | str | None =
     """The things of one image; stuff (isthing 0) is background.
 
     Args:
-        path: The JSON file; the PNG lie beside it, or in the folder of its name.
+        path: The JSON file; the PNG lie beside it, or in the folder of its name. Sizes of masks are theirs.
         content: The parsed JSON.
         image_id: Which image, where there are several.
 
@@ -41,11 +42,14 @@ def read(path: Path, content: Mapping[str, Any], *, image_id: int | str | None =
         FileNotFoundError: The PNG is not there.
     """
     annotations, images, names = parts(content)
-    annotation = _annotation(annotations, images, image_id)
+    chosen = chosen_image(annotations, images, image_id)
+    annotation = _annotation(annotations, chosen)
     file_name = annotation["file_name"]
     segments = by_id("segments_info", annotation.get("segments_info"), (int,))
     paths = [strictly_below(folder, file_name, place=str(path)) for folder in _folders(path)]
-    colours = read_image(next((each for each in paths if each.exists()), paths[0]))
+    png = next((each for each in paths if each.exists()), paths[0])
+    colours = read_image(png)
+    _check_size(path, images.get(chosen, {}), png, colours.shape[:2])
     values = colours.astype(np.int64) @ [1, 256, 65536]
     numbers, rles = instance_image.split(values)
     missing = sorted(segments.keys() - set(numbers.tolist()))
@@ -70,11 +74,8 @@ def read(path: Path, content: Mapping[str, Any], *, image_id: int | str | None =
     )
 
 
-def _annotation(
-    annotations: list[dict[str, Any]], images: Mapping[Any, dict[str, Any]], image_id: int | str | None
-) -> dict[str, Any]:
+def _annotation(annotations: list[dict[str, Any]], chosen: int | str | None) -> dict[str, Any]:
     """The only annotation of the image, with the name of its PNG."""
-    chosen = chosen_image(annotations, images, image_id)
     own = [a for a in annotations if a.get("image_id") in (None, chosen)]
     if len(own) != 1:
         raise CorruptFileError(f"expected one annotation of image {chosen!r}, which lists its segments, got {len(own)}")
@@ -83,6 +84,19 @@ def _annotation(
             f"the annotation of image {chosen!r} has file_name {own[0].get('file_name')!r}, expected that of its PNG"
         )
     return own[0]
+
+
+def _check_size(path: Path, image: Mapping[str, Any], png: Path, size: tuple[int, ...]) -> None:
+    """Warn of an image whose PNG has another size; other readers look at that of the PNG alone."""
+    own = image.get("height"), image.get("width")
+    if None not in own and own != size:
+        swapped = "; swapped?" if own == size[::-1] else ""
+        warnings.warn(
+            f"{path}: image {image['id']!r} is {own} (height, width), its {png} is {size}, which is taken; mend the "
+            f"image's height and width, or take its own PNG{swapped}",
+            LdlsWarning,
+            stacklevel=7,
+        )
 
 
 def _folders(path: Path) -> tuple[Path, Path]:
