@@ -27,7 +27,9 @@ def finite_rows(points: Points) -> NDArray[np.int64]:
 def doubt_of_scale(low: ArrayLike, high: ArrayLike) -> str | None:
     """What is odd about the extent of points from `low` to `high` (3,), in metres; None where nothing is."""
     extent = float(np.max(np.subtract(high, low)))
-    return f"points: extent is {extent:.3g} m, over 10 km; are they in metres?" if extent > WIDEST_CLOUD_M else None
+    if not extent > WIDEST_CLOUD_M:
+        return None
+    return f"points: extent is {extent:.3g} m, over 10 km; are they in metres? Divide millimetres by 1000"
 
 
 def as_points(points: ArrayLike) -> Points:

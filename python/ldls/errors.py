@@ -156,7 +156,7 @@ class PrecisionWarning(LdlsWarning):
 
 
 class ScaleWarning(LdlsWarning):
-    """A cloud so large that its unit is probably not the metre."""
+    """A cloud, or a translation, so large that its unit is probably not the metre."""
 
 
 class DuplicateWarning(LdlsWarning):

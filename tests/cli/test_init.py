@@ -219,6 +219,15 @@ def test_a_name_that_is_no_text_is_named(rig):
     assert not (rig / "ldls.toml").exists()
 
 
+NO_TRANSFORM = "where the lidar is, for front: found no transform, none of 1 tried shows a point"
+
+
+def _with_a_transform_in_millimetres(rig):
+    camera = sample_frame().images[0].camera
+    write(rig / "front.yaml", intrinsics(camera))
+    write(rig / "T.txt", rows(np.column_stack([camera.T_camera_lidar[:3, :3], 1000 * camera.T_camera_lidar[:3, 3]])))
+
+
 @pytest.mark.parametrize(
     ("harm", "missing"),
     [
@@ -231,8 +240,13 @@ def test_a_name_that_is_no_text_is_named(rig):
         ),
         pytest.param(
             lambda rig: write(rig / "camera.yaml", intrinsics(sample_frame().images[0].camera)),
-            "where the lidar is, for front: found no transform",
+            "where the lidar is, for front: found no transform; docs",
             id="no transform",
+        ),
+        pytest.param(
+            _with_a_transform_in_millimetres,
+            f"{NO_TRANSFORM} (T_camera_lidar: the lidar is 288 m from",
+            id="no transform in metres",
         ),
     ],
 )
@@ -242,6 +256,32 @@ def test_what_is_missing_is_said_and_the_rest_is_written(rig, harm, missing):
     assert outcome.exit_code == 1
     assert f"missing  {missing}" in outcome.output
     assert described(rig)["points"] == "lidar/{frame}.bin"
+
+
+@pytest.mark.parametrize(
+    ("points", "translation", "warnings"),
+    [
+        pytest.param(1, 1, [], id="metres"),
+        pytest.param(1000, 1, ["lidar/{frame}.bin: points: extent is"], id="clouds"),
+        pytest.param(1000, 1000, ["lidar/{frame}.bin: points: extent is", "front: T_camera_lidar: the lidar is 288 m"],
+                     id="both"),
+    ],
+)  # fmt: skip
+def test_millimetres_are_warned_of(rig, frame, points, translation, warnings):
+    xyz = np.asarray(frame.points, np.float32)[:, :3] * points
+    write(rig / f"lidar/{NAMES[0]}.bin", np.column_stack([xyz, np.asarray(frame.points)[:, 3]]).astype("<f4").tobytes())
+    camera = frame.images[0].camera
+    T = camera.T_camera_lidar * [[1, 1, 1, translation]]
+    T[3, 3] = 1
+    write(rig / "front.yaml", intrinsics(camera))
+    write(rig / "T.txt", rows(T))
+    outcome = run("init", rig)
+    assert outcome.exit_code == 0, outcome.output
+    said = [line for line in outcome.stderr.splitlines() if line.startswith("warning: ")]
+    assert all(line.startswith(f"warning: {each}") for line, each in zip(said, warnings, strict=True)), said
+    assert all("in metres? Divide millimetres by 1000" in line for line in said)
+    distant = "T_camera_lidar: the lidar is 288 m from the camera; is its"
+    assert (distant in " ".join(run("info", rig).output.replace("│", " ").split())) == (translation > 1)
 
 
 def test_a_file_that_is_there_is_kept(rig):

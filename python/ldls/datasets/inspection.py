@@ -17,6 +17,8 @@ from ldls.stages import project
 
 LEAST_IN_VIEW = 0.01
 """Share of points below which a camera hardly sees the cloud: most calibrations that are wrong lead there."""
+FARTHEST_CAMERA_M = 20.0
+"""A camera farther from its lidar is hardly on the same rig: most translations that are in millimetres lead there."""
 LARGEST_OFFSET_S = 0.1
 """An image farther from its sweep than this is of another turn of the lidar."""
 LARGEST_GAP = 2.5
@@ -88,6 +90,7 @@ def inspect(source: Source, index: int) -> FrameFacts:
         findings=(
             *_of_cloud(frame),
             *(finding for image in frame.images for finding in _of_image(frame, image)),
+            *_of_distances(frame),
             *_of_views(name, shares if len(frame.points) else {}),
             *_of_offsets(name, offsets),
         ),
@@ -99,6 +102,17 @@ def in_view(frame: Frame, image: CameraImage) -> float:
     if not len(frame.points) or image.camera.image_size is None:
         return 0.0
     return len(project(frame.points, image.camera, image_size=image.camera.image_size)[0]) / len(frame.points)
+
+
+def doubt_of_distance(T_camera_lidar: NDArray[np.float64]) -> str | None:
+    """What is odd about the distance from lidar to camera; None where nothing is."""
+    distance_m = float(np.linalg.norm(T_camera_lidar[:3, 3]))
+    if not distance_m > FARTHEST_CAMERA_M:
+        return None
+    return (
+        f"T_camera_lidar: the lidar is {distance_m:,.0f} m from the camera; is its translation in metres? Divide "
+        "millimetres by 1000"
+    )
 
 
 def check_stamps(names: Sequence[str], stamps: Sequence[float | None]) -> list[Finding]:
@@ -168,6 +182,11 @@ def _of_image(frame: Frame, image: CameraImage) -> list[Finding]:
         what = f"{image.name}: image is {shape[0]} x {shape[1]}, its calibration is for {expected[0]} x {expected[1]}"
         return [Finding(frame.name, f"{what} (height x width)", broken=True)]
     return []
+
+
+def _of_distances(frame: Frame) -> list[Finding]:
+    doubts = ((image.name, doubt_of_distance(image.camera.T_camera_lidar)) for image in frame.images)
+    return [Finding(frame.name, f"{camera}: {doubt}", broken=False) for camera, doubt in doubts if doubt is not None]
 
 
 def _of_views(name: str, shares: Mapping[str, float]) -> list[Finding]:

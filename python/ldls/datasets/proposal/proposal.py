@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from ldls.cloud import Points
+import numpy as np
+from numpy.typing import NDArray
+
+from ldls.cloud import Points, doubt_of_scale, finite_rows
 from ldls.datasets.file_source import IMAGE_SUFFIXES
 from ldls.datasets.folder import FRAME
 from ldls.datasets.folder_description import FILE
+from ldls.datasets.inspection import doubt_of_distance
 from ldls.datasets.proposal.calibrations import (
     FoundCamera,
     camera_in,
@@ -20,7 +25,7 @@ from ldls.datasets.proposal.calibrations import (
     view_of,
 )
 from ldls.datasets.proposal.patterns import Pattern, patterns_of
-from ldls.errors import FileFormatError, LdlsError, SourceError
+from ldls.errors import FileFormatError, LdlsError, ScaleWarning, SourceError
 from ldls.io import read_masks, read_points
 from ldls.io.cameras.field_file import MAX_BYTES
 from ldls.io.images import read_image_size
@@ -86,6 +91,10 @@ def propose(folder: Path) -> Proposal:
     if columns is not None:
         made.lines.append(f"columns = {columns}")
         made.ask(f"the first file makes sense as rows of {columns} floats")
+    xyz = points[finite_rows(points), :3].astype(np.float64)
+    scale = doubt_of_scale(xyz.min(axis=0), xyz.max(axis=0)) if len(xyz) else None
+    if scale is not None:
+        warnings.warn(f"{sweeps.text}: {scale}", ScaleWarning, stacklevel=2)
     for other, _, _ in clouds:
         if other is not sweeps:
             made.ask(f"{other.text} ({_count(other, 'cloud')}) is not used")
@@ -223,12 +232,14 @@ def _add_calibration(
         made.ask("is this the calibration of this camera? No file has its name")
     if found.knows_lidar:
         upright, share = view_of(found.camera, points, size)
-        _judge(made, name, share, upright=upright)
+        _judge(made, name, share, found.camera.T_camera_lidar, upright=upright)
         return
     transforms = [each for pattern in small for each in transforms_in(_file(pattern, sweeps), pattern.text)]
     plausible = plausible_transforms(transforms, found.camera, points, size)
     if not plausible:
         turned = f", none of {len(transforms)} tried shows a point" if transforms else ""
+        doubt = doubt_of_distance(transforms[0].matrix) if transforms else None
+        turned += f" ({doubt})" if doubt is not None else ""
         made.missing.append(f"where the lidar is, for {name}: found no transform{turned}; docs/own-sensors.md says how")
         made.lines.append("# T_camera_lidar = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]")
         made.ask("no file says where the lidar is")
@@ -241,7 +252,7 @@ def _add_calibration(
         for another, also in plausible[1 : 1 + MOST_OTHERS]:
             made.ask(f"it shows {also:.0%} of the points if it is {another.how}:")
             made.lines.append(f"# {another.line}")
-    _judge(made, name, share)
+    _judge(made, name, share, chosen.matrix)
 
 
 def _camera_of(pattern: Pattern, sweeps: Pattern, name: str) -> FoundCamera | None:
@@ -253,10 +264,15 @@ def _file(pattern: Pattern, sweeps: Pattern) -> Path:
     return pattern.files[min(common)] if len(pattern.files) > 1 and common else pattern.first[1]
 
 
-def _judge(made: Proposal, name: str, share: float, *, upright: bool = True) -> None:
+def _judge(
+    made: Proposal, name: str, share: float, T_camera_lidar: NDArray[np.float64], *, upright: bool = True
+) -> None:
     made.ask(f"{share:.0%} of the first sweep's points are in view of {name}; look: ldls info . --picture check.png")
     if not upright:
         made.ask("but z of the lidar does not point up in the image: is the transform turned round?")
+    doubt = doubt_of_distance(T_camera_lidar)
+    if doubt is not None:
+        warnings.warn(f"{name}: {doubt}", ScaleWarning, stacklevel=4)
 
 
 def _names(pattern: Pattern, name: str) -> bool:
