@@ -86,7 +86,7 @@ FRAME = "segment --points points.npy --calib camera.yml --masks masks.npz --out 
         pytest.param(f"{FRAME} --part-gap -1", "--part-gap: got -1", id="parameter of segment"),
         pytest.param(
             f"{FRAME} --points cut.bin --columns 5 --extrinsic lidar.txt",
-            "; pass another --columns if rows are of another length; in Python, pass recover=True to read",
+            "; pass another --columns if rows are of another length; else copy it again",
             id="columns of segment",
         ),
         pytest.param("run kitti --masks masks --out out --cores 100000", "--cores: got 100000", id="cores of run"),
@@ -105,7 +105,8 @@ def test_errors_name_options(files, words, message):
 
 
 def test_findings_and_frames_that_fail_name_no_arguments_as_if_they_were_options(files):
-    expected = "in Python or ldls.toml, pass columns= if rows"
+    expected = "in Python or ldls.toml, pass columns= if rows are of another length; else copy it again, or have "
+    expected += "ldls.read_points recover the whole points"
     found = CliRunner().invoke(app, ["info", "kitti", "--all"])
     assert found.exit_code == 1 and expected in " ".join(found.output.replace("│", " ").split()), found.output
     shown = CliRunner().invoke(app, ["view", "kitti", "--rerun", "a.rrd"])

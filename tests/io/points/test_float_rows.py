@@ -56,8 +56,10 @@ def test_a_truncated_file_says_where_it_ends(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "mend"),
     [
-        pytest.param(None, "; pass columns= if rows are of another length; pass recover=True to read", id="usual"),
-        pytest.param(5, "; pass another columns= if rows are of another length; pass recover=True to read", id="given"),
+        pytest.param(
+            None, "; pass columns= if rows are of another length; else .* have ldls.read_points recover", id="usual"
+        ),
+        pytest.param(5, "; pass another columns= if rows are of another length; else copy it again", id="given"),
     ],
 )
 def test_what_mends_a_truncated_file_tells_by_whom_its_columns_are_given(tmp_path, columns, mend):

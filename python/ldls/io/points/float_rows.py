@@ -63,7 +63,8 @@ def _rows(path: Path, content: NDArray[np.uint8], columns: int, *, guessed: bool
         if not recover:
             other = "columns=" if guessed else "another columns="
             raise TruncatedFileError(
-                f"{message}; pass {other} if rows are of another length; pass recover=True to read the whole points"
+                f"{message}; pass {other} if rows are of another length; else copy it again, or have ldls.read_points "
+                "recover the whole points"
             )
         warnings.warn(f"{path}: {message}", RecoveredFileWarning, stacklevel=4)
     values = np.frombuffer(content, "<f4", count=whole // FLOAT_BYTES)
