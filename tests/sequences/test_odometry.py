@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import ldls
 from ldls.datasets import odometry_of
+from ldls.errors import LdlsWarning
 from ldls.simulation import Drive, drive_frame
 from ldls.simulation.drives import drive_poses
 
@@ -128,6 +129,16 @@ NO_PLACE = street() * np.array([0.2, 0.2, 1]) - np.array([70, 30, 0])
 def test_what_has_no_way_is_refused(sweeps, error, message):
     with pytest.raises(error, match=re.escape(message)):
         ldls.odometry(sweeps)
+
+
+def test_stamps_that_jump_ahead_are_warned_of(sweeps, trajectory):
+    """Where places look alike, a lidar that moved in a gap passes for one that did not."""
+    late = [(stamp + 300 * (number >= 2), points) for number, (stamp, points) in enumerate(sweeps[:4])]
+    message = r"sweeps: 1 of 4 come over 1 s after .* the first 300\.100 s after 0\.100000 s, .*; mend the stamps"
+    with pytest.warns(LdlsWarning, match=message) as caught:
+        found = ldls.odometry(late)
+    assert caught[0].filename == __file__
+    np.testing.assert_allclose(found.poses, trajectory.poses[:4], atol=1e-9)
 
 
 def test_without_the_library_the_extra_is_named(monkeypatch):

@@ -7,6 +7,7 @@ moved. What lies low keeps the way level afterwards (`ground_level`).
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -17,7 +18,7 @@ from ldls._optional import require
 from ldls.camera.rigid import inverse, transformed
 from ldls.checks import checked, shown
 from ldls.cloud import Points, as_points, finite_rows
-from ldls.errors import InputError, PoseError, within
+from ldls.errors import InputError, LdlsWarning, PoseError, within
 from ldls.sequences.grid import cell_keys
 from ldls.sequences.ground_level import levelled, split_standing
 from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory
@@ -54,7 +55,7 @@ def odometry(sweeps: Iterable[tuple[float, Points] | tuple[float, Points, NDArra
     Args:
         sweeps: Stamp in seconds, ascending, and points (N, >= 3) in metres, z up, of each sweep; two or more, and
             neighbours some tenths of a second apart. Third may stand (N,) when each point was measured, in seconds
-            after the stamp. They are taken one after the other.
+            after the stamp. They are taken one after the other. Gaps of over a second are warned of.
 
     Raises:
         PoseError: Stamps do not ascend, a sweep has nothing in common with the one before it, or a time is over a
@@ -99,7 +100,9 @@ class Way:
         """Return the poses at the sweeps."""
         if len(self) < 2:
             raise InputError(f"sweeps: got {len(self)}, expected 2 or more")
-        return Trajectory(np.array(self._laid.stamps), np.array(self._laid.poses))
+        stamps = np.array(self._laid.stamps)
+        _warn_of_gaps(stamps)
+        return Trajectory(stamps, np.array(self._laid.poses))
 
 
 class _Laid:
@@ -167,6 +170,21 @@ class _Laid:
                 f"{self.stamps[-1]:.6f} s; take sweeps of one drive without gaps, or poses of another origin"
             )
         self._places = places
+
+
+def _warn_of_gaps(stamps: NDArray[np.float64]) -> None:
+    """Warn of sweeps after which a lidar that moved is laid where it was: some places look alike."""
+    steps_s = np.diff(stamps)
+    (gaps,) = np.nonzero(steps_s > LONGEST_GAP_S)
+    if len(gaps):
+        first = gaps[0]
+        warnings.warn(
+            f"sweeps: {len(gaps):,} of {len(stamps):,} come over {LONGEST_GAP_S:g} s after the one before, the first "
+            f"{steps_s[first]:.3f} s after {stamps[first]:.6f} s, and the way is wrong from there if the lidar moved "
+            "meanwhile; mend the stamps if they jump, or take each part by itself",
+            LdlsWarning,
+            stacklevel=5,
+        )
 
 
 def _begun(laid: _Laid, first: Sequence[Parts]) -> _Laid:
