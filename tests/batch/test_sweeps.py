@@ -272,7 +272,7 @@ def gap(simulated, tmp_path):
 
 def test_poses_of_the_source_are_read_only_where_none_are_given(gap, simulated, tmp_path):
     masks, path = str(gap / "masks_02"), tmp_path / "poses.txt"
-    with pytest.raises(PoseError, match="0000000002: stamp: no pose at .*; or read no poses, by --option poses=false"):
+    with pytest.raises(PoseError, match="0000000002: stamp: no pose at .*; or leave poses out by --option poses=false"):
         open_source(gap)[2]
     assert run(gap, tmp_path / "plain", masks=masks, sweeps=0).n_done == 2
     summary = batch.run(gap, tmp_path / "none", batch.RunSettings(masks=masks), options={"poses": False})
@@ -419,6 +419,10 @@ def test_frames_without_times_are_not_silently_given_those_of_ten_a_second(drive
     with pytest.raises(PoseError, match=r"poses from 1767528000\.0+ to .*, which is at none of the frames; add stamps"):
         run(drive, tmp_path / "none", poses=str(path))
     assert not (tmp_path / "none").exists()
+    (drive / "times.txt").write_text("".join(f"{0.1 * k}\n" for k in range(N_FRAMES)))
+    with pytest.raises(PoseError, match=r"are from 0\.0+ to 0\.7.* at none of the frames; give poses by the clock"):
+        run(drive, tmp_path / "none", poses=str(path))
+    (drive / "times.txt").unlink()
     path.write_text(drives.kitti_poses(N_FRAMES))
     assert run(drive, tmp_path / "kitti", poses=str(path)).n_done == N_FRAMES
 

@@ -9,7 +9,7 @@ pytest.importorskip("embreex")
 
 import ldls
 from ldls.camera.rigid import inverse
-from ldls.datasets import open_source
+from ldls.datasets import odometry_of, open_source
 from ldls.simulation import LIDARS, Drive, SensorErrors, drive_folder, drive_frame, robot_drive, write_drive
 from ldls.simulation.drives import ROBOT_SPEED_M_S, drive_poses, poses_after
 from ldls.simulation.motion import Motion
@@ -238,3 +238,24 @@ def test_points_of_a_robot_s_bag_have_their_time(robot, tmp_path):
             np.testing.assert_allclose(times, frame.times, atol=1e-8)
             np.testing.assert_array_equal(bag[number].points[:, :3], frame.points[:, :3])
             assert bag[number].pose[0, 3] == pytest.approx(frame.pose[0, 3], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("seed", -1, "0 or more"),
+        ("n_frames", 2.5, "a whole number"),
+        ("turn_deg_s", "x", "a finite number"),
+        ("spinning", "no", "True or False"),
+    ],
+)
+def test_a_drive_refuses_what_it_cannot_be_made_of(name, value, expected):
+    with pytest.raises(ldls.ParameterError, match=f"{name}: got {value!r}, expected {expected}"):
+        Drive(**{name: value})
+
+
+def test_what_is_no_trajectory_and_no_drive_is_refused(frame):
+    with pytest.raises(ldls.InputError, match="trajectory: expected Trajectory, got str"):
+        frame.deskewed("poses.txt")
+    with pytest.raises(ldls.InputError, match="source: got str, expected a drive as ldls.datasets.open_source opens"):
+        odometry_of("drive")

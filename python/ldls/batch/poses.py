@@ -183,24 +183,30 @@ class Poses:
             )
 
     def _check_clock(self) -> None:
-        """Warn of a file with stamps for frames that have none of their own; refuse one that has a pose of none."""
+        """Refuse a file that has a pose of no frame; warn of one with stamps for frames that have none of their own."""
         trajectory = self._trajectory
-        if trajectory is None or any(stamp is not None for stamp in _own_stamps(self._source)) or self._are_found:
-            return
-        if format_of(Path(str(self._settings.poses))) == "kitti":
+        if trajectory is None or format_of(Path(str(self._settings.poses))) == "kitti":
             # which has no stamps, and takes those of the frames
             return
         first, last = float(trajectory.stamps[0]), float(trajectory.stamps[-1])
-        message = (
-            f"{self._settings.poses}: frames of {self._source.path} have no times, and are taken {PERIOD_S:g} s apart "
-            f"from 0; the file has poses from {first:.6f} to {last:.6f} s"
-        )
         stamps = [stamp for stamp in self.stamps if stamp is not None]
-        if not any(first - trajectory.margin_s <= stamp <= last + trajectory.margin_s for stamp in stamps):
-            raise PoseError(f"{message}, which is at none of the frames; add stamps to the source")
-        warnings.warn(
-            f"{message}; add stamps to the source if its frames are of other times", LdlsWarning, stacklevel=5
+        are_own = any(stamp is not None for stamp in _own_stamps(self._source))
+        times = (
+            f"are from {min(stamps):.6f} to {max(stamps):.6f} s"
+            if are_own
+            else f"have no times, and are taken {PERIOD_S:g} s apart from 0"
         )
+        message = (
+            f"{self._settings.poses}: frames of {self._source.path} {times}; the file has poses from {first:.6f} to "
+            f"{last:.6f} s"
+        )
+        if not any(first - trajectory.margin_s <= stamp <= last + trajectory.margin_s for stamp in stamps):
+            mend = "give poses by the clock of the frames, in seconds" if are_own else "add stamps to the source"
+            raise PoseError(f"{message}, which is at none of the frames; {mend}")
+        if not are_own and not self._are_found:
+            warnings.warn(
+                f"{message}; add stamps to the source if its frames are of other times", LdlsWarning, stacklevel=5
+            )
 
     def _has_poses(self, chosen: Frames) -> bool:
         """False if the first frame that can be read and has a stamp has no pose."""

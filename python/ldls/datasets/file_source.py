@@ -116,7 +116,9 @@ class FileSource:
             try:
                 return self._trajectory.at(stamp)
             except PoseError as error:
-                raise PoseError(f"{error}; or read no poses, by --option poses=false") from None
+                raise PoseError(
+                    f"{error}; or leave poses out by --option poses=false, and where they are needed give --poses FILE"
+                ) from None
 
     def _image(self, camera: str, index: int) -> CameraImage:
         """The image of a camera in a frame."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.checks import checked
 from ldls.cloud import Points
 from ldls.errors import within
 from ldls.labeling import Labeling
@@ -71,6 +72,7 @@ class Frame:
     images: tuple[CameraImage, ...] = ()
     truth: Labeling | None = None
 
+    @checked
     def deskewed(self, trajectory: Trajectory | None = None) -> Frame:
         """Return the frame as it was at its stamp: points where they were then, cameras from where the lidar was then.
 

@@ -36,9 +36,11 @@ def odometry_of(source: Source) -> Trajectory:
         SourceError: Some frames have stamps and others none.
         PoseError: A sweep has nothing in common with the one before it, or more than two in a row are left out, or come
             no later than the one before them.
-        InputError: Fewer than two frames are left.
+        InputError: It is no source, or fewer than two frames are left.
         ImportError: `ldls[odometry]` is not installed.
     """
+    if not hasattr(source, "names"):
+        raise InputError(f"source: got {type(source).__name__}, expected a drive as ldls.datasets.open_source opens it")
     left_out: dict[str, str] = {}
     with within(source.path):
         try:

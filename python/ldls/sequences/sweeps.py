@@ -192,8 +192,8 @@ def check_points(sweep: Sweep, result: Segmentation) -> None:
     """
     if len(result.labels) != len(sweep.points):
         raise ShapeError(f"result: has {len(result.labels)} points, the sweep {len(sweep.points)}; give its own")
-    places = [points[:, :3] for points in (result.points, sweep.points)]
-    if result.points is not sweep.points and not np.array_equal(*places, equal_nan=True):
+    own, given = result.points[:, :3], sweep.points[:, :3]
+    if result.points is not sweep.points and not np.array_equal(own, given, equal_nan=True):
         raise InputError(
             "result: is of as many other points than those of the sweep; give its own, or where these were moved, "
             "dataclasses.replace(result, points=sweep.points)"

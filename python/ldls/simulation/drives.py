@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ldls.camera.extrinsic import turn_of
 from ldls.camera.rigid import from_parts, inverse
-from ldls.checks import hold_python_values
+from ldls.checks import checked, hold_python_values
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.ground import Ground
@@ -45,6 +45,7 @@ ROBOT_IMAGE_DELAY_S = 0.012
 """Time from a robot's sweep to its image."""
 
 
+@checked
 @dataclass(frozen=True, kw_only=True)
 class Drive:
     """A car's drive: what would come too near to the rig is taken away before.
@@ -64,7 +65,8 @@ class Drive:
             from behind to behind, as KITTI's does, and looks ahead at the stamp of the sweep.
 
     Raises:
-        ParameterError: There is no frame, the rig turns too fast, or the camera is a ring.
+        ParameterError: There is no frame, the seed is negative, the rig turns too fast, or the camera is a ring.
+        InputError: An argument is of another type.
     """
 
     n_frames: int = 20
@@ -81,6 +83,8 @@ class Drive:
         hold_python_values(self)
         if self.n_frames < 1:
             raise ParameterError(f"n_frames: got {self.n_frames}, expected 1 or more")
+        if self.seed < 0:
+            raise ParameterError(f"seed: got {self.seed}, expected 0 or more")
         if not abs(self.turn_deg_s) <= FASTEST_TURN_DEG_S:
             limit = f"{FASTEST_TURN_DEG_S:g} degrees a second"
             raise ParameterError(f"turn_deg_s: got {self.turn_deg_s}, expected -{limit} to {limit}")

@@ -77,6 +77,8 @@ def test_what_kittis_poses_lack_is_asked_for(tmp_path):
         ldls.read_poses(path, stamps=STAMPS)
     with pytest.raises(ldls.PoseError, match="poses.txt: has 4 poses for 3 stamps"):
         ldls.read_poses(path, stamps=STAMPS[:3], T_camera_lidar=np.eye(4))
+    with pytest.raises(ldls.DtypeError, match="stamps: "):
+        ldls.read_poses(path, stamps="times.txt", T_camera_lidar=np.eye(4))
     with pytest.raises(ldls.CalibrationError, match="T_camera_lidar: R\\^T R deviates"):
         ldls.read_poses(path, stamps=STAMPS, T_camera_lidar=2 * np.eye(4))
 

@@ -87,7 +87,7 @@ def _annotation(annotations: list[dict[str, Any]], chosen: int | str | None) -> 
 
 
 def _check_size(path: Path, image: Mapping[str, Any], png: Path, size: tuple[int, ...]) -> None:
-    """Warn of an image whose PNG has another size; other readers look at that of the PNG alone."""
+    """Warn of an image whose PNG has another size."""
     own = image.get("height"), image.get("width")
     if None not in own and own != size:
         swapped = "; swapped?" if own == size[::-1] else ""

@@ -50,11 +50,11 @@ def read(
         for number, pose in zip(lines, poses, strict=True):
             rigid(f"line {number}", pose, CorruptFileError)
     poses, lines_of = poses[chosen], np.array(lines)[chosen]
-    if np.size(stamps) != len(poses):
-        raise PoseError(
-            f"{path}: has {len(poses)} poses for {np.size(stamps)} stamps, expected a line for each sweep of the drive"
-        )
     times = numbers("stamps", stamps, np.float64, ("n",))
+    if len(times) != len(poses):
+        raise PoseError(
+            f"{path}: has {len(poses)} poses for {len(times)} stamps, expected a line for each sweep of the drive"
+        )
     back = np.flatnonzero(np.diff(times) <= 0)
     if len(back):
         at = int(back[0])
