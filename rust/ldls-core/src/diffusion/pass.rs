@@ -308,6 +308,7 @@ mod tests {
     use super::super::plan::Planner;
     use super::*;
     use crate::masks::PixelLabels;
+    use crate::test_support::seeds_by_point;
 
     /// Two points without neighbours whose seeds of labels 0 and 1 are what likelihoods are after one product.
     fn pass_is_sound(likelihoods: [[f32; 2]; 2], error: f64, overlap: f64) -> bool {
@@ -345,12 +346,8 @@ mod tests {
         // points that are joined to themselves alone
         let own = [0.9, 0.5, 0.2];
         let a = PointGraph::from_csr(vec![0, 1, 2, 3], vec![0, 1, 2], own.to_vec()).unwrap();
-        let b = PixelLabels {
-            offsets: vec![0, 1, 2, 3],
-            labels: vec![1, 1, 1],
-            weights: vec![0.1; 3],
-            mass: vec![0.1; 3],
-        };
+        let seeds: &[(u32, f64)] = &[(1, 0.1)];
+        let b = seeds_by_point(3, &[seeds; 3]);
         let (never, products) = (Cancel::never(), Some(200));
         let series = Series::of_graph(&a, products, 1e-7).pop().unwrap();
         let schedule = Schedule::new(&a, never).unwrap();
