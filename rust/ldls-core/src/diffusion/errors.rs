@@ -4,7 +4,11 @@
 //! where terms grow and alternate in sign. That differs by orders of magnitude from one part of a cloud to another, and where it
 //! passes zero at a point it does not around it. So does what rounding leaves of a sum of all labels.
 
+use crate::Real;
 use crate::graph::PointGraph;
+
+/// Edges of which estimates are asked for around a point.
+pub(super) const AROUND: usize = 2;
 
 /// By how many times what is left out may be more than the most that is estimated around a point. Of a million points of three lidars
 /// there is none at which it counts beside rounding and that of the two best labels differs by more than 2.5 times as much.
@@ -12,14 +16,14 @@ const SAFETY: f64 = 2.5;
 
 /// By how much the values at each point may be off, going by the probe and the sum of all labels there.
 #[derive(Debug)]
-pub(super) struct Errors<'a> {
-    pub(super) a: &'a PointGraph,
+pub(super) struct Errors<'a, T = f32> {
+    pub(super) a: &'a PointGraph<T>,
     /// Nothing where no series was used.
     pub(super) estimates: Vec<f32>,
 }
 
-impl Errors<'_> {
-    /// By how much values at a point may be off, going by the estimates at all points within two edges.
+impl<T: Real> Errors<'_, T> {
+    /// By how much values at a point may be off, going by the estimates at all points within [`AROUND`] edges.
     pub(super) fn at(&self, point: usize) -> f64 {
         if self.estimates.is_empty() {
             return 0.0;

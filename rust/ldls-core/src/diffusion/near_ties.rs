@@ -18,11 +18,11 @@ use crate::{Cancel, Result};
 use std::collections::BTreeMap;
 
 /// What the series of one round after the other leave out, as a share of the largest value: the first tells labels apart that single
-/// precision sees [`APART`], the second those that differ at all, the third knows equal ones, for which it leaves out less than
-/// rounding does. What none is sure of is left for the products.
-const ROUNDS: [Option<f64>; 4] = [Some(1e-8), Some(1e-14), Some(1e-18), None];
-/// The round in which equal labels are known, and before which seeds are looked at.
-const EQUAL_ROUND: usize = 2;
+/// precision sees [`APART`], the others know equal ones, for which they leave out less than rounding does, the last nearly everywhere.
+/// What none is sure of is left for the products.
+const ROUNDS: [Option<f64>; 4] = [Some(1e-9), Some(1e-15), Some(1e-18), None];
+/// The first round of many points.
+const OF_MANY: usize = 2;
 /// By which share of its value the best label must be ahead in single precision for the first round: closer ones are equal as a rule.
 const APART: f32 = 2e-6;
 /// Points up to which they are a few: what flows to these is diffused in double precision in the time that it takes to look at all
@@ -48,13 +48,13 @@ pub(super) fn decide(
         return Ok(0);
     }
     let rounds = match iterations {
-        Some(_) if contested > FEW => EQUAL_ROUND..ROUNDS.len(),
+        Some(_) if contested > FEW => OF_MANY..ROUNDS.len(),
         Some(_) => usize::from(ahead < APART)..ROUNDS.len(),
         // endlessly many end where they change little, which says no more than a series
-        None => EQUAL_ROUND..EQUAL_ROUND + 1,
+        None => OF_MANY..OF_MANY + 1,
     };
     for round in rounds {
-        if round >= EQUAL_ROUND {
+        if round >= OF_MANY {
             let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
             settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
         }

@@ -4,6 +4,7 @@
 //! from matter, before the one before it those two edges away, and so on: a tenth of a frame on average. Nothing comes along edges of
 //! next to no weight, which join what lies far apart.
 
+use super::errors::AROUND;
 use super::schedule::Schedule;
 use crate::graph::PointGraph;
 use crate::memory::{filled, push};
@@ -35,8 +36,8 @@ enum Met {
 }
 
 impl Reach {
-    /// The reach of `from`, where the `least` value is at best, in so many steps over `a`, and what the rows that they need are
-    /// normalised with; none where that is much of the graph.
+    /// The reach of `from`, where the `least` value is at best, and of what is [`AROUND`], in so many steps over `a`, and what the
+    /// rows that they need are normalised with; none where that is much of the graph.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
@@ -56,7 +57,7 @@ impl Reach {
         }
         push(&mut ends, points.len())?;
         let (mut outermost, mut work) = (points.clone(), 0);
-        for _ in 0..=steps {
+        for _ in 0..=steps + AROUND {
             cancel.check()?;
             work += points.len();
             if work as f64 > most {
@@ -80,14 +81,14 @@ impl Reach {
         Ok(Some(Self { points, ends }))
     }
 
-    /// The steps that lead to the points themselves over the graph `a` of all, in this order.
+    /// The steps that lead to the points themselves and what is around over the graph `a` of all, in this order.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
     pub(super) fn schedule(&self, a: &PointGraph<f64>, cancel: &Cancel) -> Result<Schedule> {
         // rows of the outermost do not matter
-        let steps = self.ends.len() - 2;
-        Schedule::narrowing(a, self.ends[..steps].iter().rev().copied(), cancel)
+        let steps = AROUND..self.ends.len() - 2;
+        Schedule::narrowing(a, self.ends[steps].iter().rev().copied(), cancel)
     }
 }
 
@@ -97,7 +98,7 @@ mod tests {
     use crate::test_support::chain;
 
     #[test]
-    fn it_ends_as_many_edges_away_as_there_are_steps_and_one_more() {
+    fn it_ends_as_many_edges_away_as_there_are_steps_and_three_more() {
         let reach = Reach::of(
             &chain(&[0.25; 90], &[]).0,
             (&[5, 2], 1.0),
@@ -105,8 +106,8 @@ mod tests {
             Cancel::never(),
         );
         let reach = reach.unwrap().unwrap();
-        assert_eq!(reach.points, [5, 2, 6, 3, 7, 4, 8]);
-        assert_eq!(reach.ends, [2, 4, 6, 7]);
+        assert_eq!(reach.points, [5, 2, 6, 3, 7, 4, 8, 9, 10]);
+        assert_eq!(reach.ends, [2, 4, 6, 7, 8, 9]);
     }
 
     #[test]

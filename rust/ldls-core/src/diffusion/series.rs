@@ -46,7 +46,7 @@ pub(super) struct Series {
     pub(super) legs: Option<usize>,
     /// Products to be run after it.
     pub(super) products_left: usize,
-    /// Sum of the coefficients left out, none of which is negative.
+    /// Sum of the coefficients left out, none of which is negative, over all legs.
     pub(super) tail: f64,
     /// What it may leave out of any likelihood: where that is more, it is given up.
     pub(super) most_left_out: f64,
@@ -118,8 +118,10 @@ impl Series {
         let largest: f64 = coefficients.iter().sum();
         let degree = degree_within(&coefficients, tolerance * largest);
         let degree = degree.max(degree_within(&power, tolerance));
-        let tail = cut(&mut coefficients, degree);
-        cut(&mut power, degree);
+        // what one leg leaves out stays, and all of them leave out as much of the values before as of 1
+        let n = legs.unwrap_or(2) as f64;
+        let tail = n * cut(&mut coefficients, degree)
+            + n * (n - 1.0) / 2.0 * largest * cut(&mut power, degree);
         Self {
             middle,
             half_width,
@@ -127,8 +129,7 @@ impl Series {
             power,
             legs,
             products_left,
-            // of the values of the leg before as much is left out again; what these lack grows less and less
-            tail: if legs == Some(1) { tail } else { 2.0 * tail },
+            tail,
             most_left_out: MOST_LEFT_OUT,
         }
     }
@@ -389,9 +390,8 @@ mod tests {
             (5000, 20, 1600),
         ] {
             let series = Series::of_products(Some(products), [LOW, HIGH], 1e-7);
-            let largest: f64 = (0..products).map(|k| HIGH.powi(k as i32)).sum();
-            // each leg leaves out its share
-            let left_out = 1e-7 * (legs + 1) as f64 * largest;
+            // no term grows on the interval, so what is left out is twice the coefficients at most, and rounding
+            let left_out = 2.0 * series.tail + 1e-9;
             for x in points() {
                 let sum: f64 = (0..products).map(|k| x.powi(k as i32)).sum();
                 assert!(
