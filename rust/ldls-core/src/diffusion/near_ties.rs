@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 /// What the series of one round after the other leave out, as a share of the largest value: the first tells labels apart that single
 /// precision sees [`APART`], the others know equal ones, for which they leave out less than rounding does, the last nearly everywhere.
 /// What none is sure of is left for the products.
-const ROUNDS: [Option<f64>; 4] = [Some(1e-9), Some(1e-15), Some(1e-18), None];
+const ROUNDS: [Option<f64>; 4] = [Some(1e-9), Some(1e-15), Some(1e-20), None];
 /// The first round of many points.
 const OF_MANY: usize = 2;
 /// By which share of its value the best label must be ahead in single precision for the first round: closer ones are equal as a rule.

@@ -118,8 +118,9 @@ impl Series {
         let largest: f64 = coefficients.iter().sum();
         let degree = degree_within(&coefficients, tolerance * largest);
         let degree = degree.max(degree_within(&power, tolerance));
-        // what one leg leaves out stays, and all of them leave out as much of the values before as of 1
-        let n = legs.unwrap_or(2) as f64;
+        // what one leg leaves out stays, and each leaves out as much of the values before as of 1: of endlessly many, which end where
+        // they change little, less than that
+        let n = legs.unwrap_or(1) as f64;
         let tail = n * cut(&mut coefficients, degree)
             + n * (n - 1.0) / 2.0 * largest * cut(&mut power, degree);
         Self {
