@@ -21,8 +21,8 @@ const EQUAL: f64 = 1e-13;
 /// 4.3 times as much, of half a million pairs of labels on clouds of all kinds.
 const SAFETY: f64 = 10.0;
 
-/// The leader of `candidates`, ascending, at each of `points`, where the `least` value is at best, with `series` in the place of the products where there is one. `exact`
-/// is that of [`super::diffuse`].
+/// The leader of `candidates`, ascending, at each of `points`, where the `least` value is at best, with `series` in the place of the
+/// products where there is one. `exact` is that of [`super::diffuse`].
 ///
 /// # Errors
 /// [`crate::Error::OutOfMemory`], [`crate::Error::Cancelled`], and whatever `exact` returns.
