@@ -18,15 +18,13 @@ use crate::{Cancel, Result};
 use std::collections::BTreeMap;
 
 /// What the series of one round after the other leave out, as a share of the largest value: the first tells labels apart that single
-/// precision sees [`APART`], the others know equal ones, for which they leave out less than rounding does, the last nearly everywhere.
-/// What none is sure of is left for the products.
-const ROUNDS: [Option<f64>; 4] = [Some(1e-9), Some(1e-15), Some(1e-20), None];
-/// The first round of many points.
-const OF_MANY: usize = 2;
+/// precision sees [`APART`], the second knows equal ones, for which it leaves out less than rounding does nearly everywhere. What
+/// neither is sure of is left for the products.
+const ROUNDS: [Option<f64>; 3] = [Some(1e-9), Some(1e-20), None];
 /// By which share of its value the best label must be ahead in single precision for the first round: closer ones are equal as a rule.
 const APART: f32 = 2e-6;
 /// Points up to which they are a few: what flows to these is diffused in double precision in the time that it takes to look at all
-/// seeds. More are those of masks that lie over one another, most of whose labels are equal.
+/// seeds. More are those of masks that lie over one another, most of whose labels are equal, which seeds show at most.
 const FEW: usize = 1 << 8;
 
 /// Puts right the best of `winners` where the seeds `b` and single precision, off by `errors`, leave it open; the number of such
@@ -47,14 +45,14 @@ pub(super) fn decide(
     if contested == 0 {
         return Ok(0);
     }
-    let rounds = match iterations {
-        Some(_) if contested > FEW => OF_MANY..ROUNDS.len(),
-        Some(_) => usize::from(ahead < APART)..ROUNDS.len(),
+    let are_many = contested > FEW;
+    let (first, last) = match iterations {
+        Some(_) => (usize::from(are_many || ahead < APART), ROUNDS.len() - 1),
         // endlessly many end where they change little, which says no more than a series
-        None => OF_MANY..OF_MANY + 1,
+        None => (1, 1),
     };
-    for round in rounds {
-        if round >= OF_MANY {
+    for round in first..=last {
+        if are_many || round == last {
             let steps = Pass::<f32, WIDTH_F32>::steps(None, iterations);
             settle_lowest((a, b, schedule), steps, best, &mut ties, cancel)?;
         }
