@@ -43,7 +43,8 @@ def fit_upright_box(points: NDArray[np.float64]) -> OrientedBox:
 
     Of 90 headings, one degree apart, it has the one at which points lie nearest to two sides that meet (closeness, of
     Zhang et al., Efficient L-Shape Fitting for Vehicle Detection Using Laser Scanners, IV 2017), and of those as good
-    as that, the one of least area. Stray points do not decide where sides are; the box holds all points.
+    as that, the one of least area. Stray points do not decide where sides are, and of more than 150 points some decide;
+    the box holds all. The order of the points does not matter.
 
     Raises:
         ShapeError: There are none, or they are no (n, 3).

@@ -11,7 +11,7 @@ const NEAR_M: f64 = 0.1;
 const AS_GOOD: f64 = 0.998;
 /// Share of the points at either end that do not decide where a side is.
 const STRAY: f64 = 0.04;
-/// Points, evenly chosen, that decide on the heading, and how many of them at most are stray at one end.
+/// Points, evenly chosen in the order of their places, that decide on the heading, and how many of them at most are stray at one end.
 const MOST_LOOKED_AT: usize = 150;
 const MOST_STRAY: usize = (STRAY * MOST_LOOKED_AT as f64) as usize;
 
@@ -31,11 +31,14 @@ impl UprightBox {
     ///
     /// Of 90 headings it has the one at which points lie nearest to two sides that meet (closeness, of Zhang et al.,
     /// Efficient L-Shape Fitting for Vehicle Detection Using Laser Scanners, IV 2017), and of those as good as that, the
-    /// one of least area. Stray points do not decide where sides are; the box holds all points.
+    /// one of least area. Stray points do not decide where sides are, and of more than 150 points some decide; the box holds all.
+    /// The order of the points does not matter.
     pub fn around(points: &[[f64; 3]]) -> Option<Self> {
         let first = points.first()?;
-        let step = points.len().div_ceil(MOST_LOOKED_AT);
-        let some = points.iter().step_by(step).map(|&[x, y, _]| [x, y]);
+        let mut places: Vec<[f64; 2]> = points.iter().map(|&[x, y, _]| [x, y]).collect();
+        places.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        let step = places.len().div_ceil(MOST_LOOKED_AT);
+        let some = places.into_iter().step_by(step);
         let heading = best_heading(&some.collect::<Vec<_>>());
         let (sin, cos) = heading.sin_cos();
         let turned = |[x, y, z]: &[f64; 3]| [cos * x + sin * y, cos * y - sin * x, *z];
@@ -166,6 +169,20 @@ mod tests {
             }
             assert!((found.yaw - yaw).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn the_order_of_the_points_does_not_matter() {
+        // an oval, which fits many headings nearly as well, in golden steps around it
+        let mut points: Vec<[f64; 3]> = (0..1000)
+            .map(|i| (f64::from(i) * 2.4).sin_cos())
+            .map(|(sin, cos)| [1.3 * cos, sin, 0.0])
+            .collect();
+        let found = UprightBox::around(&points);
+        points.reverse();
+        assert_eq!(UprightBox::around(&points), found);
+        points.rotate_left(1);
+        assert_eq!(UprightBox::around(&points), found);
     }
 
     #[test]
