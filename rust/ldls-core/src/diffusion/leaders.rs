@@ -60,7 +60,7 @@ pub(super) fn leaders(
             Pass::run(&exact_a, &schedule, &seeds, series, iterations, cancel)?;
         cancel.check()?;
         // of a part, values of points farther away are not those of all steps
-        let is_sound = |series: &Series| pass.is_sound(series.most_left_out, b.largest_shares());
+        let is_sound = |series: &Series| pass.is_sound(series.most_left_out, b.most(iterations));
         if reach.is_none() && !series.is_none_or(is_sound) {
             return self::leaders(
                 a,

@@ -376,6 +376,62 @@ mod tests {
         }
     }
 
+    /// Lets two labels of these numbers share the points of a lattice at random, and compares winners with those of plain products.
+    fn assert_told_apart(
+        (points, k): (&[[f64; 3]], usize),
+        numbers: [u32; 2],
+        (iterations, lambda): (usize, f64),
+    ) {
+        let of_point = |i: usize| (i as u32).wrapping_mul(0x9e37_79b1) >> 20 & 1;
+        let seen = |numbers: [u32; 2]| -> Vec<(u32, u32)> {
+            let of_point = |i| (numbers[of_point(i) as usize], 25);
+            (0..points.len()).map(of_point).collect()
+        };
+        let (a, b) = system::<f32>(points, k, &seen(numbers), lambda);
+        let exact = system::<f64>(points, k, &seen(numbers), lambda);
+        let double = |among: Option<&[u32]>| {
+            Ok(among.map_or(exact.clone(), |points| {
+                (exact.0.among(points), exact.1.among(points))
+            }))
+        };
+        let n_labels = 1 + numbers[1] as usize;
+        let found = diffuse(&a, &b, n_labels, Some(iterations), double, Cancel::never()).unwrap();
+        let (a, b) = system::<f64>(points, k, &seen([0, 1]), lambda);
+        let expected = plain_products(&a, &b, 2, iterations);
+        for (i, (label, z)) in found.labels.iter().zip(expected.chunks(2)).enumerate() {
+            let own = numbers.iter().position(|number| number == label).unwrap();
+            let best = z[0].max(z[1]);
+            assert!(
+                z[own] >= best * (1.0 - 1e-11),
+                "{numbers:?}: point {i} has {label}"
+            );
+        }
+    }
+
+    fn lattice(size: u32, pitch: f64, layers: u32) -> Vec<[f64; 3]> {
+        let places =
+            (0..size * size * layers).map(|i| [i % size, i / size % size, i / size / size]);
+        places
+            .map(|place| place.map(|steps| pitch * f64::from(steps)))
+            .collect()
+    }
+
+    #[test]
+    fn labels_that_share_points_are_told_apart_where_terms_grow_whatever_their_numbers() {
+        let points = lattice(40, 0.39, 1);
+        for other in [2, 14, 22, 35, 90] {
+            assert_told_apart((&points, 4), [1, other], (200, 4e-5));
+        }
+    }
+
+    #[test]
+    fn labels_whose_values_a_series_makes_negative_may_win() {
+        let corners = lattice(8, 0.316, 8);
+        let middles = corners.iter().map(|place| place.map(|at| at + 0.158));
+        let points: Vec<[f64; 3]> = corners.iter().copied().chain(middles).collect();
+        assert_told_apart((&points, 8), [1, 2], (70, 4e-7));
+    }
+
     #[test]
     fn a_series_that_grows_without_end_on_a_ring_of_one_way_is_given_up() {
         // of the edges of a point, which all weigh the same, more lead one way than the other; few points have pixel edges

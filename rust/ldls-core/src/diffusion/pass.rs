@@ -9,12 +9,12 @@ use super::series::Series;
 use super::sweep::{Step, take_steps};
 use super::values::Values;
 use crate::graph::PointGraph;
-use crate::masks::Shares;
+use crate::masks::Most;
 use crate::memory::tabulate;
 use crate::{Cancel, Error, Result};
 use rayon::prelude::*;
 
-/// How far likelihoods may leave [0, 1], and their sum what the seeds allow.
+/// How far likelihoods, and their sum, may leave what seeds may come to, as a share of the most of one label.
 const SLACK: f64 = 1e-3;
 
 /// The values of the lanes of one pass at all points, and how far they have come.
@@ -186,6 +186,11 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         self.previous = Values::none();
     }
 
+    /// By how much a value may be off because smaller ones counted as zero on the way.
+    pub(super) fn lost(&self) -> f64 {
+        self.convergence.sweeps as f64 * self.seeds.least.to_f64()
+    }
+
     /// The labels that may have come to a point, and their values.
     pub(super) fn at(&self, point: usize) -> impl Iterator<Item = (u32, T)> {
         let groups = self.z.groups().enumerate();
@@ -268,9 +273,10 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
         tabulate(self.a.len(), rounding, cancel)
     }
 
-    /// True if at most `most_left_out` is left out, no likelihood is negative or larger than the `largest` share of one label, and
-    /// those of no point sum to more than that of all labels.
-    pub(super) fn is_sound(&self, most_left_out: f64, largest: Shares) -> bool {
+    /// True if at most `most_left_out` of the `largest` likelihood is left out, none is negative or larger than that, and those of no
+    /// point sum to more than those of all labels may.
+    pub(super) fn is_sound(&self, most_left_out: f64, largest: Most) -> bool {
+        let slack = SLACK * largest.one;
         let groups: Vec<_> = self.groups().collect();
         let zeros = [T::default(); WIDTH];
         let row_is_sound = |i: usize| {
@@ -292,14 +298,14 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
                 }
             }
             let sum: f64 = sums.iter().map(|sum| sum.to_f64()).sum();
-            let negative = least.iter().any(|value| value.to_f64() < -SLACK);
+            let negative = least.iter().any(|value| value.to_f64() < -slack);
             let beyond = most
                 .iter()
-                .any(|value| value.to_f64() > largest.one + SLACK);
-            sum.is_finite() && sum <= largest.all + SLACK && !negative && !beyond
+                .any(|value| value.to_f64() > largest.one + slack);
+            sum.is_finite() && sum <= largest.all + slack && !negative && !beyond
         };
         let points = (0..self.a.len()).into_par_iter().with_min_len(ROWS_A_TASK);
-        self.convergence.error <= most_left_out && points.all(row_is_sound)
+        self.convergence.error <= most_left_out * largest.one && points.all(row_is_sound)
     }
 }
 
@@ -334,7 +340,7 @@ mod tests {
         pass.convergence.error = error;
         pass.is_sound(
             1e-3,
-            Shares {
+            Most {
                 all: overlap,
                 one: 1.0,
             },
@@ -361,11 +367,12 @@ mod tests {
         let plan = planner.plan((&a, &b), &[1], never).unwrap().remove(0);
         let seeds = Seeds::new(&b, plan, never).unwrap();
         let pass = Pass::<f64, 4>::run(&a, &schedule, &seeds, Some(&series), products, never);
-        for (own, error) in own.into_iter().zip(pass.unwrap().errors) {
+        let errors = pass.unwrap().errors.into_iter().zip(&seeds.probe);
+        for (own, (error, [x, y])) in own.into_iter().zip(errors) {
             let angle = ((own - series.middle) / series.half_width).acos();
             let term = |k: usize| (k as f64 * angle).cos();
             let mean = f64::midpoint(term(series.degree()), term(series.degree() - 1));
-            let expected = 0.1 * series.tail * mean.abs();
+            let expected = x.hypot(*y) * series.tail * mean.abs();
             assert!(
                 (f64::from(error) - expected).abs() < 1e-6 * series.tail,
                 "{own}"

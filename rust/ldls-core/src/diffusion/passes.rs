@@ -33,7 +33,7 @@ pub(super) fn for_each_pass(
     let schedule = schedule?;
     // how far rounding goes is known of one series on graphs of the paper's degree, and measured where it may grow more
     let is_usual = |series: &Series| series.legs == Some(1) && a.degree() == Some(PAPER_DEGREE);
-    let largest = b.largest_shares();
+    let most = b.most(iterations);
     let mut convergence = Convergence::default();
     // a probe shows how large the terms left out may be
     let (mut labels, mut probe) = (labels.to_vec(), true);
@@ -49,7 +49,7 @@ pub(super) fn for_each_pass(
             let seeds = Seeds::new(b, plan, cancel)?;
             let mut pass = Pass::run(a, &schedule, &seeds, series.last(), iterations, cancel)?;
             let tried = series.last();
-            if tried.is_some_and(|tried| !pass.is_sound(tried.most_left_out, largest)) {
+            if tried.is_some_and(|tried| !pass.is_sound(tried.most_left_out, most)) {
                 // another takes more steps, in which labels come farther
                 series.pop();
                 continue 'planned;

@@ -11,9 +11,18 @@ use crate::masks::PixelLabels;
 use crate::memory::{push, tabulate, with_room, zeros};
 use crate::{Cancel, Real, Result};
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 
 /// What divides a circle by the golden ratio: pi (3 - sqrt 5).
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+/// Distances from the middle between which the factors lie that the probe has for labels, and that of the background.
+const RING: [f64; 2] = [0.6, 1.4];
+const OF_BACKGROUND: f64 = 2.0;
+/// By how much the factors of one seed are aside from those of its label: what a sum over many labels cancels of, it does not of these.
+const ASIDE: f64 = 0.15;
+/// Ways in which they may be.
+const WAYS: usize = 1 << WAYS_BITS;
+const WAYS_BITS: u32 = 4;
 
 /// The seeds of the labels of one pass by lane.
 #[derive(Debug)]
@@ -26,7 +35,7 @@ pub(super) struct Seeds<T> {
     pub(super) in_common: Vec<T>,
     others: Others<T>,
     /// Seeds of the probe, where the pass has it.
-    probe: Vec<[T; PROBE_LANES]>,
+    pub(super) probe: Vec<[T; PROBE_LANES]>,
     /// Values up to this magnitude are too small to matter.
     pub(super) least: T,
 }
@@ -95,14 +104,17 @@ impl<T: Real> Seeds<T> {
         let others = Others::concat(tasks.map(of_task).collect::<Result<_>>()?)?;
         let probe = if plan.probe.is_some() {
             let labels = b.labels.par_iter().max();
-            let directions: Vec<[T; PROBE_LANES]> =
-                directions(labels.map_or(0, |&label| label as usize + 1));
-            let in_lane = |row: usize, lane: usize| {
-                let seeds = b.row(row);
-                let seeds = seeds.map(|(label, seed)| directions[label][lane] * seed);
-                seeds.sum()
+            let factors: Vec<[T; PROBE_LANES]> =
+                factors(labels.map_or(0, |&label| label as usize + 1));
+            let asides = asides();
+            let of_row = |row: usize| {
+                let sum = [T::default(); PROBE_LANES];
+                b.row(row).fold(sum, |[x, y], (label, seed)| {
+                    let ([own_x, own_y], aside) = (factors[label], way_of(row, label));
+                    let [aside_x, aside_y]: [T; PROBE_LANES] = asides[aside];
+                    [x + (own_x + aside_x) * seed, y + (own_y + aside_y) * seed]
+                })
             };
-            let of_row = |row: usize| [0, 1].map(|lane| in_lane(row, lane));
             tabulate(b.rows(), of_row, cancel)?
         } else {
             Vec::new()
@@ -273,16 +285,39 @@ fn seed_in_all<T: Real>(common: u64, seeds: impl Iterator<Item = (u8, T)>) -> T 
     }
 }
 
-/// The factors with which the probe has so many labels: directions in a plane, so that what one lacks and what the one beside it has
-/// too much of does not cancel. Those of labels one after the other lie far apart, and that of the background, which all objects
-/// are beside, far from all.
-fn directions<T: Real>(labels: usize) -> Vec<[T; PROBE_LANES]> {
-    let direction = |label: usize| {
-        let (sine, cosine) = (GOLDEN_ANGLE * label as f64).sin_cos();
-        let length = if label == 0 { 2.0 } else { 1.0 };
-        [cosine, sine].map(|part| T::from_f64(length * part))
+/// The factors with which the probe has so many labels: places in a plane, so that what one lacks and what the one beside it has
+/// too much of does not cancel. They are spread evenly over a ring, no two near one another, those of labels one after the other far
+/// apart, and that of the background, which all objects are beside, far from all.
+fn factors<T: Real>(labels: usize) -> Vec<[T; PROBE_LANES]> {
+    let [inner, outer] = RING.map(|radius| radius * radius);
+    let place = |label: usize| {
+        let share = label as f64 / labels as f64;
+        let radius = if label == 0 {
+            OF_BACKGROUND
+        } else {
+            (inner + share * (outer - inner)).sqrt()
+        };
+        on_circle(radius, GOLDEN_ANGLE * label as f64)
     };
-    (0..labels).map(direction).collect()
+    (0..labels).map(place).collect()
+}
+
+/// What the factors of a seed may be aside by.
+fn asides<T: Real>() -> [[T; PROBE_LANES]; WAYS] {
+    std::array::from_fn(|way| on_circle(ASIDE, way as f64 * TAU / WAYS as f64))
+}
+
+/// The way of the seed of a label at a row: no pattern of rows or labels is one of ways.
+#[inline]
+fn way_of(row: usize, label: usize) -> usize {
+    let mixed = (row as u32).wrapping_mul(0x9e37_79b1) ^ (label as u32).wrapping_mul(0x85eb_ca6b);
+    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x2c1b_3c6d);
+    (mixed >> (u32::BITS - WAYS_BITS)) as usize
+}
+
+fn on_circle<T: Real>(radius: f64, angle: f64) -> [T; PROBE_LANES] {
+    let (sine, cosine) = angle.sin_cos();
+    [cosine, sine].map(|part| T::from_f64(radius * part))
 }
 
 #[cfg(test)]
@@ -309,16 +344,40 @@ mod tests {
     }
 
     #[test]
-    fn in_the_probe_labels_in_a_row_lie_far_apart_and_the_background_far_from_all() {
-        let directions = directions::<f64>(500);
-        let apart = |one: usize, other: usize| {
-            let [one, other] = [directions[one], directions[other]];
-            (one[0] - other[0]).hypot(one[1] - other[1])
-        };
-        for label in 1..499 {
-            assert!(apart(0, label) > 0.999, "{label}");
-            assert!(apart(label, label + 1) > 1.8, "{label}");
+    fn in_the_probe_no_two_labels_are_near_and_the_background_is_far_from_all() {
+        for (labels, least) in [(12, 0.45), (37, 0.28), (500, 0.07)] {
+            let factors = factors::<f64>(labels);
+            let apart = |one: usize, other: usize| {
+                let [one, other] = [factors[one], factors[other]];
+                (one[0] - other[0]).hypot(one[1] - other[1])
+            };
+            for label in 1..labels {
+                assert!(apart(0, label) > 0.59, "{label} of {labels}");
+                let nearest = (1..label).map(|other| apart(label, other));
+                let nearest = nearest.fold(f64::INFINITY, f64::min);
+                assert!(nearest > least, "{label} of {labels}: {nearest}");
+                if label > 1 {
+                    assert!(apart(label, label - 1) > 1.1, "{label} of {labels}");
+                }
+            }
         }
+    }
+
+    #[test]
+    fn factors_of_seeds_are_aside_in_all_ways_alike() {
+        let mut counts = [0; WAYS];
+        for row in 0..500 {
+            (1..30).for_each(|label| counts[way_of(row, label)] += 1);
+        }
+        let expected = 500 * 29 / WAYS as i32;
+        assert!(
+            counts.iter().all(|count| (count - expected).abs() < 150),
+            "{counts:?}"
+        );
+        let sum = asides::<f64>()
+            .iter()
+            .fold([0.0; 2], |sum, way| [sum[0] + way[0], sum[1] + way[1]]);
+        assert!(sum.iter().all(|part: &f64| part.abs() < 1e-15));
     }
 
     proptest! {

@@ -11,8 +11,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// By how much rounding may move one likelihood of a point against another with each sweep, as a share of the largest. On real
 /// frames it is 1.5e-7 with a sweep of a series and 3e-8 with a product, at most; no bound.
 const ROUNDING_A_SWEEP: f32 = 2.5e-7;
-/// The same with all sweeps: of products that come to an end, the last ones move nothing.
-const MOST_ROUNDING: f32 = 2.5e-5;
+/// The same with all sweeps: at least as much as weights of single precision are off by, and of products that come to an end, the
+/// last ones move nothing.
+const ROUNDING: [f32; 2] = [4e-6, 2.5e-5];
 
 /// Share of the largest value of a point that errors are at most where labels of less than half of it cannot win.
 const SMALL_ERROR: f64 = 1.0 / 32.0;
@@ -53,9 +54,9 @@ struct Rival {
 }
 
 /// True if `value` may really be the largest at a point where `best` is: `rounding` moves one against the other by so large a
-/// share, and each may be off by `error`.
+/// share, and each may be off by `error`, even to below zero, which it is where the label never came.
 fn may_win(value: f32, best: f32, rounding: f32, error: f64) -> bool {
-    value > 0.0 && f64::from(best - value) <= f64::from(rounding * best) + 2.0 * error
+    value != 0.0 && f64::from(best - value) <= f64::from(rounding * best) + 2.0 * error
 }
 
 /// The best label of every point, and those that single precision cannot tell from it.
@@ -66,6 +67,8 @@ pub(super) struct Winners {
     rivals: Vec<Vec<Rival>>,
     /// By which share of the largest rounding may move one value of a point against another.
     rounding: f32,
+    /// By how much values may be off because smaller ones counted as zero.
+    lost: f64,
 }
 
 impl Winners {
@@ -80,13 +83,15 @@ impl Winners {
         cancel: &Cancel,
     ) -> Result<()> {
         let sweeps = pass.convergence.sweeps as f32;
-        let rounding = (ROUNDING_A_SWEEP * sweeps).min(MOST_ROUNDING);
+        let [least, most] = ROUNDING;
+        let rounding = (ROUNDING_A_SWEEP * sweeps).clamp(least, most);
         self.rounding = self.rounding.max(rounding);
+        self.lost = pass.lost().max(self.lost);
         let offers = Offers {
             pass,
             groups: pass.groups().collect(),
             rounding: self.rounding,
-            error,
+            error: error + self.lost,
         };
         if self.best.is_empty() {
             // not before, since a pass takes the most memory while it runs
@@ -112,7 +117,7 @@ impl Winners {
         largest: f64,
         error: impl Fn(u32) -> f64 + Sync,
     ) -> Result<(NearTies, f32)> {
-        let (best, rounding) = (&self.best, self.rounding);
+        let (best, rounding, lost) = (&self.best, self.rounding, self.lost);
         let of_share = |rivals: &mut Vec<Rival>| {
             rivals.sort_by_key(|rival| rival.point);
             let (mut ties, mut labels, mut ahead) = (NearTies::new(), Vec::new(), 1.0_f32);
@@ -123,7 +128,7 @@ impl Winners {
                 } = best[point as usize];
                 let within = |error: f64| {
                     let rivals = rivals.iter();
-                    rivals.filter(move |rival| may_win(rival.value, best, rounding, error))
+                    rivals.filter(move |rival| may_win(rival.value, best, rounding, error + lost))
                 };
                 // to find the error at a point takes a look around
                 let error = if within(0.0).count() == within(largest).count() {
@@ -135,7 +140,8 @@ impl Winners {
                 labels.extend(within(error).map(|rival| rival.label));
                 labels.sort_unstable();
                 labels.dedup();
-                if labels.len() > 1 {
+                // one alone may be ahead of nothing by less than nothing
+                if !labels.is_empty() && labels != [label] {
                     let others = within(error).filter(|rival| rival.label != label);
                     let next = others.map(|rival| rival.value).fold(0.0, f32::max);
                     ahead = ahead.min((best - next) / best);
@@ -210,10 +216,17 @@ impl Offers<'_> {
         offer(before.label, before.value)?;
         // most labels are far behind, and cannot win
         let is_sure = f64::from(largest) * SMALL_ERROR > self.error;
-        let far_behind = if is_sure { largest / 2.0 } else { 0.0 };
+        let far_behind = if is_sure {
+            largest / 2.0
+        } else {
+            f32::NEG_INFINITY
+        };
         for (group, (values, counts)) in self.groups.iter().enumerate() {
             let values = &values[point];
-            let is_near = |lane: usize| counts[lane] * values[lane] > far_behind;
+            let is_near = |lane: usize| {
+                let value = counts[lane] * values[lane];
+                value > far_behind && value != 0.0
+            };
             if (0..WIDTH_F32).fold(false, |any, lane| any | is_near(lane)) {
                 let lanes = self.pass.labels_at(point, group).enumerate();
                 for (lane, label) in lanes.filter(|(lane, _)| is_near(*lane)) {
@@ -223,7 +236,7 @@ impl Offers<'_> {
                 }
             }
         }
-        if rivals.len() - met == 1 {
+        if rivals.len() - met == 1 && rivals[met].label == best.label {
             rivals.pop();
         }
         Ok(())
@@ -305,6 +318,14 @@ mod tests {
         let ahead = |error| ties_of(&points, error).1;
         assert_eq!([0.25, 0.1, 0.0].map(ahead), [0.25, 0.25, 1.0]);
         assert_eq!(ties_of(&[&[(1, 0.5), (2, 0.5)]], 0.0).1, 0.0);
+    }
+
+    #[test]
+    fn a_value_below_zero_may_be_the_largest_as_far_as_it_may_be_off() {
+        assert_eq!(tied(&[&[(1, 0.25), (2, -0.25)]], 0.25), [0]);
+        assert!(tied(&[&[(1, 0.25), (2, -0.25)]], 0.125).is_empty());
+        let (ties, _) = ties_of(&[&[(3, -0.25)]], 0.125);
+        assert_eq!(ties[&vec![3]], [0], "nothing else came");
     }
 
     #[test]

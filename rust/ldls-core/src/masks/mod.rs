@@ -10,6 +10,6 @@ mod rle;
 
 pub use instance_masks::InstanceMasks;
 pub use label_image::LabelImage;
+pub(crate) use pixel_labels::Most;
 pub use pixel_labels::PixelLabels;
-pub(crate) use pixel_labels::Shares;
 pub use rle::Rle;

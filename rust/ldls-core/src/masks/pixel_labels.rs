@@ -23,9 +23,9 @@ pub struct PixelLabels<T = f32> {
     pub mass: Vec<T>,
 }
 
-/// What labels weigh at a point, as shares of the weight of its pixel edges.
+/// What labels may come to at any point.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shares {
+pub(crate) struct Most {
     /// All labels together: 1 where masks do not overlap.
     pub(crate) all: f64,
     /// A single one.
@@ -260,9 +260,10 @@ impl<T: Real> PixelLabels<T> {
         })
     }
 
-    /// The largest shares that any point has, no less than 1.
-    pub(crate) fn largest_shares(&self) -> Shares {
-        let shares = |i: usize| {
+    /// The most that these seeds may come to in so many `products`: as many times the largest seed, and no more than the largest
+    /// share of the weight of the pixel edges that any point has, or 1.
+    pub(crate) fn most(&self, products: Option<usize>) -> Most {
+        let of_point = |i: usize| {
             let mass = self.mass[i].to_f64();
             let weights = self.row(i).map(|(_, weight)| weight.to_f64());
             let [all, one] = weights.fold([0.0_f64; 2], |[all, one], weight| {
@@ -270,18 +271,17 @@ impl<T: Real> PixelLabels<T> {
             });
             // a point without pixel edges counts for none
             let share = |weight: f64| if all > 0.0 { weight / mass } else { 0.0 };
-            Shares {
-                all: share(all),
-                one: share(one),
-            }
+            [all, one, share(all), share(one)]
         };
-        let larger = |a: Shares, b: Shares| Shares {
-            all: a.all.max(b.all),
-            one: a.one.max(b.one),
-        };
-        let least = Shares { all: 1.0, one: 1.0 };
+        let larger = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|at| a[at].max(b[at]));
         let points = (0..self.rows()).into_par_iter().with_min_len(POINTS_A_TASK);
-        points.map(shares).reduce(|| least, larger)
+        let [all, one, of_all, of_one] = points.map(of_point).reduce(|| [0.0; 4], larger);
+        let products = products.map_or(f64::INFINITY, |products| products as f64);
+        let most = |seed: f64, share: f64| (products * seed).min(share.max(1.0));
+        Most {
+            all: most(all, of_all),
+            one: most(one, of_one),
+        }
     }
 
     /// Number of points.
