@@ -49,8 +49,9 @@ def by_definition(sweeps, names, minimum):
             if len(points) >= minimum:
                 frames += 1
                 true_tubes.setdefault(key, set()).update((sweep, i) for i in points)
-        for (_, number), points in instances_of(prediction, counted).items():
-            predicted_tubes.setdefault(number, set()).update((sweep, i) for i in points)
+        for i in counted:
+            if prediction.instances[i]:
+                predicted_tubes.setdefault(int(prediction.instances[i]), set()).add((sweep, i))
         # points of a true class without a number tell nothing of the instances of a sweep
         told = [i for i in counted if not truth.classes[i] or truth.instances[i]]
         for (k, number), points in instances_of(prediction, told).items():
@@ -141,6 +142,28 @@ def test_a_class_that_changes_keeps_its_number():
     assert scores.s_cls == pytest.approx((6 / 8 + 4 / 6) / 2)
 
 
+@pytest.mark.parametrize(("classes", "counts"), [(("Car", "Pedestrian"), (5, 0, 5)), (("car", "truck"), (5, 5, 5))])
+def test_a_number_goes_on_through_classes_that_are_not_scored(classes, counts):
+    names = ("background", "car", "truck", "road")
+    truth = labeling([1] * 50 + [3] * 50, [7] * 50 + [0] * 50, names=names)
+    numbers = [7] * 45 + [0] * 55  # the last five points of the car are missed
+    sweeps = [labeling([1 + at % 2] * 50 + [3] * 50, numbers, names=names) for at in range(10)]
+    pairs = [(f"{at}", prediction, truth) for at, prediction in enumerate(sweeps)]
+    tracking = evaluate(pairs, classes=ClassSet.kitti(classes), track=True).tracking
+    car = np.tile(truth.instances == 7, 10)
+    tube = np.concatenate([prediction.instances == 7 for prediction in sweeps])
+    common = np.sum(car & tube)
+    assert tracking.s_assoc == pytest.approx(common / np.sum(car) * common / np.sum(car | tube))
+    # a match is one of its class
+    assert (tracking.total.tubes, tracking.total.counts) == (1, Counts(*counts))
+
+
+def test_numbers_of_the_background_of_a_prediction_are_none():
+    truth = labeling([1, 1, 0, 0], [7, 7, 0, 0])
+    prediction = labeling([1, 1, 0, 0], [7, 7, 7, 7])
+    assert evaluate([("0", prediction, truth)], classes=ClassSet.kitti(), track=True).tracking.s_assoc == 1.0
+
+
 def test_equal_numbers_of_two_classes_are_two_true_objects_and_one_predicted():
     truth = labeling([1, 1, 2, 2], [1, 1, 1, 1])
     assert scored([(truth, truth)]).s_assoc == 0.5
@@ -148,9 +171,9 @@ def test_equal_numbers_of_two_classes_are_two_true_objects_and_one_predicted():
 
 
 def test_background_and_ignored_points_have_no_tube():
-    # the number of a point of the background means nothing; a predicted tube has its points where truth has background
+    # the number of a true point of the background means nothing; a predicted tube has its points where truth has it
     truth = labeling([1, 1, 0, 0, 0], [1, 1, 9, 9, 9], ignored=[4])
-    assert scored([(labeling([1, 1, 0, 0, 1], [3, 3, 3, 3, 3]), truth)]).s_assoc == 1.0
+    assert scored([(labeling([1, 1, 0, 0, 1], [3, 3, 0, 0, 3]), truth)]).s_assoc == 1.0
     assert scored([(labeling([1, 1, 1, 1, 1], [3, 3, 3, 3, 3]), truth)]).s_assoc == 0.5
     assert scored([(labeling([1, 1, 1, 1, 1], [3, 3, 3, 3, 3], ignored=[2, 3]), truth)]).s_assoc == 1.0
 

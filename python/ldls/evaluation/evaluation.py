@@ -84,8 +84,8 @@ def evaluate(
         max_range_m: Points farther from the lidar than this do not count; needs `Pair.ranges_m`.
         minimum_points: Smaller true instances, and smaller unmatched segments in panoptic quality, do not count.
         track: Score objects over the drive as well. The frames are the sweeps of one drive in their order, and an
-            instance's number means the same object in all of them; of true ones together with the scored class. Of
-            several drives evaluate each, and merge their `tracking`.
+            instance's number means the same object in all of them; of true ones together with the scored class, of
+            predicted ones whatever their class. Of several drives evaluate each, and merge their `tracking`.
 
     Raises:
         ShapeError: Prediction and truth of a frame differ in length.
@@ -123,8 +123,11 @@ def evaluate(
 
 
 def _numbered(mapped: Labeling, own: Labeling) -> Labeling:
-    """`mapped` with the numbers of `own`: classes that become one may have got others, in each frame anew."""
-    return replace(mapped, instances=np.where(mapped.classes > 0, own.instances, 0))
+    """`mapped` with the numbers of `own`: classes that become one may have got others, in each frame anew.
+
+    An object whose class is not scored keeps its number, which in predictions still tells it from others.
+    """
+    return replace(mapped, instances=np.where(own.classes > 0, own.instances, 0))
 
 
 def _as_pair(item: Pair | tuple[str, Labeling, Labeling]) -> Pair:

@@ -6,9 +6,10 @@ true tube t have in common, IoU(s, t) these over the points in either, |T| the n
 
     S_assoc = 1 / |T| sum_t 1 / |t| sum_s |s and t| IoU(s, t),    LSTQ = sqrt(S_cls S_assoc)
 
-Classes do not matter to tubes: a predicted tube has all points of its number, in whatever scored class, where neither
-labeling ignores them. S_cls is the mean IoU of the scored classes. Background is not among them, as in
-`SemanticScores.mean_iou`; SemanticKITTI, where every point has a class, knows none.
+Predicted classes do not matter to tubes: a predicted tube has all points of its number, in whatever class, scored or
+not, where neither labeling ignores them. True tubes are those of the scored classes. S_cls is the mean IoU of the
+scored classes. Background is not among them, as in `SemanticScores.mean_iou`; SemanticKITTI, where every point has a
+class, knows none.
 
 Matches, switches and MOTSA are those of Voigtlaender et al., MOTS (CVPR 2019). In each sweep and class an object is
 matched to the predicted instance with IoU above 0.5, of which there is one at most; a switch is a match under another
@@ -115,7 +116,13 @@ class TrackingScores:
 
     @checked
     def add(self, prediction: Labeling, truth: Labeling) -> None:
-        """Count the next sweep of the drive; both labelings mapped to these classes, numbers kept."""
+        """Count the next sweep of the drive.
+
+        Args:
+            prediction: Mapped to these classes, with the numbers of the drive, also of objects of a class that is not
+                scored and so became background; 0 where the prediction itself has background.
+            truth: Mapped to these classes, with the numbers of the drive.
+        """
         check_vocabulary(self.names, prediction, truth)
         self.semantic.add(prediction, truth)
         self._add_tubes(prediction, truth)
@@ -178,7 +185,8 @@ class TrackingScores:
 
     def _add_tubes(self, prediction: Labeling, truth: Labeling) -> None:
         rows = np.flatnonzero(~(truth.ignored | prediction.ignored))
-        numbers = np.where(_named(prediction, rows), prediction.instances[rows], -1)
+        instances = prediction.instances[rows]
+        numbers = np.where(instances > 0, instances, -1)
         overlap = overlaps(numbers, _codes(truth, rows))
         counts = overlap.truth_points >= self.minimum_points
         codes, numbers = overlap.truth_ids.tolist(), overlap.prediction_ids.tolist()
@@ -218,9 +226,5 @@ CLASS_SHIFT = 32
 def _codes(truth: Labeling, rows: NDArray[np.intp]) -> NDArray[np.int64]:
     """One number for class and number of each point's object; -1 for none."""
     codes = truth.classes[rows].astype(np.int64) << CLASS_SHIFT | truth.instances[rows]
-    return np.where(_named(truth, rows), codes, -1)
-
-
-def _named(labeling: Labeling, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """True for points of an object that has a number."""
-    return (labeling.classes[rows] > 0) & (labeling.instances[rows] > 0)
+    named = (truth.classes[rows] > 0) & (truth.instances[rows] > 0)
+    return np.where(named, codes, -1)
