@@ -386,6 +386,24 @@ def test_overlooked_points_are_those_nearest_to_an_object_where_it_has_gone(velo
     assert overlooked(now, [there, now], tracks).tolist() == expected
 
 
+@pytest.mark.parametrize("clock", [0.0, 0.3, 1.03, 1767700800.3])
+@pytest.mark.parametrize("period", [0.1, 1 / 3])
+def test_of_two_moments_as_near_the_earlier_says_what_was_overlooked_whatever_rounding_does(period, clock):
+    instance = ldls.Instance(label=1, category=3, name="car", score=1.0, sources=())
+    track = Track(1, instance, n_images=ENOUGH_IMAGES)
+    track.velocity = np.zeros(2)
+    for k in range(20):
+        before, stamp, after = (round(period * at + clock, 6) for at in (k, k + 1, k + 2))
+        # the object is seen at one end, then at the other
+        ends = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+        there = [
+            Moment(before, ends, np.array([1, 0]), np.arange(2), blind=False),
+            Moment(after, ends, np.array([0, 1]), np.arange(2), blind=False),
+        ]
+        now = Moment(stamp, np.array([[0.1, 0, 0], [0.9, 0, 0]]), np.zeros(2, np.int64), np.arange(2), blind=False)
+        assert overlooked(now, [there[0], now, there[1]], [track]).tolist() == [1, 0]
+
+
 def test_what_has_gone_away_leaves_no_label_where_it_was():
     instance = ldls.Instance(label=1, category=3, name="car", score=1.0, sources=())
     stands, moves = (Track(number, instance, n_images=ENOUGH_IMAGES) for number in (1, 2))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.sequences.moment import Boxes, Ints, Moment
 from ldls.sequences.track import MEMORY_S, Floats, Track
+from ldls.sequences.trajectory import SAME_S
 
 ENOUGH_IMAGES = 5
 """Images that must have shown an object, or what others do not show is rather not there."""
@@ -40,12 +41,13 @@ NO_CATEGORY = -1
 def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track]) -> Ints:
     """(n,) number of an object for each point of a moment that has none and must be of one; 0 for all others.
 
-    A point is of an object if of all points of the nearest moment that shows the object, one of the object is nearest,
-    and it is not below all of it. Objects for which this is that moment are moved from there by their velocity.
+    A point is of an object if of all points of the nearest moment that shows the object, the earlier of two as near,
+    one of the object is nearest, and it is not below all of it. Objects for which this is that moment are moved from
+    there by their velocity.
 
     Args:
         moment: The moment.
-        moments: Those that are known, itself among them.
+        moments: Those that are known, itself among them, in the order of their stamps.
         tracks: The objects that are known.
     """
     found = np.zeros(len(moment.points), np.int64)
@@ -58,7 +60,8 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
     most = counts.max(axis=0)
     since = np.abs([moment.stamp - each.stamp for each in others])
     shown = np.where(counts >= LEAST_SHOWN * most, since[:, None], np.inf)
-    nearest = np.where(most > 0, shown.argmin(axis=0), -1)
+    # of equally near ones the earlier, not the one that rounding favours
+    nearest = np.where(most > 0, (shown <= shown.min(axis=0) + SAME_S).argmax(axis=0), -1)
     distances = np.full(len(moment.points), np.inf)
     for at in set(nearest.tolist()) - {-1}:
         of_moment = [tracks[i] for i in np.flatnonzero(nearest == at)]

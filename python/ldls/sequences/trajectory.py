@@ -15,6 +15,8 @@ from ldls.sequences.step import Step
 
 LONGEST_GAP_S = 1.0
 """Between poses farther apart in time, nothing is interpolated."""
+SAME_S = 1e-5
+"""Times that differ by less are equal: files round stamps to microseconds, and stamps since 1970 to 0.24 of one."""
 FASTEST_M_S = 100.0
 """Poses that need more than this speed jump."""
 TURN_S = 0.1
