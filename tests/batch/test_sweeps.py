@@ -217,6 +217,7 @@ def test_sweeps_are_a_setting(drive, tmp_path):
     [
         pytest.param([0.1 * k for k in range(7)], "012 345 6", id="in a row"),
         pytest.param([0, 0.1, 1.2, 1.3, 2.3, 2.4, 2.5], "01 234 56", id="gaps"),
+        pytest.param([0.2 + k for k in range(7)], "012 345 6", id="a second apart"),
         pytest.param([5, 5.1, 4, 4.1, 4.1, 4.2, 4.3], "01 23 456", id="back, and twice"),
         pytest.param([0, None, 0.2, 0.3, None, 9, 9.1], "012 34 56", id="not known"),
     ],

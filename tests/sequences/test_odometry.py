@@ -139,6 +139,8 @@ def test_stamps_that_jump_ahead_are_warned_of(sweeps, trajectory):
         found = ldls.odometry(late)
     assert caught[0].filename == __file__
     np.testing.assert_allclose(found.poses, trajectory.poses[:4], atol=1e-9)
+    # 2.2 - 1.2 is more than 1, and no gap
+    ldls.odometry([(number + 0.2, points) for number, (_, points) in enumerate(sweeps[:3])])
 
 
 def test_without_the_library_the_extra_is_named(monkeypatch):

@@ -67,6 +67,8 @@ def test_after_a_second_without_a_sweep_the_next_is_labelled_alone(frames):
         return stream.segment(frame.points, frame.images[0].masks, pose=frame.pose, stamp=stamp).report.n_sweeps
 
     assert [n_sweeps(one, 0.0), n_sweeps(two, 1.0), n_sweeps(three, 2.1)] == [1, 2, 1]
+    # 8.3 - 7.3 is more than 1
+    assert [n_sweeps(one, 7.3), n_sweeps(two, 8.3)] == [1, 2]
 
 
 @pytest.mark.parametrize(

@@ -506,6 +506,14 @@ def test_what_few_images_showed_or_none_for_long_has_no_label_where_it_has_no_ma
     assert tracks_of(ldls.Tracker(), [*seldom, sweep_at(soon, gone)])[-1][0] == 0
 
 
+def test_times_of_the_tracker_do_not_hang_on_rounding():
+    place = [((6, 0), True)]
+    # 4.4 - 2.4 is more than MEMORY_S, and 16.1 - 6.1 more than the time after which tracks end
+    sweeps = [sweep_at(2.4 - 0.1 * k, place) for k in reversed(range(FEW_IMAGES))]
+    assert tracks_of(ldls.Tracker(), [*sweeps, sweep_at(4.4, [((6, 0), False)])])[-1] == [1]
+    assert tracks_of(ldls.Tracker(), [sweep_at(stamp, place) for stamp in (6.1, 16.1)]) == [[1], [1]]
+
+
 def test_memory_is_that_of_the_last_seconds():
     tracker = ldls.Tracker()
     for k in range(30):

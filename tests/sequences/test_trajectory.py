@@ -3,6 +3,7 @@
 import copy
 import pickle
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -75,6 +76,17 @@ def test_within_a_gap_there_is_no_pose():
     with pytest.raises(PoseError, match=r"no pose at 0\.600000 s, .* a gap of 1\.010 s from 0\.100000 to 1\.110000 s"):
         trajectory.at(0.6)
     assert np.array_equal(Trajectory([0, LONGEST_GAP_S], [moved(0), moved(1)]).at(0.5), moved(0.5))
+
+
+@pytest.mark.parametrize("clock", [0.1, 0.7, 1e9 + 0.1, 1767700800.3, 1 / 3])
+def test_there_are_poses_between_those_a_second_apart_whatever_rounding_does(clock):
+    stamps = [round(clock + k, 6) for k in range(50)]
+    trajectory = Trajectory(stamps, [moved(k) for k in range(50)])
+    points = np.array([[1.0, 0, 0], [2.0, 0, 0]], np.float32)
+    for one, other in pairwise(stamps):
+        trajectory.at((one + other) / 2)
+        trajectory.motion(one, other)
+        trajectory.deskew(points, np.array([0, other - one]), one)
 
 
 def test_nor_does_motion_over_a_gap_go_on():

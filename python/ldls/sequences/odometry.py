@@ -21,7 +21,7 @@ from ldls.cloud import Points, as_points, finite_rows
 from ldls.errors import InputError, LdlsWarning, PoseError, within
 from ldls.sequences.grid import cell_keys
 from ldls.sequences.ground_level import levelled, split_standing
-from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory
+from ldls.sequences.trajectory import LONGEST_GAP_S, SAME_S, Trajectory
 
 BEGINNINGS = 2
 """Times that the first two sweeps are laid on each other again, each time with less of their motion in them."""
@@ -157,7 +157,7 @@ class _Laid:
         """The way around `stamp`, as it was between the last two sweeps; at rest where these are too far apart."""
         poses, stamps = (self.poses, self.stamps) if len(self.poses) > 1 else (self._begin.poses, self._begin.stamps)
         back, period_s = inverse(poses[-1]) @ poses[-2], float(stamps[-1] - stamps[-2])
-        if period_s > LONGEST_GAP_S:
+        if period_s > LONGEST_GAP_S + SAME_S:
             back, period_s = np.eye(4), PERIOD_S
         return Trajectory(np.array([stamp - period_s, stamp]), np.array([back, np.eye(4)]))
 
@@ -175,7 +175,7 @@ class _Laid:
 def _warn_of_gaps(stamps: NDArray[np.float64]) -> None:
     """Warn of sweeps after which a lidar that moved is laid where it was: some places look alike."""
     steps_s = np.diff(stamps)
-    (gaps,) = np.nonzero(steps_s > LONGEST_GAP_S)
+    (gaps,) = np.nonzero(steps_s > LONGEST_GAP_S + SAME_S)
     if len(gaps):
         first = gaps[0]
         warnings.warn(

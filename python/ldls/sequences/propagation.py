@@ -51,7 +51,7 @@ def overlooked(moment: Moment, moments: Sequence[Moment], tracks: Sequence[Track
         tracks: The objects that are known.
     """
     found = np.zeros(len(moment.points), np.int64)
-    others = [each for each in moments if each is not moment and abs(each.stamp - moment.stamp) <= MEMORY_S]
+    others = [each for each in moments if each is not moment and abs(each.stamp - moment.stamp) <= MEMORY_S + SAME_S]
     enough = FEW_IMAGES if moment.blind else ENOUGH_IMAGES
     tracks = [track for track in tracks if track.n_images >= enough]
     if not others or not tracks:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.segmentation import Instance
+from ldls.sequences.trajectory import SAME_S
 
 MEMORY_S = 2.0
 """Time over which a velocity is constant, and labels go on."""
@@ -119,7 +120,7 @@ class Track:
         """Note that it was seen again."""
         self.instance = instance
         self.n_images += sighting.shown
-        first = sighting.stamp - MEMORY_S
+        first = sighting.stamp - MEMORY_S - SAME_S
         self.sightings = [*(each for each in self.sightings if each.stamp >= first), sighting]
         # found anew when they are asked for, which is not after every sweep
         for name in ("velocity", "_place"):

@@ -26,6 +26,7 @@ from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
 from ldls.sequences.sweeps import Sweep, check_order, check_points
 from ldls.sequences.track import MEMORY_S, Floats, Footprint, Sighting, Track
+from ldls.sequences.trajectory import SAME_S
 
 LONGEST_GAP_S = 10.0
 """Time without a point after which a track ends."""
@@ -99,7 +100,7 @@ class Tracker:
         of_number = {number: label for label, number in sorted(numbers.items(), reverse=True)}
         results = [_relabelled(result, {label: of_number[numbers[label]] for label in numbers}) for result in results]
         moments = [Moment.of(sweep, result, numbers) for sweep, result in zip(sweeps, results, strict=True)]
-        known = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= MEMORY_S]
+        known = [moment for moment in self._moments if moments[0].stamp - moment.stamp <= MEMORY_S + SAME_S]
         self._moments = known + moments
         # of points with a label, and of those without
         others = mistaken(moments, known, self._tracks)
@@ -161,7 +162,7 @@ class Tracker:
             going_on: Tracks that have a label at the moment or later. Another label goes on with one if it is in its
                 place or a few points on it, and they are joined with no other.
         """
-        self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S]
+        self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S + SAME_S]
         if not sightings:
             return {}
         labels = list(sightings)

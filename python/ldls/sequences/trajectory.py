@@ -100,7 +100,7 @@ class Trajectory:
         Raises:
             PoseError: They are farther from each other, lie farther out, or in a gap of the poses.
         """
-        if not abs(start - end) <= LONGEST_S:
+        if not abs(start - end) <= LONGEST_S + SAME_S:
             raise PoseError(
                 f"start: {start - end:+.6g} s from the other moment, expected at most {LONGEST_S:g} s; give seconds of "
                 "the same clock"
@@ -192,7 +192,7 @@ class Trajectory:
 
     def _check_gap(self, start: int, stamp: float) -> None:
         begin, end = float(self.stamps[start]), float(self.stamps[start + 1])
-        if end - begin > LONGEST_GAP_S:
+        if end - begin > LONGEST_GAP_S + SAME_S:
             raise PoseError(
                 f"stamp: no pose at {stamp:.6f} s, for poses have a gap of {end - begin:.3f} s from {begin:.6f} to "
                 f"{end:.6f} s, expected at most {LONGEST_GAP_S} s; add poses there, or leave this moment out"
@@ -207,7 +207,7 @@ def _there(points: Points) -> NDArray[np.int64]:
 
 def _check_times(times: NDArray[np.float64]) -> None:
     """Of points that are there."""
-    near = np.abs(times) <= LONGEST_S
+    near = np.abs(times) <= LONGEST_S + SAME_S
     if not near.all():
         at = int(np.argmin(near))
         raise PoseError(
