@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import inverse, rigid
 from ldls.checks import checked, numbers
+from ldls.checks.values import as_seconds
 from ldls.cloud import Points, as_points
 from ldls.errors import PoseError, ShapeError
 from ldls.sequences.step import Step
@@ -39,8 +40,8 @@ class Trajectory:
             those of a frame that stays where it is. Translations lose digits far from its origin.
 
     Raises:
-        PoseError: There is no pose, stamps do not ascend, a pose is no rigid transform, or two neighbours are farther
-            from each other than 100 m/s allow; the message has the stamps.
+        PoseError: There is no pose, stamps are not in seconds or do not ascend, a pose is no rigid transform, or two
+            neighbours are farther from each other than 100 m/s allow; the message has the stamps.
         ShapeError: An array of another shape.
         DtypeError: Something else than numbers.
     """
@@ -217,10 +218,8 @@ def _check_times(times: NDArray[np.float64]) -> None:
 
 
 def _check_stamps(stamps: NDArray[np.float64]) -> None:
-    finite = np.isfinite(stamps)
-    if not finite.all():
-        at = int(np.argmin(finite))
-        raise PoseError(f"stamps: pose {at} has {stamps[at]}, expected seconds; leave it out")
+    farthest = int(np.argmax(np.abs(stamps)))  # NaN, if there is one
+    as_seconds(f"stamps: pose {farthest}", float(stamps[farthest]), PoseError)
     ascending = np.diff(stamps) > 0
     if not ascending.all():
         at = int(np.argmin(ascending))

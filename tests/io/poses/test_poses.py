@@ -115,6 +115,8 @@ KITTI_LINE = "1 0 0 0 0 1 0 0 0 0 1 0\n"
                      id="backwards"),
         pytest.param(LINE + "1.1 0 30 0 0 0 0 1\n", ldls.PoseError, "from 1.000000 to 1.100000 s the lidar moves 30 m",
                      id="jump"),
+        pytest.param("17e11" + LINE[3:] + "18e11" + LINE[3:], ldls.PoseError, "stamps: pose 1: got 18.*not milli",
+                     id="milliseconds"),
         pytest.param(KITTI_LINE + "2" + KITTI_LINE[1:], ldls.CorruptFileError, r"line 2: R\^T R deviates by 3",
                      id="no rotation"),
         pytest.param(KITTI_LINE + "-1" + KITTI_LINE[1:], ldls.CorruptFileError, "line 2: the determinant", id="mirror"),

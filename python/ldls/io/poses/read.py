@@ -48,7 +48,8 @@ def read_poses(
         CorruptFileError: A line has another number of numbers, one that is none or not finite, no rotation, or a stamp
             that is not later than the one before; the message names it.
         UnsupportedFormatError: The content is of no known format.
-        PoseError: A "kitti" file lacks stamps or transform, there is not one stamp a pose, or the lidar jumps.
+        PoseError: A "kitti" file lacks stamps or transform, there is not one stamp a pose, stamps are not in
+            seconds, or the lidar jumps.
         CalibrationError: `T_camera_lidar`, or a calibration of KITTI raw, is no rigid transform.
         ParameterError: There is no such format, or it has no such option.
         FileNotFoundError: There is no such file.
