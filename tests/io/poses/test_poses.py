@@ -50,6 +50,15 @@ def test_tum_has_stamps_and_poses(tmp_path):
     np.testing.assert_allclose(trajectory.poses, WAY, atol=1e-8)
 
 
+def test_comments_may_stand_behind_poses(tmp_path):
+    text = tum_text().replace("\n", " # 8 numbers\r\n").removesuffix("\r\n")
+    trajectory = ldls.read_poses(written(tmp_path, text))
+    np.testing.assert_allclose(trajectory.stamps, STAMPS)
+    np.testing.assert_allclose(trajectory.poses, WAY, atol=1e-8)
+    with pytest.raises(ldls.CorruptFileError, match="line 5: expected a number"):
+        ldls.read_poses(written(tmp_path, text.replace("10.300000000", "east")))
+
+
 def test_tum_of_a_camera_leads_to_the_lidar(tmp_path):
     path = written(tmp_path, tum_text(WAY @ np.linalg.inv(T_CAMERA_LIDAR)))
     np.testing.assert_allclose(ldls.read_poses(path, T_camera_lidar=T_CAMERA_LIDAR).poses, WAY, atol=1e-8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,12 +11,13 @@ from numpy.typing import NDArray
 from ldls.errors import CorruptFileError, TruncatedFileError
 from ldls.io.points.text_rows import Row, read_rows, text_rows
 
-COMMENT = "#"
+COMMENT = re.compile("#[^\r\n]*")
 
 
 def pose_rows(text: str) -> list[Row]:
-    """The numbered lines of `text` that are neither blank nor comments."""
-    return [row for row in text_rows(text) if not row[1].lstrip().startswith(COMMENT)]
+    """The numbered lines of `text` without comments that are not blank."""
+    # what takes the place of a comment says that the number before it is whole
+    return text_rows(COMMENT.sub(" ", text))
 
 
 def read_pose_rows(text: str, names: str) -> tuple[list[int], NDArray[np.float64]]:
