@@ -257,7 +257,14 @@ def test_without_poses_nothing_is_begun(tmp_path, settings):
     with pytest.raises(PoseError, match=rf"kitti-odometry\) have no poses, .*; {whence}"):
         run(drive, tmp_path / "out", **settings)
     (drive / "times.txt").unlink()
-    with pytest.raises(PoseError, match="have no stamps, expected them"):
+    with pytest.raises(
+        PoseError, match=r"have no stamps, expected them and poses \(they come with poses\.txt and times"
+    ):
+        run(drive, tmp_path / "out", **settings)
+    (drive / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 2)
+    with pytest.raises(
+        PoseError, match=r"poses \(those of poses\.txt come with times\.txt, which is not in the folder\)"
+    ):
         run(drive, tmp_path / "out", **settings)
     assert not (tmp_path / "out").exists()
 

@@ -258,6 +258,11 @@ def test_misuse_is_named():
             ldls.Sweep(np.zeros((1, 3)), [], np.eye(4), stamp)
     with pytest.raises(ldls.CalibrationError, match="pose: R"):
         ldls.Sweep(np.zeros((1, 3)), [], 2 * np.eye(4), 0.0)
+    for row, column in ((0, 0), (0, 3)):
+        pose = np.eye(4)
+        pose[row, column] = np.nan
+        with pytest.raises(ldls.CalibrationError, match="pose: has numbers that are not finite, expected a rotation"):
+            ldls.Sweep(np.zeros((1, 3)), [], pose, 0.0)
     with pytest.raises(ldls.InputError, match=re.escape("points: row 1 has a coordinate of -1e+30 m, expected |x|")):
         ldls.Sweep([[np.inf, 0, 0], [0, -1e30, np.nan]], [], np.eye(4), 0.0)
     # columns of other things may have any value

@@ -153,10 +153,13 @@ class Poses:
             return
         named = zip(self._source.names, self.stamps, strict=True)
         known = [(name, stamp) for name, stamp in named if stamp is not None]
+        # only sources whose frames may have poses say why there are none
+        why = getattr(self._source, "why_no_poses", "")
         if not known:
             raise PoseError(
                 f"{self._source.path}: frames of this source ({self._source.kind}) have no stamps, expected them and "
-                "poses for --sweeps and --track; take a source with times, as an ldls.toml with stamps, or give --poses"
+                f"poses{f' ({why})' if why else ''} for --sweeps and --track; take a source with times, as an "
+                "ldls.toml with stamps, or give --poses"
             )
         unordered = (pair for pair in pairwise(known) if not pair[0][1] < pair[1][1])
         if self._settings.track and (pair := next(unordered, None)) is not None:
@@ -174,8 +177,6 @@ class Poses:
                 f"ascending stamps to track objects; {mend}"
             )
         if self._trajectory is None and not self._has_poses(chosen):
-            # only sources whose frames may have poses say why there are none
-            why = getattr(self._source, "why_no_poses", "")
             raise PoseError(
                 f"{self._source.path}: frames of this source ({self._source.kind}) have no poses, expected them for "
                 f"--sweeps and --track; {f'{why}; else ' if why else ''}give --poses FILE, or --poses "

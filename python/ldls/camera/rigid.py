@@ -45,6 +45,8 @@ def rigid(place: str, matrix: Matrix, error: type[LdlsError] = CalibrationError)
     Raises:
         CalibrationError: It does something else; the message has the deviation. Or another `error`.
     """
+    if not np.isfinite(matrix).all():
+        raise error(f"{place}: has numbers that are not finite, expected a rotation and metres")
     rotation = matrix[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are no rotation's
         deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())

@@ -148,7 +148,9 @@ class FolderSource(FileSource):
             stamps[name] = stamp
         missing = [name for name in self.names if name not in stamps]
         if missing:
-            raise SourceError(f"{path}: has no stamp of {len(missing)} frames, the first is {missing[0]}")
+            others = [name for name in stamps if name not in self.names]
+            found = f"; it has one of {others[0]!r}, which is no frame" if others else ""
+            raise SourceError(f"{path}: has no stamp of {len(missing)} frames, the first is {missing[0]}{found}")
         return tuple(stamps[name] for name in self.names)
 
     def _find(self, pattern: str) -> dict[str, Path]:

@@ -81,6 +81,8 @@ class KittiOdometrySource(FileSource):
         self._poses_file = _poses_file(path) if poses else None
         if not poses:
             self.why_no_poses = POSES_LEFT_OUT
+        elif self._poses_file is not None and not (path / TIMES).exists():
+            self.why_no_poses = f"those of {self._poses_file.name} come with {TIMES}, which is not in the folder"
         self._trajectory = _trajectory(path, self._poses_file, next(iter(self._cameras.values())))
 
     @classmethod

@@ -102,6 +102,8 @@ KITTI_LINE = "1 0 0 0 0 1 0 0 0 0 1 0\n"
         pytest.param("", ldls.TruncatedFileError, "no pose, expected 12", id="empty"),
         pytest.param("# stamp\n\n", ldls.TruncatedFileError, "no pose", id="comments alone"),
         pytest.param("1 2 3\n", ldls.UnsupportedFormatError, "line 1: 3 numbers, expected 12", id="another format"),
+        pytest.param(KITTI_LINE[:-1] + " 0 0 0 1\n", ldls.UnsupportedFormatError,
+                     "line 1: 16 numbers, expected 12 .*; leave out the last four of each line", id="16 numbers"),
         pytest.param("1,0,0,0,0,0,0,1\n", ldls.UnsupportedFormatError, "separated by blanks", id="commas"),
         pytest.param(LINE + "1.1 0 0 0 0 0 0\n" + LINE, ldls.CorruptFileError,
                      "line 2: expected at least 8 cells, got 7",

@@ -75,8 +75,9 @@ def format_of(path: Path) -> str:
         number, line = rows[0]
         n_columns = len(line.split())
         if n_columns not in FORMATS:
+            mend = "leave out the last four of each line, 0 0 0 1, if they are matrices of KITTI's poses"
             raise UnsupportedFormatError(
                 f"line {number}: {n_columns} numbers, expected 12 of a KITTI pose, or 8 of TUM's ({tum.COLUMNS}), "
-                "separated by blanks; format= says what it is"
+                f"separated by blanks; {mend if n_columns == 16 else 'format= says what it is'}"
             )
     return FORMATS[n_columns]
