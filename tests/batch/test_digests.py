@@ -60,6 +60,15 @@ def test_an_input_changed_with_the_same_size_and_time_is_refused(few, tmp_path, 
     assert runs.contents(tmp_path / "out") == before
 
 
+@pytest.mark.parametrize("file", ["velodyne/000004.bin", "calib/000004.txt", "masks/000004.json"])
+def test_an_input_copied_again_with_the_same_bytes_is_the_same(few, tmp_path, file):
+    run(few, tmp_path / "out")
+    before = runs.contents(tmp_path / "out")
+    os.utime(few / file, ns=(0, 0))
+    assert run(few, tmp_path / "out").n_earlier == 12
+    assert runs.contents(tmp_path / "out") == before
+
+
 @pytest.mark.parametrize(("formats", "is_read"), [(("label",), False), (("label", "png"), True)])
 def test_images_have_a_digest_where_they_are_read(few, tmp_path, formats, is_read):
     run(few, tmp_path / "out", formats=formats)

@@ -384,7 +384,13 @@ def test_a_run_of_another_version_is_refused(few, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["velodyne/000004.bin", "calib/000004.txt", "masks/000004.json"])
-@pytest.mark.parametrize("change", [lambda path: path.touch(), lambda path: path.unlink()], ids=["written", "removed"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(lambda path: path.write_bytes(path.read_bytes() + b"\n"), id="written"),
+        pytest.param(lambda path: path.unlink(), id="removed"),
+    ],
+)
 def test_a_changed_input_is_refused(few, tmp_path, kind, change):
     run(few, tmp_path / "out", frames=slice(0, 5))
     source = open_source(few)

@@ -331,7 +331,7 @@ def test_measurements_of_raw_drives_are_inputs_of_the_frames_beside_them(simulat
     drive = shutil.copytree(simulated.parent, tmp_path / simulated.parent.name) / simulated.name
     run(drive, tmp_path / "out", masks=str(drive / "masks_02"))
     path = drive / "oxts/data/0000000003.txt"
-    path.write_text(path.read_text().replace("49.", "49.0"))
+    path.write_text(path.read_text() + "\n")
     with pytest.raises(BatchError, match=r"0000000003\.txt, of which frame 000000000[234] was made, was changed"):
         run(drive, tmp_path / "out", masks=str(drive / "masks_02"))
 

@@ -33,11 +33,12 @@ class KnownFiles:
         return [*seen, self._digest(path, seen) if known else None]
 
     def is_same(self, path: Path, state: State) -> bool:
-        """True for a file that is as it was in this state."""
+        """True for a file that is as it was in this state; of one whose digest is known the time may be another."""
         seen = look(path)
         if seen is None or state is None:
             return seen is None and state is None
-        return [*seen] == state[:2] and (state[2] is None or self._digest(path, seen) == state[2])
+        size, time, digest = state
+        return seen[0] == size and (seen[1] == time if digest is None else self._digest(path, seen) == digest)
 
 
 def look(path: Path) -> Look:
