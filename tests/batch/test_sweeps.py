@@ -517,6 +517,22 @@ def test_a_file_of_poses_takes_motion_out_in_place_of_the_source(timed, tmp_path
         np.testing.assert_allclose(points, expected, atol=1e-5)
 
 
+def test_poses_of_a_drive_that_say_nothing_of_a_sweep_can_be_left_out(timed, tmp_path):
+    # the fourth measurement comes 1.5 s after the third, at the stamp of its sweep
+    for clock in timed.glob("*/timestamps*.txt"):
+        stamps = [np.datetime64(line.replace(" ", "T"), "ns") for line in _lines(clock)]
+        stamps[3:] = [stamp + np.timedelta64(1400, "ms") for stamp in stamps[3:]]
+        clock.write_text("".join(f"{str(stamp).replace('T', ' ')}\n" for stamp in stamps))
+    masks = str(timed / "masks_02")
+    failures = run(timed, tmp_path / "out", masks=masks, sweeps=0).failures
+    assert [failure.frame[-1] for failure in failures] == ["2", "3"]
+    for failure in failures:
+        said = rf"^poses of {timed}: stamp: no pose .* gap of 1\.500 s .*; or leave poses out by --option poses=false"
+        assert re.search(said, failure.message)
+    settings = batch.RunSettings(masks=masks)
+    assert not batch.run(timed, tmp_path / "left out", settings, options={"poses": False}).failures
+
+
 def test_poses_that_say_nothing_of_a_sweep_fail_its_frame_alone(timed, tmp_path):
     source = open_source(timed, truth=False)
     # from the third sweep on; the first two lie before all of them

@@ -17,6 +17,7 @@ from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames
 from ldls.datasets import Frame, Source, odometry_of
 from ldls.datasets.file_source import counts_of
+from ldls.datasets.frame import LEAVE_POSES_OUT
 from ldls.datasets.nuscenes import NuScenesSource
 from ldls.datasets.odometry import PERIOD_S
 from ldls.errors import BatchError, LdlsError, LdlsWarning, PoseError, some, within
@@ -118,7 +119,10 @@ class Poses:
             PoseError: The poses do not say how the lidar moved during the sweep.
         """
         if self._trajectory is None:
-            return frame.deskewed()
+            try:
+                return frame.deskewed()
+            except PoseError as error:
+                raise PoseError(f"poses of {self._source.path}: {error}; {LEAVE_POSES_OUT}") from None
         with self._within_file():
             return frame.deskewed(self._trajectory)
 

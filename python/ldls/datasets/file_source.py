@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.frame import LEAVE_POSES_OUT, CameraImage, Frame
 from ldls.errors import InputError, LeftOutWarning, PoseError, SourceError, some, within
 from ldls.io import read_image, read_points
 from ldls.io.labels import read_labeling
@@ -116,9 +116,7 @@ class FileSource:
             try:
                 return self._trajectory.at(stamp)
             except PoseError as error:
-                raise PoseError(
-                    f"{error}; or leave poses out by --option poses=false, and where they are needed give --poses FILE"
-                ) from None
+                raise PoseError(f"{error}; {LEAVE_POSES_OUT}") from None
 
     def _image(self, camera: str, index: int) -> CameraImage:
         """The image of a camera in a frame."""

@@ -20,6 +20,8 @@ from ldls.sequences import Trajectory
 
 POSES_LEFT_OUT = "they are left out by --option poses=false"
 """What sources opened with `poses=False` have as `why_no_poses`."""
+LEAVE_POSES_OUT = "or leave poses out by --option poses=false, and where they are needed give --poses FILE"
+"""What errors of the poses of a source end with."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
