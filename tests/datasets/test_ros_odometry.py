@@ -91,7 +91,7 @@ def test_poses_that_are_left_out_are_not_read(tmp_path):
     path = written(tmp_path, {"/odom": [{"stamp_ns": START_NS, "xyzw": (0, 0, 0, 0)}]})
     options = {"image_topics": (), "world": "odom"}
     with pytest.raises(PoseError):
-        open_source(path, **options)[0]
+        open_source(path, **options)
     frame = pickle.loads(pickle.dumps(open_source(path, poses=False, **options)))[0]
     assert frame.pose is None and frame.trajectory is None
 
@@ -185,7 +185,14 @@ ROWS = [
 
 @pytest.mark.parametrize(("topics", "world", "message"), ROWS)
 def test_what_gives_no_pose_is_named(tmp_path, topics, world, message):
-    bag = opened(written(tmp_path, topics), world)
+    path = written(tmp_path, topics)
     with pytest.raises(PoseError, match=message) as caught:
-        bag[0]
-    assert str(bag.path) in str(caught.value)
+        opened(path, world)[0]
+    assert str(path) in str(caught.value)
+
+
+def test_a_world_that_is_not_there_is_refused_when_the_bag_is_opened(tmp_path):
+    path = written(tmp_path, {}, moving=(("odom", "base"),))
+    with pytest.raises(PoseError, match=r"the world 'map'; found odom <- base <- lidar; choose another") as caught:
+        opened(path, "map")
+    assert str(caught.value).startswith(f"{path}: transforms: ")

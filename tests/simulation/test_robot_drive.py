@@ -121,10 +121,8 @@ def test_a_bag_whose_world_is_named_has_the_poses_that_were_simulated(drive_fold
     # odom is on the ground
     made[:, 2, 3] = ROBOT.height_m
     np.testing.assert_allclose([frame.pose for frame in RosBag(bag, world="odom")], made, atol=1e-6)
-    with pytest.raises(
-        PoseError, match="velodyne_points at .*: transforms: nothing connects .* the world 'map'; found od"
-    ):
-        RosBag(bag, world="map")[0]
+    with pytest.raises(PoseError, match="transforms: nothing connects .* the world 'map'; found od"):
+        RosBag(bag, world="map")
 
 
 def test_the_first_frame_of_a_drive_has_the_true_classes():

@@ -113,14 +113,22 @@ class TransformTree:
         Raises:
             PoseError: Nothing connects the frames, or a transform on the way has a gap then, or jumps at any time.
         """
+        self.check_world(world, source)
         world, source = plain(world), plain(source)
-        if not self.connects(world, source):
-            raise PoseError(
-                f"transforms: nothing connects the lidar's frame {source!r} and the world {world!r}; found "
-                f"{self._chains() or 'none'}; choose another world"
-            )
         up_source, up_world = (self._to_root(frame, lambda edge: edge.between(stamp_ns)) for frame in (source, world))
         return inverse(up_world) @ up_source
+
+    def check_world(self, world: str, source: str) -> None:
+        """Refuse a world that nothing connects with the frame `source`.
+
+        Raises:
+            PoseError: The message lists the frames there are.
+        """
+        if not self.connects(world, source):
+            raise PoseError(
+                f"transforms: nothing connects the lidar's frame {plain(source)!r} and the world {plain(world)!r}; "
+                f"found {self._chains() or 'none'}; choose another world"
+            )
 
     def way(self, world: str, source: str, from_ns: int, to_ns: int) -> Trajectory | None:
         """The poses of the frame `source` in `world` between two moments, and the ones beside; None if it stays.

@@ -114,6 +114,8 @@ class RosBag:
             TruncatedFileError: The bag's end is missing; the message has the stamp of the last whole message.
             CorruptFileError: It is no bag.
             InputError: A topic is missing or cannot be guessed, or no image is near any sweep in time.
+            PoseError: Nothing connects the world and the cloud's frame, poses of Odometry are no way of a robot, or
+                several topics have such poses.
             ParameterError: `max_offset_s` is negative, or a key of `fields` or `T_camera_lidar` is unknown.
             FileNotFoundError: There is no such file.
             ImportError: The extra `ros` is not installed.
@@ -131,6 +133,8 @@ class RosBag:
         self.topics = choose_topics(self._bag, points_topic, image_topics, info_topics)
         self._given = given_transforms(T_camera_lidar, self.topics.images)
         self._pair()
+        if self.world is not None:
+            self._check_world(self.world)
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
@@ -246,8 +250,8 @@ class RosBag:
             IndexError: There is no such frame.
             FileFormatError: The cloud cannot be read.
             CalibrationError: A camera is not calibrated, or nothing connects its frame and the cloud's.
-            PoseError: Nothing connects the world and the cloud's frame, or transforms or poses of Odometry have a gap
-                then, or jump, or several topics have such poses.
+            PoseError: Transforms or poses of Odometry have a gap then, or jump, or nothing connects the robot's frame
+                and the cloud's.
         """
         if not -len(self) <= index < len(self):
             raise IndexError(f"frame {index}: there are {len(self)}")
@@ -287,6 +291,13 @@ class RosBag:
         if odometry is None:
             return self._tree.way(self.world, sweep.frame_id, from_ns, to_ns)
         return odometry.way_of(self._on_robot(odometry, sweep), from_ns / NANOSECONDS, to_ns / NANOSECONDS)
+
+    def _check_world(self, world: str) -> None:
+        """Refuse a world that the bag does not have, as each frame would."""
+        sweep = self._sweeps[0].header
+        with within(str(self.path)):
+            if self._odometry_for(sweep) is None:
+                self._tree.check_world(world, sweep.frame_id)
 
     def _odometry_for(self, sweep: Header) -> Odometry | None:
         """Odometry where it tells the poses of a sweep; None where transforms do."""
