@@ -18,13 +18,16 @@ OBJECTS = ((3, 1), (3, 2), (1, 3))
 """Category and track of the labels 1, 2 and 3."""
 
 
-def added(places, points, labels, confidence=None, pose=None, objects=OBJECTS, stamp=0.0):
+def added(places, points, labels, confidence=None, pose=None, objects=OBJECTS, stamp=0.0, moving=()):
     """Add points that have labels."""
     points, labels = np.asarray(points, float), np.asarray(labels, np.int32)
     instances = tuple(
-        ldls.Instance(label=label, category=category, name="thing", score=1.0, sources=(), track=track)
+        ldls.Instance(
+            label=label, category=category, name="thing", score=1.0, sources=(), track=track,
+            velocity=(1.0 * (label in moving), 0.0),
+        )
         for label, (category, track) in enumerate(objects, start=1)
-    )
+    )  # fmt: skip
     confidence = np.ones(len(points)) if confidence is None else confidence
     result = replace(
         TEMPLATE, points=points, labels=labels, instances=instances, confidence=np.asarray(confidence, np.float32)
@@ -116,6 +119,25 @@ def test_a_label_that_leaks_in_a_few_points_does_not_move_an_object():
         points[:5, 0] += [8, -8][number % 2]
         added(places, points, np.ones(100), stamp=number)
     assert set(places.tracks.tolist()) == {1}
+
+
+@pytest.mark.parametrize(
+    ("n_sweeps", "n_moving", "stays"),
+    [
+        pytest.param(10, 9, False, id="nine of ten sweeps"),
+        pytest.param(11, 9, True, id="fewer"),
+        pytest.param(9, 9, True, id="seen too seldom to tell"),
+    ],
+)
+def test_what_has_a_velocity_nearly_always_is_left_out_though_its_label_was_long_once(n_sweeps, n_moving, stays):
+    generator, places = np.random.default_rng(0), ldls.LabelledMap(0.2)
+    for number in range(n_sweeps):
+        walker = generator.uniform([-0.3, -0.3, 0], [0.3, 0.3, 1.8], (50, 3)) + np.array([0.12 * number, 0, 0])
+        if number == 5:
+            walker[::4, 0] += 2
+        moving = [1] if number >= n_sweeps - n_moving else []
+        added(places, walker, np.ones(50), stamp=number, moving=moving)
+    assert (1 in places.tracks) == stays
 
 
 def test_ties_go_to_the_background_then_to_the_lowest_category():
