@@ -147,7 +147,7 @@ def test_tables_of_a_run_are_none_of_its_inputs(few, tmp_path):
     shutil.copy(few / "velodyne/000002.bin", few / "map.ply")
     (few / "velodyne/000002.bin").unlink()
     (few / "velodyne/000002.bin").symlink_to(few / "map.ply")
-    with pytest.raises(InputError, match=r"map: would write over .*map\.ply, which is an input"):
+    with pytest.raises(InputError, match=r"map_file: would write over .*map\.ply, which is an input"):
         run(few, tmp_path / "out", "npz", map_file=few / "map.ply")
     assert not (tmp_path / "out").exists()
 
@@ -167,7 +167,7 @@ def test_files_of_all_frames_are_not_written_over_those_of_one(drive, tmp_path, 
     batch.run(drive, tmp_path / "out", settings)
     before = runs.contents(tmp_path / "out")
     ((name, file),) = options.items()
-    said = rf"{name.partition('_')[0]}: .*{file} is the name of a file that runs write there; give another"
+    said = rf"{name}: .*{file} is the name of a file that runs write there; give another"
     with pytest.raises(ParameterError, match=said):
         batch.run(drive, tmp_path / "out", settings, **{name: tmp_path / "out" / file})
     assert runs.contents(tmp_path / "out") == before

@@ -25,6 +25,12 @@ INFO = {"dataset": "--dataset", "option": "--option"}
         pytest.param("truth: got 3", INFO, "--option truth: got 3", id="option of a source"),
         pytest.param("poses: got 'maybe'", INFO | {"poses": "--poses"}, "--option poses: got 'maybe'",
                      id="option of a source that is named as one of the command"),
+        pytest.param("foo: no option of folder; they have none", INFO,
+                     "--option foo: no option of folder; they have none", id="no option of a source"),
+        pytest.param("names: got ()", {"categories": "--categories", "truth": "--truth"}, "--categories: got ()",
+                     id="categories of reproduce"),
+        pytest.param("threads, cores: give one", SEGMENT, "--cores, --cores: give one", id="two arguments"),
+        pytest.param("a, threads: give one", SEGMENT, "a, threads: give one", id="one of two arguments"),
         pytest.param("kind: got 'foo'", SEGMENT, "kind: got 'foo'", id="no option of the command"),
         pytest.param("a.bin: cut; pass recover=True to read it", INFO,
                      "a.bin: cut; pass --option recover=true to read it", id="mend"),
@@ -65,6 +71,7 @@ def files(tmp_path, small_scene, monkeypatch):
     overlapping = ldls.InstanceMasks.from_array(np.ones((2, 60, 80), bool), categories=[1, 3])
     ldls.save(masks, tmp_path / "masks.npz")
     ldls.save(overlapping, tmp_path / "overlapping.npz")
+    ldls.save(masks.resolve_overlaps(), tmp_path / "numbers.png")
     layouts.write_text(tmp_path / "lidar.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n")
     layouts.write_text(tmp_path / "camera.yml", "camera_matrix: [100, 0, 40, 0, 100, 30, 0, 0, 1]\nD: []\n")
     (tmp_path / "labels").mkdir()
@@ -94,6 +101,18 @@ FRAME = "segment --points points.npy --calib camera.yml --masks masks.npz --out 
         pytest.param("masks convert overlapping.npz a.png", "; .json and .npz hold masks that overlap; --resolve score "
                      "leaves it to one", id="overlaps"),
         pytest.param("masks convert masks.npz a.npy", "or pass --variant pixels", id="pixels only"),
+        pytest.param(f"{FRAME} --extrinsic lidar.txt --iterations 0", "--iterations: got 0, expected 1 to 100000, or "
+                     "--converge until nothing changes", id="iterations"),
+        pytest.param("run kitti --out out", "--masks, --segmenter: give one of them, got neither", id="no masks"),
+        pytest.param("run kitti --masks kitti --out out --map a.ply", "--map: a.ply is without what moves", id="map"),
+        pytest.param("run kitti --masks kitti --out out --gpus 1", "--ray-address, --gpus: are for engine 'ray'",
+                     id="options of an engine"),
+        pytest.param("info kitti --option foo=3", "--option foo: no option of kitti-object", id="option of no kind"),
+        pytest.param("masks convert numbers.png a.npz --class-divisor 9", "leave out --class-divisor", id="divisor"),
+        pytest.param("evaluate labels labels --categories Car,Car", "--categories: 'Car' and 'Car' are one class",
+                     id="categories of evaluate"),
+        pytest.param("evaluate labels labels --categories ,", "--categories: got (), expected one or more",
+                     id="no categories of evaluate"),
         pytest.param("evaluate labels labels --max-range -1", "--max-range: got -1", id="range"),
         pytest.param("evaluate labels labels --max-range 9", "frame 0 has no ranges of its points; give its --points",
                      id="ranges"),

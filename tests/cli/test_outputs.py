@@ -53,7 +53,7 @@ def test_a_command_writes_over_no_input(folder, command, option, output):
     assert outcome.exit_code == 1
     expected = rf"error: {option}: would write over {output}, which is an input ("
     assert outcome.stderr.replace("out/../", "").startswith(expected), outcome.stderr
-    assert outcome.stderr.endswith(f"; give another {option}\n")
+    assert outcome.stderr.endswith("; give another\n")
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_two_options_do_not_write_one_file(folder, option, output):
     command = f"{SEGMENT} --out out --formats npz,csv {option} {output}"
     outcome = run(app, command.split(), env={"COLUMNS": "500"})
     assert outcome.exit_code == 1
-    assert outcome.stderr == f"error: {option}: {output} is what --out writes, too; give another {option}\n"
+    assert outcome.stderr == f"error: {option}: {output} is what --out writes, too; give another\n"
 
 
 @pytest.mark.parametrize("command", ["view", "info"])

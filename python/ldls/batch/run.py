@@ -138,7 +138,7 @@ def run(
         tables = [FAILURES_NAME] if not begun else []
         tables += [TRACKS, TRACKS_TABLE] if settings.track and TRACKS not in begun else []
         check_places(folder, opened.names, settings.frame_formats, begun, tables)
-    of_all = {name: Path(path) for name, path in (("objects", objects), ("map", map_file)) if path is not None}
+    of_all = {name: Path(path) for name, path in (("objects", objects), ("map_file", map_file)) if path is not None}
     check_outputs({name: [path] for name, path in of_all.items()}, _inputs(opened, settings), made=folder)
     check_apart(of_all, folder, opened.names)
     tracks = _tracks(settings, folder, names, map_file)
@@ -245,7 +245,7 @@ def _tracks(
         formats = (*settings.formats, RESULT) if BAG in settings.formats else settings.formats
         return RunTracks(folder, names, formats, None if map_file is None else Path(map_file))
     if map_file is not None:
-        raise ParameterError(f"map: {map_file} is without what moves, which tracks tell; add --track")
+        raise ParameterError(f"map_file: {map_file} is without what moves, which tracks tell; add --track")
     return None
 
 

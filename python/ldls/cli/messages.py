@@ -92,7 +92,9 @@ def _option(parameter: inspect.Parameter) -> str | None:
     """The option of a parameter of a command, as --depth-gap; None for an argument."""
     for info in getattr(parameter.annotation, "__metadata__", ()):
         if isinstance(info, OptionInfo):
-            given = [word for word in info.param_decls or () if word.startswith("--")]
+            # Typer takes the first for a default until it makes the command
+            first = (info.default,) if isinstance(info.default, str) else ()
+            given = [word for word in (*first, *(info.param_decls or ())) if word.startswith("--")]
             return given[0].partition("/")[0] if given else f"--{parameter.name.replace('_', '-')}"
     return None
 

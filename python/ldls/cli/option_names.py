@@ -10,7 +10,10 @@ OF_SOURCES = (
     "split", "truth", "version", "world",
 )  # fmt: skip
 """Arguments of sources, which --option takes."""
+CONVERGED = "None for the converged solution"
+"""What messages call the value that is an option of its own."""
 WORDS: Mapping[str, Mapping[str, str]] = {
+    CONVERGED: {"--converge": "--converge until nothing changes"},
     "T_camera_lidar": {"--extrinsic": "--extrinsic"},
     "format": {"--beside": "FORMAT:PATH"},
     "image_size": {"--image": "--image"},
@@ -18,6 +21,7 @@ WORDS: Mapping[str, Mapping[str, str]] = {
     "instance_axis=0": {"--instance-axis": "--instance-axis first"},
     "kind": {"--dataset": "--dataset"},
     "max_range_m": {"--max-range": "--max-range"},
+    "names": {"--beside": "--categories", "--truth": "--categories"},
     "pixels_only": {"--variant": "--variant pixels"},
     "ranges_m": {"--points": "--points"},
     "resolve_overlaps": {"--resolve": "--resolve score"},
@@ -33,17 +37,21 @@ ARGUMENT = re.compile(r"(?<![\w/.=-])(?<!--option )(?![A-Z]+=)(\w+)(?:=(\([^)]*\
 
 
 def by_options(message: str, options: Mapping[str, str]) -> str:
-    """`message` with options of a command in place of the argument that it begins with and those in what mends it.
+    """`message` with options of a command in place of the arguments that it begins with and those in what mends it.
 
     Args:
-        message: Argument, colon, fault, semicolon, mend; mends have arguments as `name=` and `name=value`.
+        message: Arguments, colon, fault, semicolon, mend; mends have arguments as `name=` and `name=value`.
         options: Options of the command by the names of its parameters.
     """
     fault, *mends = message.split("; ")
     argument, colon, rest = fault.partition(": ")
-    return "; ".join(
-        [f"{_words(argument, options) or argument}{colon}{rest}", *(_by_options(m, options) for m in mends)]
-    )
+    if rest.startswith("no option of") and "--option" in options.values():
+        argument = f"--option {argument}"
+    named = [_words(each, options) for each in argument.split(", ")]
+    if all(named):
+        argument = ", ".join(map(str, named))
+    rest = rest.replace(CONVERGED, _words(CONVERGED, options) or CONVERGED)
+    return "; ".join([f"{argument}{colon}{rest}", *(_by_options(mend, options) for mend in mends)])
 
 
 def _by_options(mend: str, options: Mapping[str, str]) -> str:

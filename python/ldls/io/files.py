@@ -235,14 +235,14 @@ def check_outputs(
     for option, path in written:
         other = options.setdefault(path.resolve(), option)
         if other != option:
-            raise InputError(f"{option}: {path} is what {other} writes, too; give another {option}")
+            raise InputError(f"{option}: {path} is what {other} writes, too; give another")
     there = {_identity(path): (option, path) for option, path in written if path.exists()}
     # nearly always nothing is there, and the inputs, which may be many, are not looked at
     given = (Path(path) for path in inputs if path is not None) if there else ()
     for path in (path for each in given for path in (each.iterdir() if each.is_dir() else [each]) if path.exists()):
         if _identity(path) in there:
             option, output = there[_identity(path)]
-            raise InputError(f"{option}: would write over {output}, which is an input ({path}); give another {option}")
+            raise InputError(f"{option}: would write over {output}, which is an input ({path}); give another")
 
 
 def _identity(path: Path) -> tuple[int, int]:

@@ -74,7 +74,7 @@ def read(
             return InstanceMasks(**instance_image.arguments(values, **given))  # type: ignore[arg-type]
         idle = [name for name, value in given.items() if value is not None]
         if idle:
-            raise ParameterError(f"{idle[0]}: the file holds its own; leave it out")
+            raise ParameterError(f"the file holds its own {idle[0]}; leave out {idle[0]}=")
         with parsing(f"text chunk {CHUNK}"):
             return _from_chunk(values, json.loads(texts[CHUNK]))
 
