@@ -92,6 +92,11 @@ def test_capitals_do_not_count():
         pytest.param(
             lambda: ClassSet.kitti(leave_out=("vehicle.car",)), r"\['vehicle.car'\] are sc", id="leave a synonym out"
         ),
+        pytest.param(
+            lambda: ClassSet.kitti(background=("car", "gnome")),
+            r"background: \['car'\] are scored too; .* or have it as background",
+            id="background of what is scored",
+        ),
         pytest.param(lambda: ClassSet.kitti(leave_out=("Person_sitting",)), "scored too", id="leave out who is merged"),
         pytest.param(
             lambda: ClassSet.kitti(("Truck", "Car", "vehicle.car")),

@@ -9,7 +9,7 @@ import typer
 
 from ldls.cli.messages import console
 from ldls.cli.options import refuse, words
-from ldls.errors import InputError
+from ldls.errors import InputError, ParameterError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,7 +55,7 @@ def masks_of(
 
     Raises:
         InputError: Neither or both are given, or a segmenter and no image.
-        ParameterError: A segmenter is given, and which image of a file it is.
+        ParameterError: A segmenter is given, and which image of a file it is; or no category.
         MaskError: The masks are of an image of another size.
     """
     if (masks is None) == (segmenter is None):
@@ -95,5 +95,13 @@ def say_own_masks(source: Source, masks: str | None, segmenter: str | None) -> b
 
 
 def chosen_categories(text: str | None) -> tuple[int | str, ...] | None:
-    """The categories of a list separated by commas, numbers as ids and the rest as names; None where there is none."""
-    return None if text is None else tuple(int(word) if word.isdecimal() else word for word in words(text))
+    """The categories of a list separated by commas, numbers as ids and the rest as names; None where there is none.
+
+    Raises:
+        ParameterError: The list is empty.
+    """
+    if text is None:
+        return None
+    if not words(text):
+        raise ParameterError("--categories: expected at least one, as car; leave it out for all")
+    return tuple(int(word) if word.isdecimal() else word for word in words(text))

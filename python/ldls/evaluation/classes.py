@@ -83,8 +83,8 @@ class ClassSet:
                 known.
 
         Raises:
-            ParameterError: Two names are of one class, one is scored and left out, by whatever of its names, or
-                `leave_out` holds a name of no vocabulary.
+            ParameterError: Two names are of one class, one is scored and left out, or background, by whatever of its
+                names, or `leave_out` holds a name of no vocabulary.
         """
         known = _known_names()
         leave_out = None if leave_out is None else tuple(leave_out)
@@ -95,9 +95,13 @@ class ClassSet:
             if not _without([one], synonyms(other)):
                 raise ParameterError(f"names: {one!r} and {other!r} are one class; score it by one of its names")
         aliases = {alias: name for name in names for alias in _without(_merged(name, merge_sitting), names)}
-        clash = [name for name in leave_out or () if not _without([name], [*names, *aliases])]
-        if clash:
-            raise ParameterError(f"leave_out: {clash} are scored too; score a class or leave it out")
+        for argument, given, instead in (
+            ("leave_out", leave_out or (), "leave it out"),
+            ("background", background, "have it as background"),
+        ):
+            clash = [name for name in given if not _without([name], [*names, *aliases])]
+            if clash:
+                raise ParameterError(f"{argument}: {clash} are scored too; score a class or {instead}")
         wanted = LEFT_OUT if leave_out is None else leave_out
         wanted = (*wanted, *VOID) if merge_sitting else (*wanted, *VOID, SITTING)
         left_out = _without((alias for name in wanted for alias in synonyms(name)), [*names, *aliases])
