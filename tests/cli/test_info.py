@@ -91,6 +91,7 @@ def test_what_is_wrong_is_found(tmp_path, change, status, message):
         pytest.param(["--option", "kind=folder"], "--option: got 'kind=folder', expected", id="the kind"),
         pytest.param(["--option", "path=x"], "--option: got 'path=x', expected", id="the path"),
         pytest.param(["--frame", "9", "--picture", "x.png"], "expected a name from", id="no such frame"),
+        pytest.param(["--picture", "x.jpg"], "cannot write '.jpg' pictures", id="another format"),
         pytest.param(["--frame", "0"], "--frame: the frame to draw, and there is no --picture", id="nothing to draw"),
     ],
 )
@@ -98,6 +99,7 @@ def test_wrong_options_are_refused(tmp_path, monkeypatch, options, message):
     monkeypatch.chdir(tmp_path)
     result = run(layouts.kitti_raw(tmp_path), *options)
     assert result.exit_code == 1 and message in result.stderr
+    assert result.stdout == "", "nothing is looked at"
 
 
 @pytest.mark.parametrize(

@@ -291,6 +291,13 @@ def test_a_result_as_pictures_needs_no_recording(saved, tmp_path):
     assert (tmp_path / "seen.rrd").is_file()
 
 
+def test_an_image_of_another_size_leaves_no_picture(saved, tmp_path):
+    Image.new("RGB", (60, 80)).save(tmp_path / "other.png")
+    done = run("frame.npz", "--image", "other.png", "--picture", "seen.png")
+    assert done.exit_code == 1 and "got 80 x 60 (height x width), the masks are of 60 x 80" in done.stderr
+    assert not list(tmp_path.glob("seen*"))
+
+
 @pytest.mark.parametrize(
     ("picture", "message"),
     [("seen.jpg", "cannot write '.jpg' pictures, expected .png"), ("nowhere/seen.png", "no such folder to write to")],

@@ -62,7 +62,11 @@ def info(
     if picture is None:
         refuse({"frame": frame}, "the frame to draw, and there is no --picture")
     frames = opened(source, dataset, parse_options(option or []))
+    drawn = chosen_frame(frames, frame)
     if picture is not None:
+        from ldls.viewing.files import check_picture
+
+        check_picture(picture)
         check_outputs({"--picture": [picture]}, (file for at in range(len(frames)) for file in frames.files(at)))
     indices = list(range(len(frames))) if every else sample(len(frames), LOOKED_AT)
     facts = [inspect(frames, at) for at in progress(indices, len(indices), "looking at frames")]
@@ -79,7 +83,7 @@ def info(
         finding_table(findings) if findings else f"looked at {len(facts)} of {len(frames)} frames, found nothing wrong"
     )
     if picture is not None:
-        write_picture(chosen_frame(frames, frame), picture)
+        write_picture(frames[drawn], picture)
         screen.print(f"wrote {picture}", soft_wrap=True)
     if any(finding.broken for finding in findings):
         raise typer.Exit(1)
@@ -196,15 +200,15 @@ def finding_table(findings: Sequence[Finding]) -> Table:
     return table
 
 
-def chosen_frame(source: Source, name: str | None) -> Frame:
-    """The frame of a name, or the first.
+def chosen_frame(source: Source, name: str | None) -> int:
+    """The number of the frame of a name, or of the first.
 
     Raises:
         ParameterError: There is no such frame.
     """
     if name is not None and name not in source.names:
         raise ParameterError(f"--frame: got {name!r}, expected a name from {source.names[0]} to {source.names[-1]}")
-    return source[0 if name is None else source.names.index(name)]
+    return 0 if name is None else source.names.index(name)
 
 
 def write_picture(frame: Frame, path: Path) -> None:

@@ -16,7 +16,7 @@ from ldls.segmentation import Segmentation
 from ldls.viewing.birds_eye import birds_eye_view
 from ldls.viewing.comparison import comparison
 from ldls.viewing.overlay import overlay
-from ldls.viewing.shown import Images
+from ldls.viewing.shown import Images, images_of
 
 
 def save_pictures(path: str | PathLike[str], result: Segmentation, images: Images = None) -> list[Path]:
@@ -32,6 +32,8 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
         InputError: As for `overlay`.
     """
     check_picture(path)
+    # images that do not fit are refused before one of the pictures is written
+    images = images_of(result, images)
     path, birds_eye, compared = picture_files(path)
     # the one that takes longest first
     drawn: dict[Path, Callable[[], Image.Image]] = {
