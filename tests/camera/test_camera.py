@@ -69,6 +69,8 @@ def test_spellings_of_a_calibration_that_are_understood(write, text):
         pytest.param(calibration(R0_rect="1 " * 10), "line 3: expected 9 numbers, got 10", id="many"),
         pytest.param(calibration(P2="nan " * 12), "line 2: expected finite numbers", id="nan"),
         pytest.param(calibration(P2="1,5 " * 12), "line 2: expected numbers with a decimal", id="comma"),
+        pytest.param(calibration(P2="7_21.5 " * 12), "line 2: expected numbers with a decimal", id="underscore"),
+        pytest.param(calibration(P2="\u0663 " * 12), "line 2: expected numbers with a decimal", id="digits of Arabic"),
         pytest.param(calibration() + "P2: " + CALIBRATION["P2"], "line 5: .* twice", id="doubled key"),
         pytest.param(calibration(P2="0 " * 12), "focal lengths that are not zero", id="all zero"),
         pytest.param(calibration(R0_rect="2 0 0 0 1 0 0 0 1"), "deviates", id="no rotation"),

@@ -405,6 +405,8 @@ def replaced(path, old, new):
                      id="raw without images"),
         pytest.param("kitti-odometry", with_text("times.txt", "0.0\n"), ldls.SourceError, "has 1 stamps",
                      id="odometry with too few stamps"),
+        pytest.param("kitti-odometry", with_text("times.txt", "0.0\n0_1\n0.2\n"), ldls.CorruptFileError,
+                     "line 2: expected a time such as .*, got '0_1'", id="underscore in a time"),
         pytest.param("kitti-odometry", with_text("times.txt", "17e17\n" * 3), ldls.CorruptFileError,
                      "line 1: expected a time such as 0.103736, in seconds", id="odometry with nanoseconds"),
         pytest.param("kitti-odometry", with_text("times.txt", "0.0\nnan\n0.2\n"), ldls.CorruptFileError,

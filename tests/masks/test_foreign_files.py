@@ -44,6 +44,7 @@ def test_a_class_of_yolo_that_is_named_background_has_no_objects(tmp_path):
         pytest.param(f"80 {YOLO}", {}, "class 80 has no name; pass names=", id="unknown class"),
         pytest.param("2 10 10 20 10 20 20", {}, "as shares of the image from 0 to 1", id="pixels"),
         pytest.param("2 0.1 0.2 0.3 0.4 0.5 x", {}, "expected a class and numbers", id="word"),
+        pytest.param("2 0.1 0.2 0.3 0.4 0.5 0_6", {}, "expected a class and numbers", id="underscore"),
         pytest.param(f"2.0 {YOLO}", {}, "line 1: class is '2.0', expected a whole", id="class of a float"),
         pytest.param(f"2 {YOLO}\n-1 {YOLO}", {}, "line 2: class is '-1', expected a whole", id="negative class"),
         pytest.param(f"2 {YOLO}\ncar {YOLO}", {}, "line 2: class is 'car', expected a whole", id="name among numbers"),

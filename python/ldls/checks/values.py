@@ -37,6 +37,18 @@ def whole_number(
     return operator.index(value)  # type: ignore[arg-type]
 
 
+def number_of(word: str) -> float:
+    """The number that stands in a file as `word`.
+
+    Raises:
+        ValueError: It is none.
+    """
+    # which Python takes, too: 7_21.5 may be what is left of two numbers
+    if "_" in word or not word.isascii():
+        raise ValueError(f"{word!r} is no number")
+    return float(word)
+
+
 def as_seconds(name: str, stamp: float, error: type[LdlsError] = ParameterError) -> float:
     """`stamp`, in seconds since 1970 or since the start of a drive.
 

@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 
 from ldls.camera import Camera
 from ldls.checks import checked
-from ldls.checks.values import as_seconds
+from ldls.checks.values import as_seconds, number_of
 from ldls.datasets.file_source import FileSource, image_from_file
 from ldls.datasets.folder_description import FILE, read_description, template
 from ldls.datasets.frame import CameraImage
@@ -181,7 +181,7 @@ def _description_in(path: Path) -> Path:
 def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:
     name, *words = line.rsplit(None, 1) or [""]
     try:
-        seconds = float("".join(words))
+        seconds = number_of("".join(words))
     except ValueError:
         seconds = math.nan
     if not name or math.isnan(seconds):

@@ -15,7 +15,7 @@ import numpy as np
 
 from ldls.camera import Camera
 from ldls.checks import checked
-from ldls.checks.values import as_seconds
+from ldls.checks.values import as_seconds, number_of
 from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
 from ldls.datasets.kitti_common import camera_numbers
@@ -142,4 +142,4 @@ def _trajectory(path: Path, poses: Path | None, camera: Camera) -> Trajectory | 
 
 
 def _seconds(line: str) -> float:
-    return as_seconds("stamp", float(line))
+    return as_seconds("stamp", number_of(line))

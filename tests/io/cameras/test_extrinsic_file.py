@@ -50,6 +50,7 @@ def test_a_transform_is_read_from_a_file(tmp_path, name, text):
     ("name", "text", "message"),
     [
         pytest.param("a.txt", "1 2 3 0 0 0 1", "expected the 12 or 16 .* got 7; name the parts", id="seven numbers"),
+        pytest.param("a.toml", "1_0 " * 12, "not a whole transform", id="underscores"),
         pytest.param("a.json", json.dumps(PARTS | {"pose_of": None}), "pose_of is missing; write 'camera'", id="whose"),
         pytest.param(
             "a.json", json.dumps(PARTS | {"quat": 1}), "unknown key 'quat', expected T_camera_lidar", id="key"

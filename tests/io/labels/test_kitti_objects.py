@@ -52,6 +52,7 @@ def test_objects_have_all_fields(tmp_path):
         pytest.param(ROW.rsplit(" ", 1)[0], TruncatedFileError, "line 2: expected 15 fields.*got 14", id="14 fields"),
         pytest.param(f"{ROW} 1 2", CorruptFileError, "line 2: expected 15 fields.*got 17", id="17 fields"),
         pytest.param(ROW.replace("20.0", "nan"), CorruptFileError, "a finite number, got 'nan'", id="nan"),
+        pytest.param(ROW.replace("20.0", "2_0.0"), CorruptFileError, "got '2_0.0'", id="underscore"),
         pytest.param(ROW.replace("20.0", "20,0"), CorruptFileError, "got '20,0'", id="decimal comma"),
     ],
 )

@@ -56,6 +56,7 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
             "1 2 3\n\n4 5\n6 7 8\n", ldls.CorruptFileError, "line 3: expected at least 3 cells, got 2", id="short"
         ),
         pytest.param("1 2 3\n4 5", ldls.TruncatedFileError, "line 2: expected at least 3 cells, got 2", id="cut"),
+        pytest.param("1_5;2;3\n", ldls.CorruptFileError, "line 1: .* decimal point .* '1_5'", id="underscore"),
         pytest.param("1,5;2;3\n", ldls.CorruptFileError, "line 1: .* decimal point .* '1,5'", id="decimal comma"),
         pytest.param("1,2,3\n1,5,2,3\n", ldls.CorruptFileError, "line 2: expected 3 cells, got 4.* decimal", id="long"),
         pytest.param(

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ldls.camera.extrinsic import extrinsic
 from ldls.camera.fields import Fields
 from ldls.camera.rigid import as_transform, inverse, rigid
+from ldls.checks.values import number_of
 from ldls.errors import CalibrationError, within
 from ldls.io.cameras.field_file import fields_of
 from ldls.io.files import open_file
@@ -76,7 +77,7 @@ def _entries(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _numbers(words: list[str]) -> NDArray[np.float64] | None:
     try:
-        return np.array(words, np.float64)
+        return np.array([number_of(word) for word in words])
     except ValueError:
         return None
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.checks.values import number_of
 from ldls.errors import CalibrationError, ParameterError, within
 from ldls.io.files import open_file
 
@@ -167,7 +168,7 @@ def _numbers(place: str, words: list[str], expected: int) -> NDArray[np.float64]
     if len(words) != expected:
         raise CalibrationError(f"{place}: expected {expected} numbers, got {len(words)}")
     try:
-        numbers = np.array([float(word) for word in words])
+        numbers = np.array([number_of(word) for word in words])
     except ValueError:
         raise CalibrationError(f"{place}: expected numbers with a decimal point, got {words}") from None
     if not np.isfinite(numbers).all():

@@ -19,6 +19,7 @@ from ldls.camera import Camera
 from ldls.camera.rigid import transformed
 from ldls.categories import folded, own_name
 from ldls.checks import checked
+from ldls.checks.values import number_of
 from ldls.cloud import as_points
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
 from ldls.io.files import read_lines, whole_file
@@ -256,7 +257,7 @@ def _object(place: str, words: list[str]) -> KittiObject:
 
 def _number(place: str, word: str) -> float:
     try:
-        number = float(word)
+        number = number_of(word)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

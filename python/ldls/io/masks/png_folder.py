@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ldls.checks.values import number_of
 from ldls.errors import MaskError, within
 from ldls.io.files import open_file
 from ldls.io.images import read_image
@@ -56,4 +57,4 @@ def _scores(path: Path, stems: Sequence[str]) -> list[float]:
         missing = [stem for stem in stems if stem not in rows]
         if missing:
             raise MaskError(f"has no row of {missing[0]}.png; delete it, or give scores=")
-        return [min(float(rows[stem]["predicted_iou"]), 1.0) for stem in stems]
+        return [min(number_of(rows[stem]["predicted_iou"]), 1.0) for stem in stems]

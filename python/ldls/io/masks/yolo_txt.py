@@ -15,6 +15,7 @@ import numpy as np
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids, is_object
+from ldls.checks.values import number_of
 from ldls.errors import CorruptFileError, MaskError
 from ldls.io.cameras.field_file import read_fields
 from ldls.io.files import read_lines
@@ -101,7 +102,7 @@ def _parsed(place: str, words: list[str]) -> tuple[int, Any, float]:
     if not words[0].isdecimal():
         raise CorruptFileError(f"{place}: class is {words[0][:60]!r}, expected a whole number, counted from 0")
     try:
-        category, numbers = int(words[0]), np.array(words[1:], np.float64)
+        category, numbers = int(words[0]), np.array([number_of(word) for word in words[1:]])
     except ValueError:
         raise CorruptFileError(f"{place}: expected a class and numbers, got {' '.join(words)[:60]!r}") from None
     if len(words) in (5, 6):

@@ -11,6 +11,7 @@ from itertools import takewhile
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks.values import number_of
 from ldls.errors import CorruptFileError, TruncatedFileError
 
 Row = tuple[int, str]
@@ -165,7 +166,7 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
 def is_number(cell: str) -> bool:
     """True for a cell, in quotes or not, that holds a number."""
     try:
-        float(cell.strip().strip('"'))
+        number_of(cell.strip().strip('"'))
     except ValueError:
         return False
     return True
