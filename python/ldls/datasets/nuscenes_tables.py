@@ -78,6 +78,11 @@ def find_tables(path: Path, version: str | None) -> Path:
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such folder")
     versions = sorted(table.parent.name for table in path.glob("v1.0-*/sample_data.json"))
+    if not versions:
+        there = some(sorted(each.name for each in path.glob("*"))) or "nothing"
+        raise SourceError(
+            f"{path}: has no v1.0-*/sample_data.json, as nuScenes has beside samples and sweeps; found {there}"
+        )
     tables = path / choose(path, "version", versions, version)
     missing = [name for name in TABLES if not (tables / f"{name}.json").is_file()]
     if missing:
