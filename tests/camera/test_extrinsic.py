@@ -37,6 +37,11 @@ def test_a_body_is_turned_to_the_optical_frame():
             "got quaternion_wxyz, rotation",
             id="two rotations",
         ),
+        pytest.param(
+            {"quaternion_xyzw": [0, 1, 0, 2]},
+            r"_xyzw: quaternion \[0.0, 1.0, 0.0, 2.0\] .* \(x y z w\)",
+            id="no unit, w last",
+        ),
         pytest.param({"quaternion_wxyz": [1, 1, 0, 0]}, "quaternion_wxyz: .* length 1.41421, expected 1", id="no unit"),
         pytest.param({"rotation": np.diag([1.0, 1, -1])}, "rotation: the determinant is -1, a mirror", id="mirror"),
         pytest.param({"roll_pitch_yaw_deg": [1, 2]}, "roll_pitch_yaw_deg: expected shape", id="two angles"),

@@ -183,7 +183,7 @@ WHOLE = sound_model().SerializeToString()
 @pytest.mark.parametrize(
     ("content", "error", "match"),
     [
-        pytest.param(b"", TruncatedFileError, "after 0 bytes", id="empty"),
+        pytest.param(b"", TruncatedFileError, "empty, expected an ONNX", id="empty"),
         pytest.param(WHOLE[:-1], TruncatedFileError, f"after {len(WHOLE) - 1} bytes", id="last byte missing"),
         pytest.param(WHOLE[: len(WHOLE) // 2], TruncatedFileError, "download it again", id="half"),
         pytest.param(WHOLE[:1], TruncatedFileError, "after 1 bytes", id="one byte"),

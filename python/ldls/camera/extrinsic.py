@@ -71,7 +71,7 @@ def _rotation(name: str, value: NDArray[np.float64]) -> NDArray[np.float64]:
     if name == "roll_pitch_yaw_deg":
         return turn_of(*np.radians(as_matrix(name, value, ((3,),))))
     quaternion = as_matrix(name, value, ((4,),))
-    return from_quaternion(name, quaternion if name == "quaternion_wxyz" else np.roll(quaternion, 1))
+    return from_quaternion(name, quaternion, "wxyz" if name == "quaternion_wxyz" else "xyzw")
 
 
 def turn_of(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,17 +91,19 @@ def brought_together(clouds: Sequence[Points], matrices: Sequence[Matrix], *, ke
     return _ldls.brought_together(each, [matrix.tolist() for matrix in matrices], keep_origin)
 
 
-def from_quaternion(place: str, wxyz: Matrix) -> Matrix:
-    """(3, 3) rotation of a quaternion w x y z.
+def from_quaternion(place: str, quaternion: Matrix, order: Literal["wxyz", "xyzw"] = "wxyz") -> Matrix:
+    """(3, 3) rotation of a quaternion in that order.
 
     Raises:
         CalibrationError: Its length is not 1.
     """
     with np.errstate(over="ignore"):  # of numbers that are no rotation's
-        length = float(np.linalg.norm(wxyz))
+        length = float(np.linalg.norm(quaternion))
     if not abs(length - 1) <= ROTATION_LIMIT:
-        raise CalibrationError(f"{place}: quaternion {wxyz.tolist()} has length {length:.6g}, expected 1 (w x y z)")
-    w, x, y, z = wxyz / length
+        raise CalibrationError(
+            f"{place}: quaternion {quaternion.tolist()} has length {length:.6g}, expected 1 ({' '.join(order)})"
+        )
+    w, x, y, z = np.roll(quaternion, -order.index("w")) / length
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

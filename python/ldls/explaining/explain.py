@@ -67,8 +67,8 @@ def explain(result: Segmentation, point: int) -> Explanation:
 
 def _checked_row(point: int, count: int) -> int:
     if not 0 <= point < count:
-        expected = f"0 to {count - 1}" if count else "nothing, for the cloud is empty"
-        raise ParameterError(f"point: got {shown(point)}, expected {expected}, its row in the cloud")
+        expected = f"expected 0 to {count - 1}, its row in the cloud" if count else "the cloud is empty"
+        raise ParameterError(f"point: got {shown(point)}, {expected}")
     return operator.index(point)
 
 

@@ -87,7 +87,8 @@ class InstanceMasks:
                 that looks like (H, W, M) is refused without it.
 
         Raises:
-            MaskError: Masks of different sizes, values that are no mask, an unknown category or a bad score.
+            MaskError: Masks of different sizes, values that are no mask, an unknown category id or a bad score.
+            ParameterError: A name among `categories` that no id has.
         """
         rles = [encode(i, mask) for i, mask in enumerate(_one_by_one(masks, instance_axis))]
         if image_size is None:
@@ -155,7 +156,8 @@ class InstanceMasks:
         A mask has the pixels whose centres, at whole numbers, lie within the box; outside the image there are none.
 
         Raises:
-            MaskError: A box that is none, an unknown category or a bad score.
+            MaskError: A box that is none, an unknown category id or a bad score.
+            ParameterError: A name among `categories` that no id has.
         """
         rles = rectangles(adapters.to_numpy(boxes), image_size)
         return cls(rles, image_size, categories=categories, scores=scores, names=names)

@@ -103,7 +103,9 @@ def _check_fields(content: bytes) -> None:
                 raise CorruptFileError(f"not an ONNX model (byte {start} begins no protobuf field)")
     except IndexError:
         at = len(content) + 1
-    if at > len(content) or not content:
+    if not content:
+        raise TruncatedFileError("empty, expected an ONNX model; download it again")
+    if at > len(content):
         raise TruncatedFileError(f"ends after {len(content)} bytes, expected at least {at}; download it again")
 
 

@@ -5,6 +5,7 @@ import pytest
 
 import ldls
 from ldls.errors import RecoveredFileWarning
+from ldls.simulation import sample_frame
 
 
 def rows(n, columns):
@@ -26,6 +27,12 @@ def test_bin_files_hold_rows_of_floats(tmp_path, name, columns, options):
     np.testing.assert_array_equal(points, values)
     assert points.dtype == np.float32
     assert points.flags.writeable, "as points of other formats"
+
+
+def test_floats_of_another_byte_order_are_guessed_at_without_a_warning_of_numpy(tmp_path):
+    sweep = sample_frame().points.astype(">f4")
+    sweep.tofile(tmp_path / "sweep.bin")
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / "sweep.bin"), sweep.view("<f4"))
 
 
 def test_npy_files_keep_their_precision(tmp_path):

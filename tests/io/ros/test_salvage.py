@@ -30,7 +30,7 @@ def test_a_bag_cut_anywhere_keeps_its_whole_messages(tmp_path, kind):
     counted = []
     for cut in cuts(len(content)):
         path.write_bytes(content[:cut])
-        with pytest.raises(FileFormatError, match="cut"):
+        with pytest.raises(FileFormatError, match="cut") as refused:
             open_bag(path)
         with pytest.warns(RecoveredFileWarning, match=f"{path.name}: .*whole messages before it"):
             recovered = messages(path, recover=True)
@@ -38,6 +38,7 @@ def test_a_bag_cut_anywhere_keeps_its_whole_messages(tmp_path, kind):
         if kind != "rosbag2":
             # a database keeps long messages in pages all over the file
             assert len(recovered) == sum(end <= cut for end in ends)
+        assert ("pass recover=True" in str(refused.value)) == bool(recovered)
         counted.append(len(recovered))
     assert counted == sorted(counted) and counted[0] == 0 and counted[-1] >= len(recorded) - 1
 

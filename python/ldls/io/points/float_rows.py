@@ -167,7 +167,8 @@ def _turn_deg(values: NDArray[np.float32], columns: int) -> float:
 
 def _are_alike(values: NDArray[np.float32], columns: int, period: int) -> bool:
     """True if the rows after every `period`-th are as far away as these, as where two lidars take turns."""
-    rows = np.nan_to_num(values.reshape(-1, columns)[:, :2])
+    # squares of what other bytes than floats make go beyond single precision
+    rows = np.nan_to_num(values.reshape(-1, columns)[:, :2]).astype(np.float64)
     one, other = (float(np.median(np.hypot(*rows[start::period].T))) for start in (0, 1))
     return one < 4 * other and other < 4 * one
 

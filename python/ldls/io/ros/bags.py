@@ -142,7 +142,8 @@ def open_bag(path: Path, *, recover: bool = False) -> Bag:
     last = f"the last at {seconds(whole[-1].received_ns)}" if whole else "so nothing can be saved"
     message = f"{damage}; {len(whole)} whole messages before it, {last}"
     if not recover:
-        raise TruncatedFileError(f"{message}; pass recover=True to read them") from fault
+        mend = "; pass recover=True to read them" if whole else ""
+        raise TruncatedFileError(message + mend) from fault
     warnings.warn(message, RecoveredFileWarning, stacklevel=3)
     if bag is not None:
         bag.close()
