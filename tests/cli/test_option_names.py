@@ -129,6 +129,21 @@ def test_errors_name_options(files, words, message):
     assert done.exit_code == 1 and message in " ".join(done.stderr.split()), done.output
 
 
+@pytest.mark.parametrize(
+    ("words", "option", "given"),
+    [
+        pytest.param(f"{FRAME} --neighbors abc", "--neighbors", "abc", id="no number"),
+        pytest.param("run kitti --out out --cores 0", "--cores", "0", id="too few cores"),
+        pytest.param("run kitti --out out --sweeps -1", "--sweeps", "-1", id="below zero"),
+        pytest.param("masks convert masks.npz a.png --resolve size", "--resolve", "size", id="no such choice"),
+    ],
+)
+def test_errors_of_values_say_what_was_given(files, words, option, given):
+    done = CliRunner().invoke(app, words.split(), env={"COLUMNS": "200"})
+    _, found, said = done.stderr.partition(f"Invalid value for '{option}':")
+    assert done.exit_code == 2 and found and given in said and "Value error" not in said, done.output
+
+
 def test_findings_and_frames_that_fail_name_no_arguments_as_if_they_were_options(files):
     expected = "in Python or ldls.toml, pass columns= if rows are of another length; else copy it again, or have "
     expected += "ldls.read_points recover the whole points"
