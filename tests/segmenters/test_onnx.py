@@ -202,7 +202,7 @@ def test_boxes_that_show_nothing_are_left_out(box, tmp_path):
 @pytest.mark.parametrize(
     ("outputs", "error", "match"),
     [
-        pytest.param({"scores": np.array([NAN])}, MaskError, "instance 0: score is nan", id="score NaN"),
+        pytest.param({"scores": np.array([NAN])}, MaskError, r"\.onnx: instance 0: score is nan", id="score NaN"),
         pytest.param({"scores": SCORE + 1}, MaskError, r"instance 0: score is 1\.8999", id="score above 1"),
         pytest.param({"scores": SCORE - 1.2}, MaskError, "instance 0: score is -0.3", id="score below 0"),
         pytest.param({"boxes": BOX * NAN}, MaskError, "instance 0: box holds NaN", id="box NaN"),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls._optional import require
-from ldls.errors import FileFormatError, ParameterError, ShapeError, UnsupportedFormatError
+from ldls.errors import FileFormatError, ParameterError, ShapeError, UnsupportedFormatError, within
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes, coco_classes, contiguous_coco_classes, named_classes
 from ldls.segmenters.mask_rcnn import MaskRcnn, ZooMaskRcnn, detection_outputs, zoo_masks
@@ -109,12 +109,15 @@ class OnnxSegmenter:
         Raises:
             ShapeError: It is not (H, W, 3), or not of the one size that the model takes.
             DtypeError: It is not uint8.
-            MaskError: The model gave NaN, a score outside 0 to 1 or an unknown class; the message names the instance.
+            MaskError: The model gave NaN, a score outside 0 to 1 or an unknown class; the message names the file of the
+                model and the instance.
             FileFormatError: The model fails, or its outputs are of other shapes than its kind has.
         """
         pixels = check_image(image)
         size = (pixels.shape[0], pixels.shape[1])
-        return self._family.masks(self._run(self._feed(pixels)), size, self.min_score)
+        outputs = self._run(self._feed(pixels))
+        with within(self._source):
+            return self._family.masks(outputs, size, self.min_score)
 
     def __repr__(self) -> str:
         return f"OnnxSegmenter({self._source!r}, kind={self.kind!r}, min_score={self.min_score})"
