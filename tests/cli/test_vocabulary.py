@@ -70,6 +70,14 @@ def test_help_shows_values_in_capitals_by_h_as_well(name, command):
     assert unnamed == []
 
 
+@pytest.mark.parametrize(("name", "command"), COMMANDS)
+def test_help_in_a_narrow_terminal_has_all_words_whole(name, command):
+    text = CliRunner().invoke(app, [*name.split()[1:], "--help"], env={"COLUMNS": "80"}).output
+    assert "…" not in text
+    choices = [word for param in command.params for word in (param.metavar or "").replace("|", " ").split()]
+    assert [word for word in choices if word not in text] == []
+
+
 def test_lists_are_separated_by_commas(tmp_path):
     outcome = CliRunner().invoke(app, ["run", str(tmp_path), "--out", "o", "--formats", "npz", "--formats", "png"])
     assert outcome.exit_code != 0

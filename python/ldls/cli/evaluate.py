@@ -78,7 +78,7 @@ def evaluate(
         typer.Option(
             metavar="WORDS",
             help='True categories that do not count; "" for none.',
-            show_default="Van,Cyclist,Misc,DontCare",
+            show_default="Van, Cyclist, Misc, DontCare",
         ),
     ] = None,
     background: Annotated[

@@ -68,8 +68,9 @@ def simulate(
     scene: Annotated[
         SceneKind, typer.Option(metavar="|".join(SceneKind), help="Kind of the scenes.")
     ] = SceneKind.STREET,
+    # a narrow terminal breaks choices between blanks, or else within words
     lidar: Annotated[
-        LidarName, typer.Option(metavar="|".join(LidarName), help="Beam table, ranges and noise of the sweep.")
+        LidarName, typer.Option(metavar=" | ".join(LidarName), help="Beam table, ranges and noise of the sweep.")
     ] = LidarName.HDL_64E,
     rig: Annotated[
         Rig,
@@ -80,7 +81,7 @@ def simulate(
     layout: Annotated[
         Layout,
         typer.Option(
-            metavar="|".join(Layout),
+            metavar=" | ".join(Layout),
             help="Single scenes as KITTI's object data, a drive through a scene as KITTI's raw data, or a robot's "
             "drive through a campus as a ROS bag; --scene, --lidar, --rig and --cores then do not count.",
         ),
