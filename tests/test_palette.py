@@ -45,6 +45,17 @@ def test_a_category_has_one_hue_whatever_else_is_there() -> None:
     assert tuple(alone[0]) == category_colour(3)
 
 
+def test_hues_whose_shades_meet_are_those_of_the_documentation() -> None:
+    shades = {category: seen(instance_colours([category] * 7)) for category in (*TRAFFIC, *range(100, 110))}
+    near = {
+        (one, other)
+        for one, other in combinations(shades, 2)
+        if np.linalg.norm(shades[one][:, None] - shades[other], axis=-1).min() < 0.05
+    }
+    # person and 9, motorcycle and 7, truck and 6
+    assert near == {(103, 105), (1, 109), (4, 107), (8, 106)}
+
+
 @pytest.mark.parametrize("category", [*TRAFFIC, *range(100, 110)])
 def test_instances_differ_in_shade_and_not_in_hue(category: int) -> None:
     shades = instance_colours([category] * 14)
