@@ -50,8 +50,8 @@ def segment(
         keep_origin: Points at exactly (0, 0, 0) are missing returns to most sensors and left out; keep them if yours
             means them.
         same_object: Two instances of one category in two images become one label if, of the points that both
-            cameras see and that fall on either mask, at least this share falls on both; 0 to 1. Where views have
-            different names, a category goes by its name, and instances have the id that the first view gave it.
+            cameras see and that fall on either mask, at least this share falls on both; above 0, at most 1. Where views
+            have different names, a category goes by its name, and instances have the id that the first view gave it.
 
     Returns:
         Labels, confidences and objects, in the order of `points`. Equal bit for bit for any number of threads.
