@@ -163,9 +163,9 @@ def test_likelihoods_beyond_what_the_pixel_edges_allow_are_computed_by_plain_pro
     n = 300
     steps = np.arange(n)
     graph = (
-        np.arange(n + 1) * 2,
-        np.stack([steps, (steps + 1) % n], axis=1).ravel().astype("i4"),
-        np.full(2 * n, 0.45, "f4"),
+        np.arange(n + 1) * 3,
+        np.stack([steps, (steps + 1) % n, (steps - 1) % n], axis=1).ravel().astype("i4"),
+        np.full(3 * n, 0.3, "f4"),
     )
     seeds = (np.arange(n + 1) * 2, np.tile([0, 1], n).astype("i4"), np.full(2 * n, 0.1, "f4"))
     allowed = _ldls.diffuse(graph, seeds, np.full(n, 0.1, "f4"), 2, 200, 1)

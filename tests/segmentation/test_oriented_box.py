@@ -9,7 +9,8 @@ from ldls.segmentation import fit_upright_box
 
 def plain_box(points):
     """Center, size and yaw of the box around (n, 3) points."""
-    looked_at = points[:: -(-len(points) // 150), :2]
+    by_height = points[np.lexsort((points[:, 1], points[:, 0], points[:, 2]))]
+    looked_at = by_height[:: -(-len(points) // 150), :2]
     stray, fits = int(0.04 * (len(looked_at) - 1)), []
     for heading in np.deg2rad(np.arange(90.0)):
         axes = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])

@@ -31,7 +31,7 @@ def street(T_camera_lidar, shift_m: float = 0.0) -> ldls.Segmentation:
         projection=[[200, 0, 200], [0, 200, 80], [0, 0, 1]], T_camera_lidar=np.array(T_camera_lidar, float)
     )
     masks = ldls.InstanceMasks.from_boxes([[128, 82, 164, 104]], (160, 400), categories=[3])
-    return ldls.segment(points, masks, camera, params=ldls.Params.paper())
+    return ldls.segment(points, masks, camera)
 
 
 @pytest.mark.parametrize(
@@ -42,10 +42,11 @@ def test_what_is_ahead_left_of_the_camera_is_up_left_of_the_lidar(axes) -> None:
     picture = np.asarray(birds_eye_view(result))
     ground = ground_of(result)
     (lidar,) = ground.at(np.zeros((1, 2)))
-    left, top = np.round(lidar + ground.px_per_m * np.array([-4, -13])).astype(int)
-    right, bottom = np.round(lidar + ground.px_per_m * np.array([-2, -11])).astype(int)
+    left, top = np.round(lidar + ground.px_per_m * np.array([-4.5, -13.5])).astype(int)
+    right, bottom = np.round(lidar + ground.px_per_m * np.array([-1.5, -10.5])).astype(int)
     coloured = np.abs(picture.astype(int) - instance_colours([3])[0]).max(axis=2) <= 3
-    assert coloured[top:bottom, left:right].mean() > 0.4
+    # but for its name
+    assert coloured[top:bottom, left:right].sum() > 0.8 * coloured.sum()
     assert coloured[:, int(lidar[0]) :].sum() == 0
 
 

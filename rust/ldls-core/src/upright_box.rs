@@ -1,6 +1,7 @@
 //! The upright box that fits points of which a lidar sees one side or two.
 
 use multiversion::multiversion;
+use std::cmp::Ordering;
 use std::f64::consts::FRAC_PI_2;
 
 /// Headings that are tried, equally far apart: a rectangle comes round to itself after a quarter turn.
@@ -11,7 +12,7 @@ const NEAR_M: f64 = 0.1;
 const AS_GOOD: f64 = 0.998;
 /// Share of the points at either end that do not decide where a side is.
 const STRAY: f64 = 0.04;
-/// Points, evenly chosen in the order of their places, that decide on the heading, and how many of them at most are stray at one end.
+/// Points, evenly chosen in the order of their heights, that decide on the heading, and how many of them at most are stray at one end.
 const MOST_LOOKED_AT: usize = 150;
 const MOST_STRAY: usize = (STRAY * MOST_LOOKED_AT as f64) as usize;
 
@@ -35,10 +36,17 @@ impl UprightBox {
     /// The order of the points does not matter.
     pub fn around(points: &[[f64; 3]]) -> Option<Self> {
         let first = points.first()?;
-        let mut places: Vec<[f64; 2]> = points.iter().map(|&[x, y, _]| [x, y]).collect();
-        places.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-        let step = places.len().div_ceil(MOST_LOOKED_AT);
-        let some = places.into_iter().step_by(step);
+        // which are the same whatever way the axes on the ground point
+        let mut sorted: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [z, x, y]).collect();
+        sorted.sort_unstable_by(|one, other| {
+            let axes = one
+                .iter()
+                .zip(other)
+                .map(|(one, other)| one.total_cmp(other));
+            axes.fold(Ordering::Equal, Ordering::then)
+        });
+        let step = sorted.len().div_ceil(MOST_LOOKED_AT);
+        let some = sorted.iter().step_by(step).map(|&[_, x, y]| [x, y]);
         let heading = best_heading(&some.collect::<Vec<_>>());
         let (sin, cos) = heading.sin_cos();
         let turned = |[x, y, z]: &[f64; 3]| [cos * x + sin * y, cos * y - sin * x, *z];
