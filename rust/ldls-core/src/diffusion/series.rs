@@ -15,8 +15,8 @@ use rayon::prelude::*;
 /// What the eigenvalues of the graph of a cloud lie above: -0.25 to -0.34 is the least one of frames of 64 beams, where
 /// Gershgorin's theorem says -0.82.
 const USUAL_LOW: f64 = -0.5;
-/// What series may leave out of a likelihood, as a share of the largest that there may be. On graphs where it would be more, the terms left out grow, and the probe says too
-/// little.
+/// What series may leave out of a likelihood, as a share of the largest that there may be. On graphs where it would be more, the
+/// terms left out grow, and the probe says too little.
 const MOST_LEFT_OUT: f64 = 1e-4;
 /// The same of those that begin at [`USUAL_LOW`]: in one frame of a hundred some dozen points have more than the others may,
 /// and double precision decides the near-ties among them.
