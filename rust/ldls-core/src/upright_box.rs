@@ -12,7 +12,8 @@ const NEAR_M: f64 = 0.1;
 const AS_GOOD: f64 = 0.998;
 /// Share of the points at either end that do not decide where a side is.
 const STRAY: f64 = 0.04;
-/// Points, evenly chosen in the order of their heights, that decide on the heading, and how many of them at most are stray at one end.
+/// Points, evenly chosen in the order of their heights, that decide on the heading, and how many of them at most are stray at one
+/// end.
 const MOST_LOOKED_AT: usize = 150;
 const MOST_STRAY: usize = (STRAY * MOST_LOOKED_AT as f64) as usize;
 
