@@ -43,6 +43,8 @@ INFO = {"dataset": "--dataset", "option": "--option"}
                      id="one of two without an option"),
         pytest.param("a: no lidar; give it as T_camera_lidar=", SEGMENT, "a: no lidar; give it as --extrinsic",
                      id="extrinsic"),
+        pytest.param("a: b; perhaps masks=c/masks_02?", {"masks": "--masks"}, "a: b; perhaps --masks c/masks_02?",
+                     id="path of a mend"),
         pytest.param("a: b; as by --option scene=NAME, or NAME=PATH", INFO,
                      "a: b; as by --option scene=NAME, or NAME=PATH", id="words of the command line"),
         pytest.param("kind=x/threads=2.bin: no file", SEGMENT, "kind=x/threads=2.bin: no file", id="path"),

@@ -35,6 +35,8 @@ ELSEWHERE = {"T_camera_lidar": f"{PYTHON} or ldls.toml", "columns": f"{PYTHON} o
 """Where arguments are given for which a command has no option; the others in Python."""
 ARGUMENT = re.compile(r"(?<![\w/.=-])(?<!--option )(?![A-Z]+=)(\w+)(?:=(\([^)]*\)|\{[^}]*\}|[^\s,;()]*)|\(\))")
 
+PATH = re.compile(r"[/\\]")
+
 
 def by_options(message: str, options: Mapping[str, str]) -> str:
     """`message` with options of a command in place of the arguments that it begins with and those in what mends it.
@@ -66,7 +68,10 @@ def _by_options(mend: str, options: Mapping[str, str]) -> str:
 def _with_value(found: re.Match[str], options: Mapping[str, str]) -> str:
     words = _words(found[0], options) or _words(found[1], options) or found[1]
     value = (found[2] or "...").replace("True", "true")
-    return f"{words}={value}" if words.startswith("--option") else words
+    if words.startswith("--option"):
+        return f"{words}={value}"
+    # words say what a value means, but not a path
+    return f"{words} {value}" if PATH.search(value) else words
 
 
 def _words(argument: str, options: Mapping[str, str]) -> str | None:
