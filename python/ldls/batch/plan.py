@@ -14,7 +14,7 @@ from ldls.batch.window import Frames
 from ldls.checks.values import is_whole
 from ldls.datasets import Source
 from ldls.errors import BatchError, ParameterError, UnsafePathError, some
-from ldls.sequences.trajectory import LONGEST_GAP_S, SAME_S
+from ldls.sequences.trajectory import is_gap
 from ldls.viewing.formats import ENDINGS, TRACKS, file_name, file_names
 
 WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
@@ -71,7 +71,7 @@ def windows_of(chosen: Frames, stamps: Sequence[float | None], sweeps: int) -> l
     last: float | None = None
     for frame in chosen:
         stamp = stamps[frame[0]] if sweeps else None
-        parted = last is not None and stamp is not None and not 0 < stamp - last <= LONGEST_GAP_S + SAME_S
+        parted = last is not None and stamp is not None and (stamp <= last or is_gap(stamp - last))
         if not windows or parted or len(windows[-1]) > 2 * sweeps:
             windows.append([])
         windows[-1].append(frame)

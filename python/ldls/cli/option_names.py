@@ -35,8 +35,6 @@ ELSEWHERE = {"T_camera_lidar": f"{PYTHON} or ldls.toml", "columns": f"{PYTHON} o
 """Where arguments are given for which a command has no option; the others in Python."""
 ARGUMENT = re.compile(r"(?<![\w/.=-])(?<!--option )(?![A-Z]+=)(\w+)(?:=(\([^)]*\)|\{[^}]*\}|[^\s,;()]*)|\(\))")
 
-PATH = re.compile(r"[/\\]")
-
 
 def by_options(message: str, options: Mapping[str, str]) -> str:
     """`message` with options of a command in place of the arguments that it begins with and those in what mends it.
@@ -71,7 +69,7 @@ def _with_value(found: re.Match[str], options: Mapping[str, str]) -> str:
     if words.startswith("--option"):
         return f"{words}={value}"
     # words say what a value means, but not a path
-    return f"{words} {value}" if PATH.search(value) else words
+    return f"{words} {value}" if any(mark in value for mark in "/\\") else words
 
 
 def _words(argument: str, options: Mapping[str, str]) -> str | None:

@@ -21,7 +21,7 @@ from ldls.cloud import Points, as_points, finite_rows
 from ldls.errors import InputError, LdlsWarning, PoseError, within
 from ldls.sequences.grid import cell_keys
 from ldls.sequences.ground_level import levelled, split_standing
-from ldls.sequences.trajectory import LONGEST_GAP_S, SAME_S, Trajectory
+from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory, is_gap
 
 BEGINNINGS = 2
 """Times that the first two sweeps are laid on each other again, each time with less of their motion in them."""
@@ -157,7 +157,7 @@ class _Laid:
         """The way around `stamp`, as it was between the last two sweeps; at rest where these are too far apart."""
         poses, stamps = (self.poses, self.stamps) if len(self.poses) > 1 else (self._begin.poses, self._begin.stamps)
         back, period_s = inverse(poses[-1]) @ poses[-2], float(stamps[-1] - stamps[-2])
-        if period_s > LONGEST_GAP_S + SAME_S:
+        if is_gap(period_s):
             back, period_s = np.eye(4), PERIOD_S
         return Trajectory(np.array([stamp - period_s, stamp]), np.array([back, np.eye(4)]))
 
@@ -175,8 +175,8 @@ class _Laid:
 def _warn_of_gaps(stamps: NDArray[np.float64]) -> None:
     """Warn of sweeps after which a lidar that moved is laid where it was: some places look alike."""
     steps_s = np.diff(stamps)
-    (gaps,) = np.nonzero(steps_s > LONGEST_GAP_S + SAME_S)
-    if len(gaps):
+    gaps = [at for at, step_s in enumerate(steps_s.tolist()) if is_gap(step_s)]
+    if gaps:
         first = gaps[0]
         warnings.warn(
             f"sweeps: {len(gaps):,} of {len(stamps):,} come over {LONGEST_GAP_S:g} s after the one before, the first "

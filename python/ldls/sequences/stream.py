@@ -18,7 +18,7 @@ from ldls.params import Params
 from ldls.segmentation import Segmentation
 from ldls.sequences.sweeps import SAME_OBJECT as SAME_OBJECT_OF_SWEEPS, Sweep, check_drive, label_sweeps
 from ldls.sequences.tracker import Tracker
-from ldls.sequences.trajectory import LONGEST_GAP_S, SAME_S
+from ldls.sequences.trajectory import is_gap
 from ldls.view import View
 
 BEFORE = 2
@@ -107,7 +107,7 @@ class LabelDiffusion:
         # a copy, for those who give arrays that they use again
         sweep = Sweep(as_points(points).copy(), views, pose, stamp)  # type: ignore[arg-type]
         last = (*self._recent[-1:], sweep)
-        goes_on = sweep.stamp - last[0].stamp <= LONGEST_GAP_S + SAME_S
+        goes_on = not is_gap(sweep.stamp - last[0].stamp)
         try:
             check_drive(last)
         except PoseError as error:

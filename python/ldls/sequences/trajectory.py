@@ -193,11 +193,16 @@ class Trajectory:
 
     def _check_gap(self, start: int, stamp: float) -> None:
         begin, end = float(self.stamps[start]), float(self.stamps[start + 1])
-        if end - begin > LONGEST_GAP_S + SAME_S:
+        if is_gap(end - begin):
             raise PoseError(
                 f"stamp: no pose at {stamp:.6f} s, for poses have a gap of {end - begin:.3f} s from {begin:.6f} to "
                 f"{end:.6f} s, expected at most {LONGEST_GAP_S} s; add poses there, or leave this moment out"
             )
+
+
+def is_gap(step_s: float) -> bool:
+    """Whether poses or sweeps so many seconds apart are too far from each other to be joined."""
+    return not step_s <= LONGEST_GAP_S + SAME_S
 
 
 def _there(points: Points) -> NDArray[np.int64]:
