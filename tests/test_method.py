@@ -85,7 +85,7 @@ def test_labels_that_a_far_neighbour_alone_tells_apart_equal_the_oracle(apart_m)
     places = np.stack(np.meshgrid(25.0 * np.arange(35), 25.0 * np.arange(35)), axis=-1).reshape(-1, 2)
     first = np.column_stack([places, np.full(len(places), 100.0)])
     points = np.concatenate([first, first + np.array([apart_m, 0, 0])])
-    camera = ldls.Camera(projection=[[400, 0, 10], [0, 400, 10], [0, 0, 1]], T_camera_lidar=np.eye(4))
+    camera = ldls.Camera(projection=[[400, 0, 10], [0, 400, 10], [0, 0, 1]], image_size=(3460, 3460))
     pixels = np.ones((2, 3460, 3460), bool)
     for column in np.unique(10 + 4 * (places[:, 0] + apart_m)).astype(int):
         pixels[0, :, column - 3 : column + 4] = False

@@ -13,6 +13,7 @@ from ldls.camera.rigid import transformed
 from ldls.cloud import Points, doubt_of_scale, finite_rows
 from ldls.errors import (
     DuplicateWarning,
+    ImageSizeWarning,
     NothingInView,
     NoUsablePoints,
     PrecisionWarning,
@@ -32,6 +33,10 @@ ALONG_Z = 0.7
 """Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
 STEEPEST = 0.97
 """The same up to which a camera may look up, where a leaning wall in the image passes for ground."""
+RESIZED = 1.5
+"""Times the middle of an image that a principal point is at, or the reverse, from which on it is that of another."""
+ALIKE = 1.25
+"""Times the scale along one axis that the other may be where an image was resized."""
 NOT_FINITE = "points: no row is finite; nothing is labelled; are they read as they were written?"
 GROUND_SHARE = 0.2
 """Share of the points in view that the ground must have to tell where up is."""
@@ -79,6 +84,14 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
                 "the lidar points up, turn points and T_camera_lidar until z does"
             )
             yield message, UprightWarning
+    doubts = [
+        doubt
+        for each in results
+        for name, seen in zip(camera_names(each.views), each.views, strict=True)
+        if (doubt := _doubt_of_size(name, seen)) is not None
+    ]
+    for doubt in dict.fromkeys(doubts):
+        yield doubt, ImageSizeWarning
 
 
 def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning]]]:
@@ -91,6 +104,24 @@ def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning
     for doubt, sweeps in doubts.items():
         place = f"{some(sweeps)}: " if len(results) > 1 else ""
         yield f"{place}{doubt}", NoUsablePoints if doubt == NOT_FINITE else NothingInView
+
+
+def _doubt_of_size(name: str, seen: SeenView) -> str | None:
+    """Why the image of masks was probably resized: by that, its middle would be the principal point along both axes."""
+    if seen.view.camera.image_size is not None:
+        return None
+    height, width = seen.view.masks.image_size
+    u, v = seen.view.camera.projection[:2, 2].tolist()
+    scales = (2 * u / width, 2 * v / height)
+    is_resized = min(scales) > RESIZED or 0 < max(scales) < 1 / RESIZED
+    if not is_resized or max(scales) > ALIKE * min(scales):
+        return None
+    return (
+        f"masks of {name}: of an image of {height} x {width}, but the camera's principal point ({u:.1f}, {v:.1f}) is "
+        f"the middle of about {2 * v:.0f} x {2 * u:.0f}; was the image resized? Give masks of its size before, or "
+        "multiply the first two rows of the camera's projection by the ratio. If nothing was resized, "
+        "Camera(image_size=) says so"
+    )
 
 
 def _is_own_frame(seen: SeenView) -> bool:

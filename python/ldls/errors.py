@@ -147,6 +147,10 @@ class UprightWarning(LdlsWarning):
     """What is up to the lidar does not point up in an image."""
 
 
+class ImageSizeWarning(LdlsWarning):
+    """Masks of an image so much larger or smaller than the camera's that one of them was probably resized."""
+
+
 class NothingInView(LdlsWarning):
     """No point is in view, or none of those in view is on a mask."""
 

@@ -13,7 +13,14 @@ import pytest
 
 import ldls
 from conftest import pinhole
-from ldls.errors import DuplicateWarning, NoUsablePoints, PrecisionWarning, ScaleWarning, UprightWarning
+from ldls.errors import (
+    DuplicateWarning,
+    ImageSizeWarning,
+    NoUsablePoints,
+    PrecisionWarning,
+    ScaleWarning,
+    UprightWarning,
+)
 from ring_samples import as_views, random_ring
 
 
@@ -341,6 +348,30 @@ def test_millimetres_for_metres_are_suspected(small_scene):
     points, masks, camera = small_scene
     with pytest.warns(ScaleWarning, match="are they in metres"):
         ldls.segment(points.astype(np.float64) * 1e4, masks, camera)
+
+
+@pytest.mark.parametrize(
+    ("size", "doubtful"),
+    [
+        pytest.param((120, 160), False, id="as the camera's"),
+        pytest.param((60, 80), True, id="half as large"),
+        pytest.param((240, 320), True, id="twice as large"),
+        pytest.param((60, 160), False, id="cut below"),
+        pytest.param((90, 120), False, id="a little smaller"),
+    ],
+)
+def test_masks_of_a_resized_image_are_doubted(size, doubtful):
+    points, masks = np.array([[0.0, 0, 10]] * 9), ldls.InstanceMasks.from_boxes([[3, 2, 5, 4]], size)
+    camera = ldls.Camera(projection=[[100, 0, 80], [0, 100, 60], [0, 0, 1]])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ldls.segment(points, masks, camera)
+        ldls.segment(points, masks, replace(camera, image_size=size))
+    said = [str(one.message) for one in caught if one.category is ImageSizeWarning]
+    assert len(said) == doubtful
+    if doubtful:
+        assert f"masks of camera 0: of an image of {size[0]} x {size[1]}" in said[0]
+        assert "(80.0, 60.0) is the middle of about 120 x 160" in said[0]
 
 
 def test_a_cloud_of_nans_is_warned_of(small_scene):
