@@ -1,8 +1,12 @@
+import pickle
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import ldls
 from conftest import pinhole
+from ldls.camera.rigid import from_parts
 
 CALIBRATION = {
     "P0": "100 0 50 0 0 100 40 0 0 0 1 0",
@@ -162,6 +166,31 @@ def test_an_extrinsic_in_the_projection_may_be_of_any_hand(mirror, to_optical):
     camera = ldls.Camera(projection=np.column_stack([projection, np.zeros(3)]))
     in_view, _ = ldls.stages.project(np.array([[5.0, 0.2, 0.1], [-5, 0.2, 0.1]]), camera, image_size=(60, 80))
     assert in_view.tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    "mirror",
+    [pytest.param(np.eye(3), id="as it is"), pytest.param([[-1.0, 0, 80], [0, 1, 0], [0, 0, 1]], id="mirrored")],
+)
+def test_an_extrinsic_in_the_projection_is_that_of_the_camera(mirror):
+    turn = from_parts(Rotation.from_rotvec([0.1, -0.05, 0.2]).as_matrix() @ TO_OPTICAL, np.array([0.3, -2, 0.1]))
+    intrinsic = mirror @ np.array([[100, 1.5, 40], [0, 90, 30], [0, 0, 1]])
+    earlier = from_parts(Rotation.from_rotvec([0, 0, 0.3]).as_matrix(), np.array([1.0, 2, 3]))
+    camera = ldls.Camera(projection=2 * intrinsic @ turn[:3], T_camera_lidar=earlier, image_size=(60, 80))
+    np.testing.assert_allclose(camera.projection, 2 * np.column_stack([intrinsic, np.zeros(3)]), atol=1e-12)
+    np.testing.assert_allclose(camera.T_camera_lidar, turn @ earlier, atol=1e-12)
+    assert pickle.loads(pickle.dumps(camera)).T_camera_lidar.tolist() == camera.T_camera_lidar.tolist()
+
+
+def test_up_is_the_same_for_a_camera_of_one_matrix():
+    points = np.random.default_rng(7).uniform([3, -4, -1.8], [30, 4, 1], (400, 3))
+    points[:300, 2] = -1.8
+    extrinsic = from_parts(TO_OPTICAL, np.array([0.0, -0.1, 0]))
+    apart = ldls.Camera(projection=pinhole().projection, T_camera_lidar=extrinsic)
+    whole = ldls.Camera(projection=pinhole().projection @ extrinsic)
+    heights = [ldls.stages.ground(points, camera) for camera in (apart, whole)]
+    assert np.isfinite(heights[0]).sum() > 300
+    np.testing.assert_allclose(*heights, atol=1e-9)
 
 
 def test_the_camera_of_a_mirrored_image_looks_forward():

@@ -36,6 +36,20 @@ def _depth_forward(projection: NDArray[np.float64]) -> NDArray[np.float64]:
     return -projection if is_negated else projection
 
 
+def _taken_apart(projection: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """K (3, 4) and the transform (4, 4) to the frame in which it is one, of a projection K [R | t].
+
+    Its third row is the axis along which the camera looks, and what the second has across that points down.
+    """
+    left, axis = projection[:, :3], projection[2, :3] / np.linalg.norm(projection[2, :3])
+    down = left[1] - (left[1] @ axis) * axis
+    down /= np.linalg.norm(down)
+    rotation = np.stack([np.cross(down, axis), down, axis])
+    intrinsic = np.triu(left @ rotation.T)
+    translation = np.linalg.solve(intrinsic, projection[:, 3])
+    return np.column_stack([intrinsic, np.zeros(3)]), from_parts(rotation, translation)
+
+
 def _identity() -> NDArray[np.float64]:
     return np.eye(4)
 
@@ -48,7 +62,8 @@ class Camera:
     Attributes:
         projection: (3, 4) from homogeneous points in the camera frame (metres; x right, y down, z forward) to
             homogeneous pixels; pixel centres lie at integer coordinates. A (3, 3) intrinsic matrix K is taken as
-            [K | 0], and a matrix of negative sign, which projects alike, as its negative.
+            [K | 0], a matrix of negative sign, which projects alike, as its negative, and one of which the third row
+            is not the depth, K [R | t] for points of the lidar, as K, its [R | t] before `T_camera_lidar`.
         T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates, column vectors.
         distortion: How the lens departs from a pinhole; nothing by default, as in rectified images. With one,
             `projection` is the intrinsic matrix K of the raw image.
@@ -78,9 +93,7 @@ class Camera:
             projection = np.hstack([projection, np.zeros((3, 1))])
         projection = _depth_forward(projection)
         transform = as_transform("T_camera_lidar", self.T_camera_lidar)
-        for name, matrix in (("projection", projection), ("T_camera_lidar", transform)):
-            matrix.flags.writeable = False
-            object.__setattr__(self, name, matrix)
+        self._hold(projection, transform)
         if self.image_size is not None:
             object.__setattr__(self, "image_size", as_image_size("image_size", self.image_size, CalibrationError))
         if not self.distortion.is_none and projection[:, 3].any():
@@ -88,6 +101,16 @@ class Camera:
                 f"projection: the last column is {projection[:, 3].tolist()}, expected zeros beside a distortion; pass "
                 "the intrinsic matrix K of the raw image, or leave the distortion out for a rectified one"
             )
+        if projection[2, :2].any():
+            # up, and how far away points are, go by the camera's own frame
+            projection, extrinsic = _taken_apart(projection)
+            self._hold(projection, extrinsic @ transform)
+
+    def _hold(self, projection: NDArray[np.float64], transform: NDArray[np.float64]) -> None:
+        """Be of these matrices, which the core checks."""
+        for name, matrix in (("projection", projection), ("T_camera_lidar", transform)):
+            matrix.flags.writeable = False
+            object.__setattr__(self, name, matrix)
         object.__setattr__(self, "core", self._core())
 
     def _core(self) -> _ldls.Camera:
