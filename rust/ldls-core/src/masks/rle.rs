@@ -17,26 +17,26 @@ pub struct Rle {
 }
 
 impl Rle {
-    /// A mask from its run lengths, which must cover the image exactly.
+    /// A mask from its run lengths, which must cover the image exactly. Those beside an empty one are one run.
     ///
     /// # Errors
     /// [`Error::ImageSize`] and [`Error::RunSum`].
     pub fn from_runs(height: usize, width: usize, runs: Vec<u32>) -> Result<Self> {
         let pixels = check_size(height, width)?;
         let found: u64 = runs.iter().map(|&run| u64::from(run)).sum();
-        if found == pixels as u64 {
-            return Ok(Self {
+        if found != pixels as u64 {
+            return Err(Error::RunSum {
+                found,
+                expected: pixels as u64,
                 height,
                 width,
-                runs,
             });
         }
-        Err(Error::RunSum {
-            found,
-            expected: pixels as u64,
-            height,
-            width,
-        })
+        let ends = runs.into_iter().scan(0, |end, run| {
+            *end += run;
+            Some(*end)
+        });
+        Ok(Self::from_switches(height, width, ends.collect()))
     }
 
     /// A mask from its pixels, row by row: `true` where the object is.
@@ -319,6 +319,15 @@ mod tests {
         assert_eq!(pixels_of(&rle), [false, true, false, true, false, false]);
         assert_eq!(rle.bounding_box(), [0, 0, 2, 2]);
         assert_eq!(rle.area(), 2);
+    }
+
+    #[test]
+    fn runs_beside_an_empty_one_are_one() {
+        let runs_of = |runs: &[u32]| Rle::from_runs(4, 3, runs.to_vec()).unwrap();
+        let plain = runs_of(&[0, 3, 4, 5]);
+        assert_eq!(plain.runs(), [0, 3, 4, 5]);
+        assert_eq!(runs_of(&[0, 1, 0, 2, 1, 0, 3, 5, 0]), plain);
+        assert_eq!(runs_of(&[0, 0, 12]).runs(), [12]);
     }
 
     #[test]
