@@ -65,7 +65,7 @@ pub enum Error {
     /// The rigid transform is not rigid.
     #[error(
         "camera: the rotation of T_camera_lidar deviates from orthonormal by {deviation:.3e} (determinant {determinant:.4}), \
-         expected at most {limit:e} and determinant 1; is the matrix transposed, scaled or row-major?"
+         expected at most {limit:e} and determinant 1; {hint}"
     )]
     CameraNotRigid {
         /// Largest entry of |R^T R - I|.
@@ -74,6 +74,8 @@ pub enum Error {
         determinant: f64,
         /// Deviation allowed.
         limit: f64,
+        /// What may have happened.
+        hint: &'static str,
     },
 
     /// The last row of a rigid transform is not 0 0 0 1.

@@ -268,6 +268,11 @@ fn check_rigid(transform: &Matrix4<f64>) -> Result<()> {
         deviation,
         determinant,
         limit: ROTATION_LIMIT,
+        hint: if deviation <= ROTATION_LIMIT {
+            "is an axis flipped, which makes a mirror?"
+        } else {
+            "is the matrix transposed, scaled or row-major?"
+        },
     })
 }
 
