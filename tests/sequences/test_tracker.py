@@ -404,6 +404,14 @@ def test_of_two_moments_as_near_the_earlier_says_what_was_overlooked_whatever_ro
         assert overlooked(now, [there[0], now, there[1]], [track]).tolist() == [1, 0]
 
 
+def test_images_are_those_of_sweeps_however_many_labels_an_object_has_there():
+    instance = ldls.Instance(label=1, category=3, name="car", score=1.0, sources=())
+    track, footprint = Track(1, instance), Footprint(np.zeros((1, 2)))
+    for stamp, shown in ((0.0, True), (0.1, False), (0.1, True), (0.1, True), (0.2, False)):
+        track.advance(instance, Sighting(stamp, footprint, shown))
+    assert track.n_images == 2
+
+
 def test_what_has_gone_away_leaves_no_label_where_it_was():
     instance = ldls.Instance(label=1, category=3, name="car", score=1.0, sources=())
     stands, moves = (Track(number, instance, n_images=ENOUGH_IMAGES) for number in (1, 2))

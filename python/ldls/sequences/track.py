@@ -119,7 +119,9 @@ class Track:
     def advance(self, instance: Instance, sighting: Sighting) -> None:
         """Note that it was seen again."""
         self.instance = instance
-        self.n_images += sighting.shown
+        # two labels of a sweep may be of it
+        shown = {each.stamp for each in self.sightings if each.shown}
+        self.n_images += sighting.shown and sighting.stamp not in shown
         first = sighting.stamp - MEMORY_S - SAME_S
         self.sightings = [*(each for each in self.sightings if each.stamp >= first), sighting]
         # found anew when they are asked for, which is not after every sweep
