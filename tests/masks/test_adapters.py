@@ -142,7 +142,7 @@ def test_supervision_may_find_nothing():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        pytest.param({"mask": None}, "boxes without masks; InstanceMasks.from_boxes .*BoxSegmenter", id="boxes only"),
+        pytest.param({"mask": None}, "3 boxes without masks, .*InstanceMasks.from_boxes .*Box", id="boxes only"),
         pytest.param({"class_id": np.array([0, 1])}, "3 masks, 2 class ids, 3 class names", id="too few classes"),
         pytest.param({"class_id": np.array([0, 0, 2])}, "mask 0: class 0 is 'person', elsewhere", id="two names"),
         pytest.param({"class_id": np.array([0, -200, 2])}, "mask 1: class -200", id="class -200"),
@@ -184,14 +184,16 @@ def test_ultralytics_masks_of_the_padded_input_come_from_their_outlines():
 
 
 def test_ultralytics_may_find_nothing():
-    masks = ldls.InstanceMasks.from_ultralytics(ultralytics_result(None))
-    assert (len(masks), masks.image_size) == (0, (11, 17))
+    for boxes in (SimpleNamespace(cls=Tensor(np.zeros(0)), conf=Tensor(np.zeros(0))), None):
+        masks = ldls.InstanceMasks.from_ultralytics(ultralytics_result(None, boxes=boxes))
+        assert (len(masks), masks.image_size) == (0, (11, 17))
 
 
 @pytest.mark.parametrize(
     ("result", "message"),
     [
         pytest.param(ultralytics_result(names={0: "person"}), "mask 1: class 1 has no name", id="no name"),
+        pytest.param(ultralytics_result(None), "result: 3 boxes without masks, expected a result", id="boxes only"),
         pytest.param(
             ultralytics_result(boxes=SimpleNamespace(cls=Tensor([0.0]), conf=Tensor([1.0]))),
             "categories: expected one for each of 3",

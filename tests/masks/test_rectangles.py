@@ -9,7 +9,8 @@ EDGE = st.one_of(st.integers(-3, 15).map(float), st.floats(-1e300, 1e300))
 
 @given(boxes=st.lists(st.tuples(EDGE, EDGE, EDGE, EDGE), max_size=3), height=st.integers(1, 9), width=st.integers(1, 9))
 def test_a_box_covers_the_pixels_whose_centres_it_holds(boxes, height, width):
-    boxes = [(min(a, c), min(b, d), max(a, c), max(b, d)) for a, b, c, d in boxes]
+    # the last, for all within 0 and 1 are refused
+    boxes = [*((min(a, c), min(b, d), max(a, c), max(b, d)) for a, b, c, d in boxes), (0, 0, 2, 2)]
     masks = ldls.InstanceMasks.from_boxes(boxes, (height, width))
     v, u = np.mgrid[:height, :width]
     for mask, (left, top, right, bottom) in zip(masks, boxes, strict=True):
@@ -30,6 +31,7 @@ def test_boxes_have_categories_scores_and_names():
         pytest.param([[0, 0, 1, 1], [5, 0, 4, 1]], (4, 5), ldls.MaskError, "box 1: .*left <= right", id="turned"),
         pytest.param([[0, 0, np.nan, 1]], (4, 5), ldls.MaskError, "box 0: .*nan", id="NaN"),
         pytest.param([[0, 0, np.inf, 1]], (4, 5), ldls.MaskError, "box 0: .*inf", id="infinite"),
+        pytest.param([[0, 0, 1, 1], [0.2, 0.3, 0.4, 0.9]], (4, 5), ldls.MaskError, "all 2 .* shares", id="shares"),
         pytest.param([0, 0, 1, 1], (4, 5), ldls.MaskError, r"expected \(M, 4\)", id="one flat box"),
         pytest.param([[0, 0, 1e9, 1e9]], (2**30, 2**30), ldls.LimitError, "pixels", id="huge image"),
         pytest.param([[0, 0, 1, 1]], (-4, 5), ldls.MaskError, r"size is \(-4, 5\)", id="negative height"),

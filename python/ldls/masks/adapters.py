@@ -70,11 +70,8 @@ def from_supervision(
     """
     _check_parts("detections", detections, ("mask", "xyxy", "confidence", "class_id", "data"))
     masks = detections.mask
-    if masks is None and len(detections.xyxy):
-        raise MaskError(
-            "detections: boxes without masks; InstanceMasks.from_boxes takes boxes for masks, "
-            "and ldls.segmenters.BoxSegmenter does so frame by frame"
-        )
+    if masks is None:
+        _check_no_boxes("detections", detections.xyxy)
     pixels = [] if masks is None else [to_numpy(mask) for mask in masks]
     if not pixels and image_size is None:
         raise MaskError("detections: none, so the image's size is not known; pass image_size=(height, width)")
@@ -117,12 +114,14 @@ def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
             `names` and `orig_shape`.
 
     Raises:
-        MaskError: An index that `names` does not have, or parts that do not fit one another.
+        MaskError: There are boxes and no masks, an index that `names` does not have, or parts that do not fit one
+            another.
     """
     _check_parts("result", result, ("masks", "boxes", "names", "orig_shape"))
     size = checked_size(result.orig_shape)
     ids, names = category_ids(result.names)
     if result.masks is None:
+        _check_no_boxes("result", () if result.boxes is None else result.boxes.cls)
         return {"rles": [], "image_size": size, "categories": [], "scores": [], "names": names}
     classes = whole_numbers("boxes.cls", result.boxes.cls)
     for i, index in enumerate(classes):
@@ -189,6 +188,16 @@ def _sam_rle(index: int, record: Mapping[str, Any]) -> _ldls.Rle:
         return encode(index, to_numpy(segmentation))
     with within(f"record {index}"):
         return from_rle(segmentation)
+
+
+def _check_no_boxes(name: str, boxes: Any) -> None:  # noqa: ANN401
+    """Refuse boxes (N, ...) of a result that has no masks."""
+    n_boxes = len(to_numpy(boxes))
+    if n_boxes:
+        raise MaskError(
+            f"{name}: {n_boxes} boxes without masks, expected a result of a network that makes masks; "
+            "InstanceMasks.from_boxes takes boxes for masks, and ldls.segmenters.BoxSegmenter does so frame by frame"
+        )
 
 
 def _check_parts(name: str, source: object, parts: Sequence[str]) -> None:

@@ -355,7 +355,7 @@ class InstanceMasks:
             if category < 1:
                 raise MaskError(
                     f"mask {i}: category is {category}, expected 1 or more, for 0 stands for background in results; "
-                    "number categories from 1"
+                    "pass the name of each class for categories, or number them from 1"
                 )
             if int(category) not in self.names:
                 raise MaskError(

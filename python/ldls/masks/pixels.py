@@ -71,7 +71,7 @@ def rectangles(boxes: ArrayLike, size: tuple[int, int]) -> list[_ldls.Rle]:
         size: (height, width) of the image in pixels.
 
     Raises:
-        MaskError: A box that is none, by its index.
+        MaskError: A box that is none, by its index, or boxes that are shares of the image.
         LimitError: The image is too large.
     """
     edges = as_array("boxes", boxes, MaskError)
@@ -80,6 +80,11 @@ def rectangles(boxes: ArrayLike, size: tuple[int, int]) -> list[_ldls.Rle]:
     if edges.ndim != 2 or edges.shape[1] != 4:
         raise MaskError(f"boxes: expected (M, 4) left, top, right, bottom, got shape {edges.shape}")
     edges = numbers("boxes", edges, np.float64, ("M", 4), error=MaskError)
+    if edges.size and edges.min() >= 0 and edges.max() <= 1 and (edges != np.floor(edges)).any():
+        raise MaskError(
+            f"boxes: all {len(edges)} lie within 0 and 1, expected pixels; are they shares of the image? Multiply them "
+            "by its width and height"
+        )
     checked = checked_size(size)
     check_pixels(*checked)
     return [_rectangle(i, box, checked) for i, box in enumerate(edges.tolist())]
