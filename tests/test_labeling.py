@@ -88,6 +88,6 @@ def test_a_mapped_labeling_maps_onto_itself():
 
 def test_codes_without_a_name_are_named_by_point():
     assert Labeling.from_codes(np.array([10, 0]), {0: "unlabeled", 10: "car"}).names[1:] == ("unlabeled", "car")
-    for wrong in (9, 11, 65535, -1):
+    for wrong in (9, 11, 65535, -1, 0.5, np.nan):
         with pytest.raises(InputError, match=f"point 1 has class {wrong}, expected one of 0, 10"):
             Labeling.from_codes(np.array([10, wrong]), {0: "unlabeled", 10: "car"})

@@ -75,7 +75,7 @@ class Labeling:
         lookup = np.full(max(table) + 2, -1, np.int32)
         lookup[list(table)] = [names.index(name) for name in table.values()]
         # the last entry, which no number of the table reaches, stands for all that are out of range
-        inside = (codes >= 0) & (codes <= max(table))
+        inside = (codes >= 0) & (codes <= max(table)) & (codes == np.floor(codes))
         classes = lookup[np.where(inside, codes, len(lookup) - 1).astype(np.int64)]
         if (classes < 0).any():
             first = int((classes < 0).argmax())

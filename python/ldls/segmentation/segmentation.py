@@ -161,7 +161,7 @@ class Segmentation:
         Those that outlier removal left out are among them where they are as doubtful.
         """
         lost = (self.labels == 0) & (self.diffused_labels > 0)
-        doubtful: NDArray[np.bool_] = lost & (self.confidence < self.params.abstain)
+        doubtful: NDArray[np.bool_] = lost & (self.confidence.astype(np.float64) < self.params.abstain)
         return doubtful
 
     @cached_property
