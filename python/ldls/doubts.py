@@ -7,9 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ldls.camera import Camera
-from ldls.camera.rigid import transformed
+from ldls.camera.rigid import doubt_of_distance, inverse, transformed
 from ldls.cloud import Points, doubt_of_scale, finite_rows
 from ldls.errors import (
     DuplicateWarning,
@@ -23,7 +24,7 @@ from ldls.errors import (
 )
 from ldls.segmentation import Segmentation
 from ldls.stages import GROUND_M, ground
-from ldls.view import SeenView, camera_names
+from ldls.view import SeenView, View, camera_names
 
 COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
@@ -34,7 +35,7 @@ ALONG_Z = 0.7
 STEEPEST = 0.97
 """The same up to which a camera may look up, where a leaning wall in the image passes for ground."""
 RESIZED = 1.5
-"""Times the middle of an image that a principal point is at, or the reverse, from which on it is that of another."""
+"""Times the middle of an image that a principal point is at, or the reverse, beyond which it is that of another."""
 ALIKE = 1.25
 """Times the scale along one axis that the other may be where an image was resized."""
 NOT_FINITE = "points: no row is finite; nothing is labelled; are they read as they were written?"
@@ -73,7 +74,7 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
         leaning = dict.fromkeys(
             name
             for each in results
-            for name, seen in zip(camera_names(each.views), each.views, strict=True)
+            for name, seen in _named(each.views)
             # the ground is fitted around the first camera
             if not _is_own_frame(each.views[0]) and _leans(seen, each)
         )
@@ -84,14 +85,20 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
                 "the lidar points up, turn points and T_camera_lidar until z does"
             )
             yield message, UprightWarning
-    doubts = [
-        doubt
+    yield from dict.fromkeys(
+        (f"{name}: {doubt}", category)
         for each in results
-        for name, seen in zip(camera_names(each.views), each.views, strict=True)
-        if (doubt := _doubt_of_size(name, seen)) is not None
-    ]
-    for doubt in dict.fromkeys(doubts):
-        yield doubt, ImageSizeWarning
+        for name, seen in _named(each.views)
+        for doubt, category in (
+            (_doubt_of_place(seen.view.camera.T_camera_lidar, each.points), ScaleWarning),
+            (_doubt_of_size(seen.view), ImageSizeWarning),
+        )
+        if doubt is not None
+    )
+
+
+def _named(views: Sequence[SeenView]) -> Iterator[tuple[str, SeenView]]:
+    return zip(camera_names(views), views, strict=True)
 
 
 def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning]]]:
@@ -106,22 +113,48 @@ def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning
         yield f"{place}{doubt}", NoUsablePoints if doubt == NOT_FINITE else NothingInView
 
 
-def _doubt_of_size(name: str, seen: SeenView) -> str | None:
-    """Why the image of masks was probably resized: by that, its middle would be the principal point along both axes."""
-    if seen.view.camera.image_size is not None:
+def _doubt_of_place(T_camera_lidar: NDArray[np.float64], points: Points) -> str | None:
+    """What is odd about the distance from lidar to camera, where the lidar is amid its points and the camera is not."""
+    doubt = doubt_of_distance(T_camera_lidar)
+    if doubt is None:
         return None
-    height, width = seen.view.masks.image_size
-    u, v = seen.view.camera.projection[:2, 2].tolist()
+    # those of a map may be far from its origin, and some of a cloud from both
+    known = points[finite_rows(points), :3]
+    if not len(known):
+        return None
+    low, high = known.min(axis=0), known.max(axis=0)
+    lidar_is_amid, camera_is_amid = (
+        bool(((low <= place) & (place <= high)).all()) for place in (np.zeros(3), inverse(T_camera_lidar)[:3, 3])
+    )
+    return doubt if lidar_is_amid and not camera_is_amid else None
+
+
+def _doubt_of_size(view: View) -> str | None:
+    """Why masks are of an image of another size: by that, its middle would be where the principal point is."""
+    if view.camera.image_size is not None:
+        return None
+    height, width = view.masks.image_size
+    u, v = view.camera.projection[:2, 2].tolist()
     scales = (2 * u / width, 2 * v / height)
-    is_resized = min(scales) > RESIZED or 0 < max(scales) < 1 / RESIZED
-    if not is_resized or max(scales) > ALIKE * min(scales):
+    if _are_near_one(scales):
+        return None
+    if 0 < max(scales) <= ALIKE * min(scales):
+        mend = (
+            "was it resized? Give masks of its size before, or multiply the first two rows of the camera's projection "
+            "by the ratio."
+        )
+    elif _are_near_one((2 * u / height, 2 * v / width)):
+        mend = "are rows and columns of the masks swapped?"
+    else:
         return None
     return (
-        f"masks of {name}: of an image of {height} x {width}, but the camera's principal point ({u:.1f}, {v:.1f}) is "
-        f"the middle of about {2 * v:.0f} x {2 * u:.0f}; was the image resized? Give masks of its size before, or "
-        "multiply the first two rows of the camera's projection by the ratio. If nothing was resized, "
-        "Camera(image_size=) says so"
+        f"masks: of an image of {height} x {width}, but the camera's principal point ({u:.1f}, {v:.1f}) is the middle "
+        f"of about {2 * v:.0f} x {2 * u:.0f}; {mend} If this is the camera's image, Camera(image_size=) says so"
     )
+
+
+def _are_near_one(scales: tuple[float, float]) -> bool:
+    return min(scales) >= 1 / RESIZED and max(scales) <= RESIZED
 
 
 def _is_own_frame(seen: SeenView) -> bool:

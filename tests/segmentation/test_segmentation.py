@@ -350,6 +350,25 @@ def test_millimetres_for_metres_are_suspected(small_scene):
         ldls.segment(points.astype(np.float64) * 1e4, masks, camera)
 
 
+@pytest.mark.filterwarnings("ignore::ldls.errors.NothingInView")
+def test_a_translation_in_millimetres_is_suspected(small_scene):
+    _, masks, camera = small_scene
+    around = np.random.default_rng(3).uniform(-60, 60, (500, 3))
+    far = replace(camera, T_camera_lidar=translation([-270, 60, -80]))
+    with pytest.warns(ScaleWarning, match="camera 0: T_camera_lidar: the lidar is 288 m from the camera"):
+        ldls.segment(around, masks, far)
+    # a map whose origin is elsewhere, points of a part of it, and a camera amid them
+    for points in (around + np.array([270, -60, 80]), around[around[:, 0] < -9], 5 * around):
+        ldls.segment(points, masks, far)
+
+
+def test_masks_of_rows_for_columns_are_doubted():
+    masks = ldls.InstanceMasks.from_boxes([[3, 2, 5, 4]], (160, 60))
+    camera = ldls.Camera(projection=[[100, 0, 80], [0, 100, 30], [0, 0, 1]])
+    with pytest.warns(ImageSizeWarning, match="is the middle of about 60 x 160; are rows and columns of the masks"):
+        ldls.segment(np.array([[-4.0, 0, 10]]), masks, camera)
+
+
 @pytest.mark.parametrize(
     ("size", "doubtful"),
     [
@@ -370,7 +389,7 @@ def test_masks_of_a_resized_image_are_doubted(size, doubtful):
     said = [str(one.message) for one in caught if one.category is ImageSizeWarning]
     assert len(said) == doubtful
     if doubtful:
-        assert f"masks of camera 0: of an image of {size[0]} x {size[1]}" in said[0]
+        assert f"camera 0: masks: of an image of {size[0]} x {size[1]}" in said[0]
         assert "(80.0, 60.0) is the middle of about 120 x 160" in said[0]
 
 

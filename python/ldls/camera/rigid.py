@@ -17,6 +17,8 @@ Matrix = NDArray[np.float64]
 
 ROTATION_LIMIT = 1e-3
 """Largest deviation of a rotation from orthonormal; calibration files round to 7 digits."""
+FARTHEST_CAMERA_M = 20.0
+"""A camera farther from its lidar is hardly on the same rig: most translations that are in millimetres lead there."""
 
 
 def as_transform(name: str, values: ArrayLike) -> Matrix:
@@ -68,6 +70,17 @@ def from_parts(rotation: Matrix, translation: Matrix | None = None) -> Matrix:
     matrix[:3, :3] = rotation
     matrix[:3, 3] = 0 if translation is None else translation
     return matrix
+
+
+def doubt_of_distance(T_camera_lidar: Matrix) -> str | None:
+    """What is odd about the distance from lidar to camera; None where nothing is."""
+    distance_m = float(np.linalg.norm(T_camera_lidar[:3, 3]))
+    if not distance_m > FARTHEST_CAMERA_M:
+        return None
+    return (
+        f"T_camera_lidar: the lidar is {distance_m:,.0f} m from the camera; is its translation in metres? Divide "
+        "millimetres by 1000"
+    )
 
 
 def inverse(matrix: Matrix) -> Matrix:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.camera.rigid import doubt_of_distance
 from ldls.cloud import doubt_of_scale
 from ldls.datasets.frame import CameraImage, Frame, Source
 from ldls.errors import LdlsError
@@ -17,8 +18,6 @@ from ldls.stages import project
 
 LEAST_IN_VIEW = 0.01
 """Share of points below which a camera hardly sees the cloud: most calibrations that are wrong lead there."""
-FARTHEST_CAMERA_M = 20.0
-"""A camera farther from its lidar is hardly on the same rig: most translations that are in millimetres lead there."""
 LARGEST_OFFSET_S = 0.1
 """An image farther from its sweep than this is of another turn of the lidar."""
 LARGEST_GAP = 2.5
@@ -102,17 +101,6 @@ def in_view(frame: Frame, image: CameraImage) -> float:
     if not len(frame.points) or image.camera.image_size is None:
         return 0.0
     return len(project(frame.points, image.camera, image_size=image.camera.image_size)[0]) / len(frame.points)
-
-
-def doubt_of_distance(T_camera_lidar: NDArray[np.float64]) -> str | None:
-    """What is odd about the distance from lidar to camera; None where nothing is."""
-    distance_m = float(np.linalg.norm(T_camera_lidar[:3, 3]))
-    if not distance_m > FARTHEST_CAMERA_M:
-        return None
-    return (
-        f"T_camera_lidar: the lidar is {distance_m:,.0f} m from the camera; is its translation in metres? Divide "
-        "millimetres by 1000"
-    )
 
 
 def check_stamps(names: Sequence[str], stamps: Sequence[float | None]) -> list[Finding]:

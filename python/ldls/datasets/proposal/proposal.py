@@ -11,11 +11,11 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.camera.rigid import doubt_of_distance
 from ldls.cloud import Points, doubt_of_scale, finite_rows
 from ldls.datasets.file_source import IMAGE_SUFFIXES
 from ldls.datasets.folder import FRAME
 from ldls.datasets.folder_description import FILE
-from ldls.datasets.inspection import doubt_of_distance
 from ldls.datasets.proposal.calibrations import (
     FoundCamera,
     camera_in,
