@@ -29,10 +29,16 @@ def test_bin_files_hold_rows_of_floats(tmp_path, name, columns, options):
     assert points.flags.writeable, "as points of other formats"
 
 
-def test_floats_of_another_byte_order_are_guessed_at_without_a_warning_of_numpy(tmp_path):
-    sweep = sample_frame().points.astype(">f4")
-    sweep.tofile(tmp_path / "sweep.bin")
-    np.testing.assert_array_equal(ldls.read_points(tmp_path / "sweep.bin"), sweep.view("<f4"))
+@pytest.mark.parametrize("other", [">f4", "<f8", ">f8"])
+def test_rows_of_other_numbers_are_refused_with_what_mends_them(tmp_path, other):
+    path, sweep = tmp_path / "sweep.bin", sample_frame().points
+    sweep.astype(other).tofile(path)
+    with pytest.raises(ldls.FileFormatError, match=f"as '{other}' none does; write the file anew"):
+        ldls.read_points(path)
+    np.fromfile(path, other).astype("<f4").tofile(path)
+    np.testing.assert_array_equal(ldls.read_points(path), sweep)
+    sweep.astype(other).tofile(path)
+    assert ldls.read_points(path, columns=4).tobytes() == path.read_bytes()
 
 
 def test_npy_files_keep_their_precision(tmp_path):

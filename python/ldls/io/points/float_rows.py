@@ -18,6 +18,8 @@ FARTHEST_M = 1e7
 SMALLEST_M = 1e-20
 MOST_TRIED = 16
 """Columns that a file of another layout is tried with."""
+OTHER_NUMBERS = (">f4", "<f8", ">f8")
+"""Numbers that other programs write, by NumPy's names."""
 SAMPLED_POINTS = 256
 FEWEST_SAMPLED = 32
 """Of fewer points the directions tell nothing."""
@@ -76,12 +78,19 @@ def _rows(path: Path, content: NDArray[np.uint8], columns: int, *, guessed: bool
 
 
 def _check_positions(values: NDArray[np.float32], columns: int) -> None:
-    """Refuse a guess by which points lie where no lidar reaches, if with another number of columns none does."""
+    """Refuse a guess by which points lie where no lidar reaches, if with other columns or numbers none does."""
     if _are_positions(values, columns):
         return
     likeliest = _likeliest(values)
     if likeliest is not None:
         raise _wrong_guess(columns, f"then points lie farther than {FARTHEST_M:.0e} m", likeliest)
+    for other in OTHER_NUMBERS:
+        fits = values.nbytes % (columns * np.dtype(other).itemsize) == 0
+        if fits and _are_positions(values.view(other), columns):
+            raise FileFormatError(
+                f"as float32 points lie farther than {FARTHEST_M:.0e} m, as {other!r} none does; write the file anew: "
+                f"numpy.fromfile(path, {other!r}).astype('<f4').tofile(path)"
+            )
 
 
 def likeliest_columns(path: Path) -> int | None:
@@ -112,7 +121,7 @@ def _step_m(values: NDArray[np.float32], columns: int) -> float:
     return float(np.nanmedian(distances)) if np.isfinite(distances).any() else 0.0
 
 
-def _are_positions(values: NDArray[np.float32], columns: int) -> bool:
+def _are_positions(values: NDArray[np.floating], columns: int) -> bool:
     """True if the first three of so many columns are coordinates: none is huge, or all but zero."""
     positions = np.abs(values.reshape(-1, columns)[:, :3])
     with np.errstate(invalid="ignore"):
