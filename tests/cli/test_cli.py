@@ -8,10 +8,12 @@ import sys
 import numpy as np
 import pytest
 from PIL import Image
+from rich.table import Table
 from typer.testing import CliRunner
 
 import ldls
 from ldls.cli import app
+from ldls.cli.messages import console
 from ldls.viewing.formats import ENDINGS
 
 run = CliRunner().invoke
@@ -211,6 +213,19 @@ def test_help_fits_the_terminal(width):
     for line, following in itertools.pairwise(paragraph):
         assert len(line) + 1 + len(following.split()[0]) > width - 4
     assert "Examples:" in lines
+
+
+@pytest.mark.parametrize("width", [20, 30])
+def test_tables_fold_what_a_narrow_terminal_has_no_room_for(capsys, width):
+    table = Table("camera", "object", "1000000")
+    table.add_row("CAM_FRONT_RIGHT", "truck [parked]", "123")
+    screen = console()
+    screen.width = width
+    screen.print(table)
+    lines = [line.split("│") for line in capsys.readouterr().out.splitlines() if line.startswith("│")]
+    assert ["".join(cells).replace(" ", "") for cells in zip(*lines, strict=True)][1:-1] == [
+        "CAM_FRONT_RIGHT", "truck[parked]", "123",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("command", ["segment", "explain"])

@@ -121,11 +121,20 @@ def test_tracking_has_a_row_a_class_and_one_of_all():
         ("m", "Pedestrian", None, 100.0, 100.0, 1, 2, 0, 0.0, 100.0),
         ("m", "all", pytest.approx(100 * 0.75**0.5), 100.0, 75.0, 2, 4, 1, 25.0, 75.0),
     )
-    console = Console(file=io.StringIO(), width=80)
-    console.print(table.rich())
-    assert console.file.getvalue().count("Pedestrian") == 1
     one = TrackingScores(("Car",))
     assert tracking_table({"m": one}).rows == (("m", "Car", None, None, None, 0, 0, 0, None, None),)
+
+
+@pytest.mark.parametrize("make", [semantic_table, instance_table, panoptic_table, ablation_table])
+def test_a_narrow_terminal_cuts_neither_numbers_nor_names(make, methods):
+    table = make(methods)
+    console = Console(file=io.StringIO(), width=62)
+    console.print(table.rich())
+    text = console.file.getvalue()
+    assert "…" not in text
+    assert text.count("100.0") == sum(cell == 100 for row in table.rows for cell in row) > 0
+    # the name is folded, not left out
+    assert "ion" in text and "full" in text
 
 
 def test_recall_is_told_of_well_seen_instances_too():

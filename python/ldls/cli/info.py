@@ -115,7 +115,7 @@ def topic_table(source: Source) -> Table | None:
         return None
     table = Table(title="topics")
     for heading in ("topic", "type", "messages"):
-        table.add_column(heading, justify="right" if heading == "messages" else "left", overflow="fold")
+        table.add_column(heading, justify="right" if heading == "messages" else "left")
     for topic in source.all_topics:
         table.add_row(topic.name, topic.type, f"{topic.count:,}")
     return table
@@ -191,7 +191,7 @@ def finding_table(findings: Sequence[Finding]) -> Table:
     broken = sum(finding.broken for finding in findings)
     table = Table(title=f"{broken:,} broken, {len(findings) - broken:,} worth a look")
     for heading in ("", "frame", "what"):
-        table.add_column(heading, overflow="fold")
+        table.add_column(heading)
     in_order = sorted(findings, key=lambda finding: not finding.broken)
     for finding in in_order[:SHOWN]:
         table.add_row("broken" if finding.broken else "look", finding.frame, in_options(finding.what))

@@ -143,12 +143,23 @@ def say_kept(count: int) -> None:
         console().print(f"kept {count:,} that were there; delete them to make them anew")
 
 
+class _Screen(Console):
+    """A console that folds what is too wide for a table's column, where Rich cuts it."""
+
+    def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401 - what Rich prints, with its options
+        for each in objects:
+            for column in each.columns if isinstance(each, Table) else ():
+                column.overflow = "fold"
+        # a table of more columns than fit is as wide as its numbers need
+        super().print(*objects, **{"crop": False, **options})
+
+
 def console() -> Console:
     """Return the console for tables: as wide as the terminal, and wide enough where there is none; silent if quiet.
 
     It prints text as it is: names and paths may hold square brackets and colons, which mean something to Rich.
     """
-    screen = Console(quiet=is_quiet(), markup=False, highlight=False, emoji=False)
+    screen = _Screen(quiet=is_quiet(), markup=False, highlight=False, emoji=False)
     if not screen.is_terminal:
         screen.width = 100
     return screen

@@ -83,8 +83,9 @@ class Table:
         grid = RichTable(title=self.title, caption=self.note or None)
         for c, column in enumerate(self.columns):
             is_number = self._is_number(c)
-            # heads are of several words and can be wrapped, names of classes would be cut
-            grid.add_column(Text(column), justify="right" if is_number else "left", no_wrap=not is_number)
+            # heads and names fold where the terminal is narrow, numbers stay whole
+            widest = max(len(_shown(row[c])) for row in self.rows) if is_number else None
+            grid.add_column(Text(column), justify="right" if is_number else "left", overflow="fold", min_width=widest)
         for row in self.rows:
             grid.add_row(*(Text(_shown(cell)) for cell in row))
         return grid
