@@ -160,6 +160,12 @@ def test_boxes_can_be_left_out() -> None:
     assert (with_boxes != without).any()
 
 
+@pytest.mark.parametrize(("range_m", "is_named"), [(8, False), (14, True)])
+def test_an_object_beyond_the_picture_is_not_named_at_its_edge(range_m, is_named) -> None:
+    picture = np.asarray(birds_eye_view(street(X_FORWARD), range_m=range_m)).astype(int)
+    assert (np.abs(picture - instance_colours([3])[0]).max(axis=2) <= 3).any() == is_named
+
+
 @pytest.mark.parametrize(
     "points",
     [

@@ -47,7 +47,8 @@ def birds_eye_view(
     Args:
         result: The segmentation.
         stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
-        range_m: Farthest range shown, in metres; by default as far as the objects lie.
+        range_m: Farthest range shown, in metres; by default as far as the objects lie, but no farther than 120. Objects
+            beyond it are left out.
         boxes: True to draw the boxes of the objects; they are those of the final labels.
 
     Raises:
@@ -80,7 +81,9 @@ def birds_eye_of(shown: Shown, ground: Ground, canvas: Canvas, *, boxes: bool) -
             corners, colour = ground.at(corners_of(each.box)), shown.colours[each.label - 1]
             around = [tuple(place) for place in (FINE * corners[[0, 1, 2, 3, 0]]).tolist()]
             draw.line(around, colour, 2 * FINE, joint="curve")
-            tags.append(Tag(shown.names[each.label - 1], colour, _around(corners)))
+            # a name whose object is elsewhere would stand at the edge as if the object did
+            if ((corners >= 0) & (corners < ground.size_px)).all(axis=1).any():
+                tags.append(Tag(shown.names[each.label - 1], colour, _around(corners)))
     picture = fine.reduce(FINE).convert("RGB")
     written = _write_ranges(picture, ground, step_m)
     draw_tags(picture, tags, _covered(picture, shown, ground), PEN_PX, aversion=AVERSION, taken=written)
