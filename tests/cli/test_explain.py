@@ -165,7 +165,7 @@ def test_a_background_point_has_no_components(frame):
     ("back", "words"),
     [
         pytest.param(4, "behind the camera, at a depth of -5.00 m", id="behind"),
-        pytest.param(3, "at u 3040.0, v 30.0, outside the 80 x 60 pixels of the image", id="outside"),
+        pytest.param(3, "at u 3040.0, v 30.0, outside the image of 60 x 80 pixels (height x width)", id="outside"),
         pytest.param(2, "a coordinate is not finite", id="not finite"),
         pytest.param(1, "at (0, 0, 0), which stands for a missing return", id="origin"),
     ],
@@ -361,7 +361,7 @@ def test_a_pixel_of_a_picture_of_ldls(frame, ring, tmp_path, rings):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        pytest.param(["3,4", "--on", "{other}"], "a picture of 40 x 30 pixels is no overlay", id="other"),
+        pytest.param(["3,4", "--on", "{other}"], "a picture of 30 x 40 pixels (height x width) is no", id="other"),
         pytest.param(["0,899", "--on", "{own}", "--camera", "a"], "whose pixels tell their camera", id="camera"),
         pytest.param(["7", "--on", "{own}"], "only a pixel U,V lies on a picture", id="beside a row"),
         pytest.param(["3,5", "--on", "{own}"], "3,5 lies in no image of the picture", id="on a caption"),

@@ -125,6 +125,7 @@ def test_the_camera_is_found_and_the_folder_is_a_source(rig, frame, calibrate):
     outcome = run("init", rig)
     assert outcome.exit_code == 0, outcome.output
     assert "missing" not in outcome.output
+    assert "3 images of 375 x 1242 (height x width), 3 with a sweep" in " ".join(outcome.output.split())
     assert described(rig)["points"] == "lidar/{frame}.bin"
     assert described(rig)["cameras"]["front"]["masks"] == "labels/{frame}.txt"
     source = open_source(rig)

@@ -84,7 +84,7 @@ def test_a_folder_of_one_png_an_instance_is_taken(masks):
     for number, pixels in enumerate(made.to_array()):
         Image.fromarray(pixels).save(folder / f"each/{number}.png")
     outcome = ldls_masks("show", folder / "each")
-    assert outcome.exit_code == 0 and "3 masks of 60 x 40 pixels" in outcome.output, outcome.output
+    assert outcome.exit_code == 0 and "3 masks of 40 x 60 pixels (height x width)" in outcome.output, outcome.output
     outcome = ldls_masks("convert", folder / "each", folder / "out.npz")
     assert outcome.exit_code == 0, outcome.output
     np.testing.assert_array_equal(ldls.read_masks(folder / "out.npz").to_array(), made.to_array())
@@ -132,9 +132,9 @@ def test_show_prints_a_line_a_mask_and_draws_them(masks):
         "show", folder / "masks.json", "--image", folder / "image.png", "--picture", folder / "picture.png"
     )
     assert outcome.exit_code == 0, outcome.output
-    assert "3 masks of 60 x 40 pixels" in outcome.output
+    assert "3 masks of 40 x 60 pixels (height x width)" in outcome.output
     (car,) = (line for line in outcome.output.splitlines() if "car" in line)
-    assert [cell.strip() for cell in car.strip("│").split("│")] == ["1", "car", "3", "0.90", "600", "3, 2", "30 x 20"]
+    assert [cell.strip() for cell in car.strip("│").split("│")] == ["1", "car", "3", "0.90", "600", "3, 2", "20 x 30"]
     with Image.open(folder / "picture.png") as picture:
         assert picture.width >= 1800
 

@@ -211,7 +211,7 @@ def pinhole():
     [
         pytest.param([0, 0, -3], pinhole, "behind", "behind the camera, at a depth of -3.00 m", id="behind"),
         pytest.param([0, 0, 0.05], pinhole, "behind", "at a depth of 0.05 m", id="nearer than the smallest depth"),
-        pytest.param([9, 0, 4], pinhole, "outside", "at u 120.0, v 20.0, outside the 60 x 40 pixels of", id="beside"),
+        pytest.param([9, 0, 4], pinhole, "outside", "at u 120.0, v 20.0, outside the image of 40 x 60", id="beside"),
         pytest.param([9, 0, 0.5], lens, "beyond the lens", "beyond the lens of the camera", id="beyond the lens"),
         pytest.param([0, np.nan, 4], pinhole, "not finite", "a coordinate is not finite", id="NaN"),
         pytest.param([np.inf, 0, 4], pinhole, "not finite", "a coordinate is not finite", id="infinite"),

@@ -218,10 +218,10 @@ def _show(masks: InstanceMasks, pixels: np.ndarray | None, picture: Path | None)
 
 def mask_table(masks: InstanceMasks) -> Table:
     """Label, name, category, score, pixels and box of each mask."""
-    table = Table(title=f"{len(masks)} masks of {masks.width} x {masks.height} pixels")
+    table = Table(title=f"{len(masks)} masks of {masks.height} x {masks.width} pixels (height x width)")
     table.add_column("label", justify="right")
     table.add_column("object")
-    for heading in ("category", "score", "pixels", "left, top", "width x height"):
+    for heading in ("category", "score", "pixels", "left, top", "height x width"):
         table.add_column(heading, justify="right")
     for label, mask in enumerate(masks, start=1):
         top, left, height, width = mask.bounding_box
@@ -232,7 +232,7 @@ def mask_table(masks: InstanceMasks) -> Table:
             f"{mask.score:.2f}",
             f"{mask.area:,}",
             f"{left}, {top}" if mask.area else "-",
-            f"{width} x {height}" if mask.area else "-",
+            f"{height} x {width}" if mask.area else "-",
         )
     return table
 

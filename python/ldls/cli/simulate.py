@@ -75,7 +75,8 @@ def simulate(
     rig: Annotated[
         Rig,
         typer.Option(
-            metavar="|".join(Rig), help="KITTI's 1242 x 375, a robot's 640 x 480, or a ring of six of 1600 x 900."
+            metavar="|".join(Rig),
+            help="KITTI's 375 x 1242 (height x width), a robot's 480 x 640, or a ring of six of 900 x 1600.",
         ),
     ] = Rig.KITTI,
     layout: Annotated[

@@ -297,7 +297,7 @@ def _unseen_by(sight: Sight) -> str:
         return f"it is beyond the lens of the camera, at a depth of {sight.depth_m:.2f} m"
     height, width = sight.image_size
     u, v = sight.pixel
-    return f"it falls at u {u:.1f}, v {v:.1f}, outside the {width} x {height} pixels of the image"
+    return f"it falls at u {u:.1f}, v {v:.1f}, outside the image of {height} x {width} pixels (height x width)"
 
 
 def _each_unseen(sights: tuple[Sight, ...]) -> Iterator[str]:

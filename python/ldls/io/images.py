@@ -105,7 +105,7 @@ def check_pixels(image: Image.Image, n_bytes: int) -> None:
     pixels, bands = image.width * image.height, len(image.getbands())
     png_bytes = pixels * (bands if bands > 1 else 1 / 8)
     if png_bytes > DEFLATE_RATIO * n_bytes if image.format == "PNG" else pixels > PIXELS_A_BYTE * n_bytes:
-        raise TruncatedFileError(f"{image.width} x {image.height} pixels cannot come of {n_bytes:,} bytes")
+        raise TruncatedFileError(f"{image.height} x {image.width} pixels cannot come of {n_bytes:,} bytes")
 
 
 @contextmanager

@@ -75,13 +75,13 @@ def pixel_of(result: Segmentation, size_px: tuple[int, int], at_px: tuple[float,
     tiles = [_scaled((width, height), scale) for (height, width), scale in zip(sizes, scales, strict=True)]
     corners, whole = places_in_grid(tiles, captions=several, columns=2 if several else 1)
     if whole != (size_px[1], size_px[0]):
-        expected = f"{whole[0]} x {whole[1]}"
-        raise InputError(f"a picture of {size_px[1]} x {size_px[0]} pixels is no overlay of this result ({expected})")
+        size = f"{size_px[0]} x {size_px[1]} pixels (height x width)"
+        raise InputError(f"a picture of {size} is no overlay of this result, which is of {whole[1]} x {whole[0]}")
     for number, ((left, top), (width, height), scale) in enumerate(zip(corners, tiles, scales, strict=True)):
         x, y = at_px[0] - left, at_px[1] - top
         if 0 <= x < width and 0 <= y < height:
             return number, (x + 0.5) / scale - 0.5, (y + 0.5) / scale - 0.5
-    raise InputError(f"{at_px[0]:g},{at_px[1]:g} lies in no image of the picture of {size_px[1]} x {size_px[0]} pixels")
+    raise InputError(f"{at_px[0]:g},{at_px[1]:g} lies in no image of the picture of {size_px[0]} x {size_px[1]} pixels")
 
 
 def masks_overlay(masks: InstanceMasks, image: AnImage | None = None) -> Image.Image:

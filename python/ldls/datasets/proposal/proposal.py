@@ -169,7 +169,7 @@ def _add_camera(
     common = picture.shared(sweeps)
     size = read_image_size(picture.files[min(common)])
     made.lines += ["", f"[cameras.{quoted(name)}]", f"images = {quoted(picture.text)}"]
-    count = f"{_count(picture, 'image')} of {size[1]} x {size[0]}, {len(common):,} with a sweep"
+    count = f"{_count(picture, 'image')} of {size[0]} x {size[1]} (height x width), {len(common):,} with a sweep"
     made.found.append(f"{picture.text}: {count}")
     own = [pattern for pattern in patterns if pattern not in (picture, sweeps)]
     _add_masks(made, picture, own, size, alone=alone)
@@ -226,8 +226,8 @@ def _add_calibration(
     made.found.append(f"{found.place}: calibration of {name}")
     calibrated = found.camera.image_size or size
     if calibrated != size:
-        height, width = calibrated
-        made.ask(f"the calibration is of {width} x {height} pixels, images of {size[1]} x {size[0]}: was one resized?")
+        sizes = "the calibration is of {} x {} pixels, images of {} x {}".format(*calibrated, *size)
+        made.ask(f"{sizes} (height x width): was one resized?")
     if not alone and not any(_names(pattern, name) for pattern in small):
         made.ask("is this the calibration of this camera? No file has its name")
     if found.knows_lidar:

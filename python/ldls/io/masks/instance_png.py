@@ -124,7 +124,7 @@ def _open(file: InputFile) -> tuple[NDArray[Any], Mapping[str, str]]:
 
 def _check_kind(image: PngImageFile) -> None:
     if image.width * image.height > MAX_PIXELS:
-        raise LimitError(f"{image.width} x {image.height} pixels, expected at most {MAX_PIXELS}")
+        raise LimitError(f"{image.height} x {image.width} pixels, expected at most {MAX_PIXELS}")
     if image.mode not in MODES:
         raise UnsupportedFormatError(
             f"{image.mode} pixels, expected one number a pixel, grey of 8 or 16 bits or a palette; "

@@ -50,7 +50,7 @@ def _samples(message: Message, channels: int, sample_bytes: int) -> Pixels:
     if not height or not width or step < row_bytes or len(content) < needed:
         raise CorruptFileError(
             f"image: {len(content)} bytes in rows of {step}, expected {height} rows of {row_bytes} bytes for "
-            f"{width} x {height} pixels of {message.encoding}"
+            f"{height} x {width} pixels of {message.encoding}"
         )
     rows: Pixels = np.ndarray((height, row_bytes), np.uint8, content, strides=(step, 1))
     if sample_bytes == 2:
