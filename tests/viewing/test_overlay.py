@@ -181,13 +181,17 @@ def test_only_objects_with_points_are_named(small_scene, drawn) -> None:
     assert [tag.text for tag in drawn] == ["person 2", "car 3"]
 
 
+def test_masks_alone_are_named_by_label_too(small_scene, drawn) -> None:
+    masks_overlay(small_scene[1])
+    assert [tag.text for tag in drawn] == ["person 1", "car 2"]
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
         pytest.param("car 3", "car 3", id="short"),
         pytest.param("vehicle.construction 12", "vehicle.construction 12", id="twenty"),
         pytest.param("a forklift that carries pallets 12", "a forklift that car\u2026 12", id="with its number"),
-        pytest.param("a forklift that carries pallets 0.95", "a forklift that car\u2026 0.95", id="with its score"),
         pytest.param("a forklift that is of no number", "a forklift that is\u2026", id="without a number"),
         pytest.param(f"{'W' * 80} 3", f"{'W' * 19}\u2026 3", id="one word"),
         pytest.param("W" * 80, f"{'W' * 19}\u2026", id="one word without a number"),

@@ -85,13 +85,13 @@ def pixel_of(result: Segmentation, size_px: tuple[int, int], at_px: tuple[float,
 
 
 def masks_overlay(masks: InstanceMasks, image: AnImage | None = None) -> Image.Image:
-    """The image with masks and their names and scores.
+    """The image with masks and their names, each with its label, from 1 in their order.
 
     Raises:
         InputError: The image has not the size of the masks.
     """
     colours = as_tuples(instance_colours(masks.categories.tolist()))
-    names = [f"{mask.name} {mask.score:.2f}" for mask in masks]
+    names = [f"{mask.name} {label}" for label, mask in enumerate(masks, start=1)]
     pixels = image_like(image, masks.image_size)
     scale = WIDTH_PX / pixels.shape[1]
     picture, covered = _with_masks(pixels, masks, colours, scale)

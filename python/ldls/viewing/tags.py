@@ -65,7 +65,7 @@ def draw_tags(
 def shortened(text: str) -> str:
     """`text` with no more than the beginning of a long name; the number behind it stays."""
     name, _, number = text.rpartition(" ")
-    if not number.replace(".", "", 1).isdecimal():
+    if not number.isdecimal():
         name, number = text, ""
     if len(name) <= LONGEST:
         return text
