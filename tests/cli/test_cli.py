@@ -1,6 +1,7 @@
 import itertools
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -37,8 +38,12 @@ def test_demo_writes_results_and_beats_direct_projection(demo):
         "demo.npz", "demo.label", "demo.ply", "demo.png", "demo-birds-eye.png", "demo-comparison.png", "input",
     }  # fmt: skip
     (mean,) = (line for line in outcome.output.splitlines() if "mean" in line)
-    direct, method = (float(cell) for cell in mean.replace("│", " ").split()[2:4])
+    direct, method = (float(cell) for cell in mean.replace("│", " ").split()[1:3])
     assert method > direct
+    found, accuracy = (
+        sorted(re.findall(r"│ +(\d+) │ (\w+) ", part)) for part in outcome.output.split("accuracy against")
+    )
+    assert len(found) > 3 and accuracy == found, "both tables have the numbers that pictures have"
     with np.load(folder / "demo.npz") as stored:
         assert len(set(stored["object_category"].tolist())) >= 3
 

@@ -80,16 +80,17 @@ def accuracy_table(result: Segmentation, truth: NDArray[np.int32]) -> Table:
         points = np.bincount(truth[direct == instance.label], minlength=2)[1:]
         if points.any():  # else it is a mask of nothing
             mine = truth == points.argmax() + 1
-            rows.append((instance.name, int(mine.sum())))
+            rows.append((instance, int(mine.sum())))
             ious.append([_iou(one == instance.label, mine) for one in (direct, labels)])
     of_direct, of_method = np.mean(ious, axis=0) if ious else (np.nan, np.nan)
     table = Table(title="accuracy against the true labels (IoU of points, %)", show_footer=True)
+    table.add_column("number", justify="right")
     table.add_column("object", footer="mean")
-    table.add_column("true points", justify="right", footer=f"{sum(count for _, count in rows):,}")
+    table.add_column("true points", justify="right")
     table.add_column("direct projection", justify="right", footer=f"{of_direct:.1f}")
     table.add_column("ldls", justify="right", footer=f"{of_method:.1f}")
-    for (name, count), (before, after) in zip(rows, ious, strict=True):
-        table.add_row(name, f"{count:,}", f"{before:.1f}", f"{after:.1f}")
+    for (instance, count), (before, after) in zip(rows, ious, strict=True):
+        table.add_row(str(instance.label), instance.name, f"{count:,}", f"{before:.1f}", f"{after:.1f}")
     return table
 
 
