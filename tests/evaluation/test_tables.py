@@ -51,6 +51,14 @@ def test_csv_and_json_keep_numbers_whole():
     assert (content["title"], content["note"]) == ("Cars | more", "a note")
 
 
+def test_a_row_without_a_score_of_the_column_is_empty_there():
+    table = Table("t", ("class", "IoU", "n"), (("Car", 61.25, 3), ("Van", None, 0), ("mean", 61.25, "")))
+    assert "| Van | - | 0 |\n| mean | 61.2 |  |\n" in table.markdown()
+    assert ":--- | ---: | ---:" in table.markdown()
+    assert table.csv().endswith("mean,61.25,\n")
+    assert json.loads(table.json())["rows"][2] == {"class": "mean", "IoU": 61.25, "n": None}
+
+
 def test_files_are_written_under_one_stem(tmp_path):
     paths = SMALL.write(tmp_path / "new/folder", "scores")
     assert [path.name for path in paths] == ["scores.md", "scores.csv", "scores.json"]
@@ -71,10 +79,10 @@ def test_methods_stand_side_by_side(methods):
     assert table.rows == (
         ("direct projection", "Car", 2, 100.0, 50.0, 50.0),
         ("direct projection", "Pedestrian", 0, None, None, None),
-        ("direct projection", "mean", None, None, None, 50.0),
+        ("direct projection", "mean", "", "", "", 50.0),
         ("full method", "Car", 2, 100.0, 100.0, 100.0),
         ("full method", "Pedestrian", 0, None, None, None),
-        ("full method", "mean", None, None, None, 100.0),
+        ("full method", "mean", "", "", "", 100.0),
     )
 
 
@@ -90,7 +98,7 @@ def test_panoptic_quality_has_its_parts(methods):
     rows = panoptic_table(methods).rows
     assert rows[3] == ("full method", "Car", 100.0, 100.0, 100.0, 1, 0, 0)
     # the class that is not there is not in the mean
-    assert rows[5] == ("full method", "mean", 100.0, None, None, None, None, None)
+    assert rows[5] == ("full method", "mean", 100.0, "", "", "", "", "")
     assert [row[2] for row in rows if row[1] == "mean"] == [100 * each.panoptic.mean_pq for each in methods.values()]
 
 
@@ -117,8 +125,8 @@ def test_tracking_has_a_row_a_class_and_one_of_all():
         *("a hundred frames", "MOTSA"),
     )
     assert table.rows == (
-        ("m", "Car", None, 100.0, 50.0, 1, 2, 1, 50.0, 50.0),
-        ("m", "Pedestrian", None, 100.0, 100.0, 1, 2, 0, 0.0, 100.0),
+        ("m", "Car", "", 100.0, 50.0, 1, 2, 1, 50.0, 50.0),
+        ("m", "Pedestrian", "", 100.0, 100.0, 1, 2, 0, 0.0, 100.0),
         ("m", "all", pytest.approx(100 * 0.75**0.5), 100.0, 75.0, 2, 4, 1, 25.0, 75.0),
     )
     one = TrackingScores(("Car",))

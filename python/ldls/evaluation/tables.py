@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 Cell = str | int | float | None
 UNDEFINED = "-"
+NO_SUCH_SCORE = ""
+"""Cell of a row that has no score of the column, as the precision of a mean."""
 SHOWN_THRESHOLDS = (0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 PERCENT = "Scores in percent; '-': neither truth nor prediction has the class."
 
@@ -36,7 +38,8 @@ class Table:
     Attributes:
         title: Its title.
         columns: Heads of the columns.
-        rows: Cells: text, whole numbers, numbers shown with one decimal, or None where there is nothing to score.
+        rows: Cells: text, whole numbers, numbers shown with one decimal, None where there is nothing to score, or ""
+            where the row has no score of the column.
         note: A note to the reader, shown below.
 
     Raises:
@@ -71,7 +74,8 @@ class Table:
 
     def json(self) -> str:
         """Title, note and one object a row, numbers in full and null where not defined."""
-        rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+        cells = [[None if cell == NO_SUCH_SCORE else cell for cell in row] for row in self.rows]
+        rows = [dict(zip(self.columns, row, strict=True)) for row in cells]
         content = {"title": self.title, "note": self.note, "rows": rows}
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -101,7 +105,8 @@ class Table:
         return paths
 
     def _is_number(self, column: int) -> bool:
-        return bool(self.rows) and not any(isinstance(row[column], str) for row in self.rows)
+        texts = (row[column] for row in self.rows if isinstance(row[column], str))
+        return bool(self.rows) and all(text == NO_SUCH_SCORE for text in texts)
 
 
 def table_files(folder: Path, stem: str) -> list[Path]:
@@ -117,7 +122,7 @@ def semantic_table(evaluations: Mapping[str, Evaluation]) -> Table:
     for method, evaluation in evaluations.items():
         rows += [(method, *scores) for scores in _class_scores(evaluation)]
         if len(names) > 1:
-            rows.append((method, "mean", None, None, None, percent(evaluation.semantic.mean_iou)))
+            rows.append((method, "mean", *[NO_SUCH_SCORE] * 3, percent(evaluation.semantic.mean_iou)))
     columns = ("method", "class", "true points", "precision", "recall", "IoU")
     return Table("Points by class", columns, tuple(rows), PERCENT)
 
@@ -146,7 +151,7 @@ def panoptic_table(evaluations: Mapping[str, Evaluation]) -> Table:
             scores = percent(q.pq), percent(q.sq), percent(q.rq)
             rows.append((method, name, *scores, q.counts.tp, q.counts.fp, q.counts.fn))
         if len(evaluation.names) > 1:
-            rows.append((method, "mean", percent(evaluation.panoptic.mean_pq), None, None, None, None, None))
+            rows.append((method, "mean", percent(evaluation.panoptic.mean_pq), *[NO_SUCH_SCORE] * 5))
     columns = ("method", "class", "PQ", "SQ", "RQ", "TP", "FP", "FN")
     return Table("Panoptic quality", columns, tuple(rows), PERCENT)
 
@@ -157,14 +162,19 @@ def tracking_table(scores: Mapping[str, TrackingScores]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for method, each in scores.items():
         names = each.names if len(each.names) > 1 else ()
-        rows += [(method, name, None, percent(each.semantic[name].iou), *_association(each[name])) for name in names]
+        for name in names:
+            quality = percent(each.semantic[name].iou), *_association(each[name])
+            rows.append((method, name, NO_SUCH_SCORE, *quality))
         whole = "all" if names else each.names[0]
         rows.append((method, whole, percent(each.lstq), percent(each.s_cls), *_association(each.total)))
     columns = (
         *("method", "class", "LSTQ", "S_cls", "S_assoc", "objects", "object frames"),
         *("id switches", "a hundred frames", "MOTSA"),
     )
-    note = f"{PERCENT} S_cls of a class is its IoU. Object frames: true objects in each sweep, matched or not."
+    note = (
+        "Scores in percent; '-': there is no true object. S_cls of a class is its IoU. "
+        "Object frames: true objects in each sweep, matched or not."
+    )
     return Table("Objects over the drive", columns, tuple(rows), note)
 
 
