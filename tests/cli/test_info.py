@@ -37,6 +37,13 @@ def test_a_sound_drive_is_described(tmp_path):
         assert len(np.unique(np.asarray(picture).reshape(-1, 3), axis=0)) > 20, "points are drawn in colours of depth"
 
 
+def test_images_of_several_sizes_are_told(tmp_path):
+    drive = layouts.kitti_object(tmp_path)
+    layouts.write_image(drive / "image_2/000001.png", (58, 81))
+    result = run(drive)
+    assert result.exit_code == 0 and "58 to 60 x 80 to 81" in result.output, result.output
+
+
 def _without_points(drive):
     (drive / "velodyne_points/data/0000000001.bin").unlink()
     np.save(drive / "velodyne_points/data/0000000001.npy", np.zeros((0, 4), np.float32))

@@ -170,12 +170,12 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
         table.add_column(heading)
     for image in source[source.names.index(whole.name)].images:
         across, down = field_of_view_deg(image.camera)
+        sizes = [each.image_sizes[image.name] for each in facts if image.name in each.image_sizes]
         shares = [each.in_view[image.name] for each in facts if image.name in each.in_view]
         offsets = [each.offsets_s[image.name] for each in facts if image.name in each.offsets_s]
-        height, width = image.camera.image_size or (0, 0)
         table.add_row(
             image.name,
-            f"{height} x {width}",
+            " x ".join(_range(str(min(side)), str(max(side))) for side in zip(*sizes, strict=True)) or "-",
             image.camera.distortion.model,
             f"{across:.0f} x {down:.0f}",
             _range(f"{min(shares):.1%}", f"{max(shares):.1%}"),

@@ -48,6 +48,7 @@ class FrameFacts:
     Attributes:
         name: Name of the frame.
         n_points: Its points.
+        image_sizes: Height and width of each camera's image in pixels, by its name, where they are known.
         in_view: Share of the points that each camera sees, by its name.
         offsets_s: Time of each image after the sweep, in seconds, where both stamps are known.
         truth: Points of each class that truth has; None without truth.
@@ -57,6 +58,7 @@ class FrameFacts:
 
     name: str
     n_points: int = 0
+    image_sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     in_view: Mapping[str, float] = field(default_factory=dict)
     offsets_s: Mapping[str, float] = field(default_factory=dict)
     truth: Mapping[str, int] | None = None
@@ -82,6 +84,7 @@ def inspect(source: Source, index: int) -> FrameFacts:
     return FrameFacts(
         name=name,
         n_points=len(frame.points),
+        image_sizes={i.name: i.camera.image_size for i in frame.images if i.camera.image_size is not None},
         in_view=shares,
         offsets_s=offsets,
         truth=None if frame.truth is None else {n: c for n, c in frame.truth.counts().items() if c},
