@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import ldls
 from ldls.cli import app
+from ldls.cli.frame_files import camera_name
 from ldls.cli.messages import console
 from ldls.viewing.formats import ENDINGS
 
@@ -231,6 +232,24 @@ def test_tables_fold_what_a_narrow_terminal_has_no_room_for(capsys, width):
     assert ["".join(cells).replace(" ", "") for cells in zip(*lines, strict=True)][1:-1] == [
         "CAM_FRONT_RIGHT", "truck[parked]", "123",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("calibration", "camera", "name"),
+    [
+        pytest.param("P2: 1\n", None, "image_2", id="KITTI's left colour one"),
+        pytest.param("P2: 1\n", "3", "image_3", id="another of KITTI's"),
+        pytest.param(None, None, "image_02", id="a day of KITTI raw"),
+        pytest.param("cam0: {}\n", "cam1", "cam1", id="one of Kalibr's"),
+        pytest.param("M1: {}\n", "2", "camera 2", id="one of a pair"),
+        pytest.param("K: []\n", None, "", id="the only one"),
+    ],
+)
+def test_a_camera_has_the_name_that_it_was_chosen_by(tmp_path, calibration, camera, name):
+    if calibration is not None:
+        tmp_path /= "calib.yaml"
+        tmp_path.write_text(calibration)
+    assert camera_name(tmp_path, camera) == name
 
 
 @pytest.mark.parametrize("command", ["segment", "explain"])

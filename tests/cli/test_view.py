@@ -262,7 +262,7 @@ def test_segment_and_demo_record_too(small_scene, saved, tmp_path):
     done = CliRunner().invoke(app, words.split())
     assert done.exit_code == 0 and "rerun s.rrd" in done.output, done.output
     found = Recorded("s.rrd")
-    assert r"world/camera/camera\ 0/image" in found.entities
+    assert "world/camera/image_2/image" in found.entities
     assert len(found.each("diffusion/points", "Points3D:colors")) == 4
     done = CliRunner().invoke(app, ["demo", "--rerun", "d.rrd"])
     assert done.exit_code == 0 and "world/boxes" in Recorded("d.rrd").entities, done.output

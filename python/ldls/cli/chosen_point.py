@@ -90,7 +90,7 @@ def _view_of(result: Segmentation, camera: str | None) -> SeenView:
     names = camera_names(result.views)
     if camera is None and len(names) == 1:
         return result.views[0]
-    listed = ", ".join(f"{number} {name}" for number, name in enumerate(names))
+    listed = ", ".join(f"{number} ({name})" for number, name in enumerate(names))
     if camera is None:
         raise ParameterError(f"--camera: missing, and a pixel of which picture? Expected one of {listed}")
     if camera in names:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.options import OutOption
-from ldls.cli.recording_options import ONLY_CAMERA, RerunOption, check_recording, record
+from ldls.cli.recording_options import RerunOption, check_recording, record
 
 if TYPE_CHECKING:
     import numpy as np
@@ -49,7 +49,7 @@ def demo(
     (image,) = frame.images
     assert image.masks is not None and frame.truth is not None
     rgb = image.read()
-    result = ldls.segment(frame.points, image.masks, image.camera)
+    result = ldls.segment(frame.points, [ldls.View(image.masks, image.camera, image.name)])
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, "demo", ("npz", "label", "ply"), [rgb])
     written += save_pictures(out / "demo.png", result, rgb)
@@ -62,7 +62,7 @@ def demo(
     screen.print("wrote " + " ".join(map(str, written)), soft_wrap=True)
     screen.print(f"the same from files: {command}", soft_wrap=True)
     if rerun is not None:
-        said = record(result, rerun, name="demo", images={ONLY_CAMERA: rgb})
+        said = record(result, rerun, name="demo", images={image.name: rgb})
         screen.print(said, soft_wrap=True)
 
 

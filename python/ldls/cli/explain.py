@@ -18,6 +18,7 @@ from ldls.cli.frame_files import (
     ExtrinsicOption,
     FisheyeOption,
     RectifiedOption,
+    camera_name,
     camera_of,
 )
 from ldls.cli.messages import console, speaks_plainly
@@ -103,6 +104,7 @@ def explain(
     from ldls.explaining import explain as explain_point
     from ldls.io import read_points, read_result
     from ldls.label_diffusion import segment
+    from ldls.view import View
 
     if result is not None:
         of_sweep = {
@@ -122,7 +124,8 @@ def explain(
             raise InputError("RESULT: missing; give an .npz file of ldls, or --points, --calib and --masks, all three")
         seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
         instances = masks_of(None, masks=masks, segmenter=None, image_id=image_id, image_size=seen_by.image_size)
-        segmentation, view = segment(read_points(points, columns=columns), instances, seen_by), None
+        seen = View(instances, seen_by, camera_name(calib, camera))
+        segmentation, view = segment(read_points(points, columns=columns), [seen]), None
     chosen = chosen_point(point, segmentation, view, on)
     explanation = explain_point(segmentation, chosen.row)
     if as_json:

@@ -72,5 +72,19 @@ def camera_of(
     """The camera of a calibration file, by the words of a command line."""
     from ldls.io import read_camera
 
-    which = int(camera) if camera is not None and camera.isdecimal() else camera
-    return read_camera(calib, camera=which, T_camera_lidar=extrinsic, fisheye=fisheye, rectified=rectified)
+    return read_camera(calib, camera=_which(camera), T_camera_lidar=extrinsic, fisheye=fisheye, rectified=rectified)
+
+
+def camera_name(calib: Path, camera: str | None) -> str:
+    """Name of the camera that `camera_of` reads: of KITTI's the folder of its images, empty where nothing names it."""
+    from ldls.io.cameras.read import is_kitti
+
+    which = _which(camera)
+    if is_kitti(calib):
+        number = 2 if which is None else which
+        return f"image_{number:02}" if calib.is_dir() else f"image_{number}"
+    return f"camera {which}" if isinstance(which, int) else which or ""
+
+
+def _which(camera: str | None) -> int | str | None:
+    return int(camera) if camera is not None and camera.isdecimal() else camera

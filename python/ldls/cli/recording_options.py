@@ -35,8 +35,6 @@ DiffusionOption = Annotated[
         show_default="1 of one frame, none of several or of a run with --sweeps",
     ),
 ]
-ONLY_CAMERA = "camera 0"
-"""Name in recordings of the camera of a frame that does not name it."""
 
 
 def every_of(diffusion: int | None, result: Segmentation, *, alone: bool) -> int | None:

@@ -18,6 +18,7 @@ from ldls.cli.frame_files import (
     ExtrinsicOption,
     FisheyeOption,
     RectifiedOption,
+    camera_name,
     camera_of,
 )
 from ldls.cli.mask_options import (
@@ -30,7 +31,6 @@ from ldls.cli.messages import console, object_table, speaks_plainly, timing_tabl
 from ldls.cli.method_options import takes_params
 from ldls.cli.options import CoresOption, FormatsOption, ObjectsOption, OutOption, PictureOption, words
 from ldls.cli.recording_options import (
-    ONLY_CAMERA,
     DiffusionOption,
     RerunOption,
     check_recording,
@@ -107,6 +107,7 @@ def segment(
     from ldls.io.objects import FrameObjects, objects_writer
     from ldls.label_diffusion import segment as label_points
     from ldls.segmenters.registry import segmenter_file
+    from ldls.view import View, camera_names
     from ldls.viewing.files import check_picture, picture_files, save_pictures
     from ldls.viewing.formats import check_formats, file_name, write_formats
 
@@ -138,7 +139,8 @@ def segment(
     )
     if save_masks is not None:
         save(chosen, save_masks)
-    result = label_points(read_points(points, columns=columns), chosen, seen_by, params=replace(params, threads=cores))
+    view = View(chosen, seen_by, camera_name(calib, camera))
+    result = label_points(read_points(points, columns=columns), [view], params=replace(params, threads=cores))
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, name, wanted, [pixels])
     if write_objects is not None and objects is not None:
@@ -155,6 +157,6 @@ def segment(
         screen.print(f"{report.n_nonfinite:,} points are not finite and were left out")
     screen.print("wrote " + " ".join(map(str, written)), soft_wrap=True)
     if rerun is not None:
-        pictures = None if pixels is None else {ONLY_CAMERA: pixels}
+        pictures = None if pixels is None else {camera_names(result.views)[0]: pixels}
         said = record(result, rerun, name=name, images=pictures, diffusion=diffusion)
         screen.print(said, soft_wrap=True)

@@ -82,7 +82,7 @@ def read_camera(
     }
     given = {name: value for name, value in options.items() if value is not None}
     source: Path | Fields = path
-    if format in FIELD_FORMATS or (format is None and not _is_kitti(path)):
+    if format in FIELD_FORMATS or (format is None and not is_kitti(path)):
         source = read_fields(path)
         format = format or _format_of(source, rectified=rectified)
     elif format is None:
@@ -96,7 +96,8 @@ def read_camera(
     return reader(source, **given)
 
 
-def _is_kitti(path: Path) -> bool:
+def is_kitti(path: Path) -> bool:
+    """Return True for a calibration file of KITTI, and the folder of a day of KITTI raw."""
     if path.is_dir():
         return True
     with open_file(path, "calibration", limit=kitti.MAX_BYTES) as file:
