@@ -208,10 +208,8 @@ def _island(explanation: Explanation) -> str:
     island = explanation.island
     if island is None or island.islands == 1:
         return ""
-    return (
-        f"It lies in a part of the graph of {count_points(island.points)}; no label crosses to the "
-        f"{island.islands - 1} others."
-    )
+    others = "other part" if island.islands == 2 else f"{island.islands - 1} other parts"
+    return f"It lies in a part of the graph of {count_points(island.points)}; no label crosses to the {others}."
 
 
 def _component(components: Components, number: int) -> str:
