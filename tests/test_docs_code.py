@@ -40,6 +40,7 @@ def test_readme(run, tmp_path, capsys):
     person = names["result"].labels[len(names["wall"]) :]
     assert (person == 1).mean() > 0.95
     assert np.isin(names["result"].labels[: len(names["wall"])], [-1, 0]).mean() > 0.9
+    np.testing.assert_allclose(names["found"].box.size, [0.6, 0.3, 1.8], atol=0.1)
 
 
 def test_masks(run, capsys):
