@@ -75,6 +75,18 @@ def test_errors(run, tmp_path, capsys):
     assert names["report"].n_points == 5
 
 
+def test_poses_from_memory(run, capsys):
+    run("docs/datasets.md", holding="Trajectory")
+    printed = capsys.readouterr().out.strip()
+    assert f"prints `{printed}`" in (pages.ROOT / "docs/datasets.md").read_text()
+
+
+def test_simulation(run):
+    pytest.importorskip("embreex")
+    names = run("docs/simulation.md", holding="scene_frame")
+    assert len(names["result"].labels) == len(names["frame"].truth.instances)
+
+
 def test_from_a_bag_to_a_labelled_bag(run):
     pytest.importorskip("rosbags")
     pytest.importorskip("embreex")
