@@ -518,8 +518,11 @@ def test_failures_so_far_are_kept_where_a_run_is_interrupted(few, tmp_path):
 def test_a_log_has_lines_meanwhile(few, tmp_path):
     outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path)
     lines = outcome.stdout.splitlines()
-    first = next(at for at, line in enumerate(lines) if re.fullmatch(r"labelling: 1 of 12 frames, .* a second", line))
-    assert first < next(at for at, line in enumerate(lines) if "objects found" in line)
+    first, last = (
+        next(at for at, line in enumerate(lines) if re.fullmatch(rf"labelling: {n} of 12 frames, .* a second", line))
+        for n in (1, 12)
+    )
+    assert first < last < next(at for at, line in enumerate(lines) if "objects found" in line)
 
 
 def test_quiet_prints_nothing(few, tmp_path):

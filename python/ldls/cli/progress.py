@@ -27,10 +27,10 @@ def progress(items: Iterable[T], total: int, title: str) -> Iterator[T]:
 
 @contextmanager
 def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
-    """Yield a function to call with the frames finished, failed and in all.
+    """Yield a function to call with the frames finished, those of them that failed, and in all.
 
     Standard error shows a bar, speed, time left and failures if it is a terminal. Standard output has a line now and
-    then if it is none, so that a log tells how far the command is.
+    then, and one at the end, if it is none, so that a log tells how far the command is.
     """
     start = time.monotonic()
     said: float | None = None
@@ -40,7 +40,8 @@ def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
             nonlocal said
             now = time.monotonic()
             show(finished, failed, total)
-            if sys.stdout.isatty() or is_quiet() or (said is not None and now - said < LINE_EVERY_S):
+            soon = said is not None and now - said < LINE_EVERY_S
+            if sys.stdout.isatty() or is_quiet() or (soon and finished < total):
                 return
             said = now
             rate = finished / max(now - start, 1e-9)
