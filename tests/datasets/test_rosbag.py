@@ -117,6 +117,7 @@ def test_a_given_transform_comes_first(tmp_path, as_file):
         np.savetxt(tmp_path / "T.txt", given[:3], header="camera from lidar")
     bag = RosBag(written(tmp_path, edges=()), T_camera_lidar=tmp_path / "T.txt" if as_file else given)
     np.testing.assert_array_equal(bag[0].images[0].camera.T_camera_lidar, given)
+    assert (tmp_path / "T.txt" in bag.files(0)) == as_file
 
 
 def test_binning_and_region_move_and_scale_pixels(tmp_path):

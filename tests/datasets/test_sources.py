@@ -1,9 +1,11 @@
 """Every source on a small layout of its own, and what is said where something is missing."""
 
 import json
+import os
 import pickle
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,6 +55,44 @@ def test_a_source_names_cameras_and_files_without_reading_a_frame(tmp_path, kind
         files = source.files(index)
         assert all(path.is_file() for path in files)
         assert {image.path for image in frame.images} < set(files)
+
+
+def folder_with_files_of_cameras(folder):
+    layouts.kitti_object(folder, frames=("a", "b"))
+    layouts.kitti_raw(folder, n_frames=0)
+    cameras = {
+        "front": 'calibration = "calib/{frame}.txt"\nstamps = "front/stamps.txt"',
+        "left": f'K = {layouts.K.tolist()}\nT_camera_lidar = "T.txt"',
+        "back": 'calibration = "2011_09_26"',
+    }
+    tables = (f'[cameras.{name}]\nimages = "front/{{frame}}.png"\n{keys}\n' for name, keys in cameras.items())
+    layouts.plain_folder(folder, "\n".join(['points = "lidar/{frame}.bin"', 'stamps = "stamps.txt"', *tables]))
+    layouts.write_text(folder / "front/stamps.txt", "a 0.0\nb 0.1\n")
+    layouts.write_text(folder / "T.txt", layouts.row(layouts.T))
+    return folder / "ldls.toml"
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        *(pytest.param(write, id=kind) for kind, write in WRITERS.items()),
+        pytest.param(folder_with_files_of_cameras, id="folder with files of its cameras"),
+    ],
+)
+def test_all_that_is_read_is_a_file_of_the_frame(tmp_path, write, monkeypatch):
+    folder = write(tmp_path)
+    opened = set()
+
+    def noted(path, *arguments, before=os.open, **options):
+        opened.add(Path(path))
+        return before(path, *arguments, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "open", noted)
+        source = open_source(folder, truth=False)
+        for image in source[0].images:
+            image.read()
+    assert opened == set(source.files(0))
 
 
 @pytest.mark.parametrize("kind", WRITERS)

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import chain
 from os import PathLike
 from pathlib import Path, PurePath
 
@@ -19,6 +20,7 @@ from ldls.datasets.frame import CameraImage
 from ldls.errors import CorruptFileError, ParameterError, SourceError, within
 from ldls.io import read_camera, read_masks
 from ldls.io.cameras.extrinsic_file import as_extrinsic
+from ldls.io.cameras.kitti import RAW_FILES
 from ldls.io.files import read_lines, strictly_below
 from ldls.io.images import read_image_size
 from ldls.io.masks.data_set import MaskDataSet
@@ -86,10 +88,13 @@ class FolderSource(FileSource):
         return _description_in(path).suffix == ".toml" and _description_in(path).is_file()
 
     def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from."""
-        masks = dict.fromkeys(self._one(place, self.names[index]) for place in self.stored_masks.values())
-        shared = (self._file,) if self._described.stamps is None else (self._file, self._safe(self._described.stamps))
-        return (*shared, *super().files(index), *(path for path in masks if path.exists()))
+        """The files that a frame is read from, those of its cameras and stamps among them."""
+        own = [(each.stamps, each.calibration, each.T_camera_lidar, each.masks) for each in self._cameras.values()]
+        named = dict.fromkeys(place for place in (self._described.stamps, *chain(*own)) if isinstance(place, str))
+        paths = [self._one(place, self.names[index]) for place in named]
+        # a calibration may be the folder of a day of KITTI raw
+        paths += [path / name for path in paths if path.is_dir() for name in RAW_FILES]
+        return (self._file, *super().files(index), *(path for path in paths if path.is_file()))
 
     def _image(self, camera: str, index: int) -> CameraImage:
         name = self.names[index]

@@ -25,7 +25,7 @@ from ldls.io.images import read_image_size
 from ldls.io.kitti_stamps import read_stamps
 from ldls.sequences import Trajectory
 
-TIMES = "times.txt"
+CALIBRATION, TIMES = "calib.txt", "times.txt"
 
 
 class KittiOdometrySource(FileSource):
@@ -75,7 +75,7 @@ class KittiOdometrySource(FileSource):
         points = find_points(path / "velodyne")
         images = {name: find_images(path / name) for name in cameras}
         super().__init__(path, {"velodyne": points, **images}, cameras, truth=truth)
-        calib = path / "calib.txt"
+        calib = path / CALIBRATION
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}
         self.stamps = _read_stamps(path, self.names)
         self._poses_file = _poses_file(path) if poses else None
@@ -91,8 +91,8 @@ class KittiOdometrySource(FileSource):
         return _is_sequence(path) or bool(_sequences(path)) or bool(_sequences(path / "sequences"))
 
     def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from, those of times and poses among them."""
-        shared = (self.path / TIMES, self._poses_file)
+        """The files that a frame is read from, those of its calibration, times and poses among them."""
+        shared = (self.path / CALIBRATION, self.path / TIMES, self._poses_file)
         return (*super().files(index), *(file for file in shared if file is not None and file.exists()))
 
     def _image(self, name: str, index: int) -> CameraImage:
@@ -105,11 +105,11 @@ class KittiOdometrySource(FileSource):
 
 
 def _is_sequence(path: Path) -> bool:
-    return (path / "velodyne").is_dir() and (path / "calib.txt").is_file()
+    return (path / "velodyne").is_dir() and (path / CALIBRATION).is_file()
 
 
 def _sequences(path: Path) -> list[str]:
-    return sorted(calib.parent.name for calib in path.glob("*/calib.txt") if _is_sequence(calib.parent))
+    return sorted(calib.parent.name for calib in path.glob(f"*/{CALIBRATION}") if _is_sequence(calib.parent))
 
 
 def _sequence(path: Path, wanted: str | int | None) -> Path:

@@ -30,6 +30,7 @@ from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
 from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import CorruptFileError, SourceError
 from ldls.io import read_camera, read_poses
+from ldls.io.cameras.kitti import RAW_FILES
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
 from ldls.io.poses.kitti_raw import CALIBRATION, STAMPS
 from ldls.sequences import Trajectory
@@ -120,8 +121,10 @@ class KittiRawSource(FileSource):
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from; of the poses those around its times, and what all of them share."""
+        cameras = (self.path.parent / name for name in RAW_FILES)
         clocks = [self.path / LIDAR / name for name in (STAMPS, START, END)]
-        own = (*super().files(index), *(clock for clock in clocks if clock.exists()))
+        clocks += [self.path / name / STAMPS for name in self.camera_names]
+        own = (*super().files(index), *cameras, *(clock for clock in clocks if clock.exists()))
         moments = self._moments(index)
         if self._trajectory is None or not moments:
             return own

@@ -119,9 +119,9 @@ class NuScenesSource:
         return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from, the table of poses among them."""
+        """The files that a frame is read from, the tables among them."""
         taken = (self._file(taken.filename) for taken in self._frames[index].values())
-        return (*taken, self._tables / "ego_pose.json")
+        return (*taken, *(self._tables / f"{name}.json" for name in tables.TABLES))
 
     def __getitem__(self, index: int) -> Frame:
         frame = self._frames[index]

@@ -197,7 +197,7 @@ def read_truth_files(tables: Path, name: str, tokens: set[str]) -> dict[str, str
     Raises:
         CorruptFileError: The table is broken.
     """
-    if not (tables / f"{name}.json").is_file():
+    if not tokens or not (tables / f"{name}.json").is_file():
         return {}
     rows = _rows(tables, name, {"sample_data_token": str, "filename": str})
     return {row["sample_data_token"]: row["filename"] for row in rows if row["sample_data_token"] in tokens}

@@ -132,6 +132,8 @@ class RosBag:
         self._bag = open_bag(self.path, recover=recover)
         self.topics = choose_topics(self._bag, points_topic, image_topics, info_topics)
         self._given = given_transforms(T_camera_lidar, self.topics.images)
+        each = T_camera_lidar.values() if isinstance(T_camera_lidar, Mapping) else [T_camera_lidar]
+        self._given_files = tuple(Path(given) for given in each if isinstance(given, str | PathLike))
         self._pair()
         if self.world is not None:
             self._check_world(self.world)
@@ -240,8 +242,8 @@ class RosBag:
         return tuple(sweep.header.stamp_ns / NANOSECONDS for sweep in self._sweeps)
 
     def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from: those of the bag."""
-        return tuple(storage_files(self.path))
+        """The files that a frame is read from: those of the bag, and of transforms that are given."""
+        return (*storage_files(self.path), *self._given_files)
 
     def __getitem__(self, index: int) -> Frame:
         """Read a frame; images are decoded when they are asked for.
