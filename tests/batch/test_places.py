@@ -10,6 +10,7 @@ import ldls.batch.poses as found_poses
 from batch import drives, runs
 from datasets import layouts
 from ldls import batch, read_poses
+from ldls.datasets import open_source
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_masks, save
 
@@ -150,6 +151,25 @@ def test_tables_of_a_run_are_none_of_its_inputs(few, tmp_path):
     with pytest.raises(InputError, match=r"map_file: would write over .*map\.ply, which is an input"):
         run(few, tmp_path / "out", "npz", map_file=few / "map.ply")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("how", "cameras"),
+    [
+        pytest.param({"masks": "masks/{frame}.json"}, (2,), id="masks by a pattern"),
+        pytest.param({"masks": "masks"}, (2, 3), id="masks in the folder of a camera"),
+        pytest.param({"segmenter": "boxes:masks/{frame}.json"}, (2,), id="boxes of each frame"),
+    ],
+)
+def test_files_of_masks_wherever_they_lie_are_inputs(tmp_path, how, cameras):
+    drive = layouts.many_frames(tmp_path / "drive", n_frames=2, cameras=cameras)
+    ((option, place),) = how.items()
+    kind, colon, path = place.rpartition(":")
+    settings = batch.RunSettings(**{option: f"{kind}{colon}{drive / path}"})
+    table = drive / "masks" / ("image_3" if len(cameras) > 1 else "") / "000001.json"
+    source = open_source(drive, camera=cameras)
+    with pytest.raises(InputError, match=r"objects: would write over .*000001\.json, which is an input"):
+        batch.run(source, tmp_path / "out", settings, objects=table)
 
 
 @pytest.mark.parametrize(

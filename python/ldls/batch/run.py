@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,7 @@ from ldls.batch.summary import (
 from ldls.batch.window import Frames, Outcome
 from ldls.checks import checked
 from ldls.datasets import Source, open_source
+from ldls.datasets.stored_masks import fill
 from ldls.errors import (
     ChangedFileWarning,
     LdlsWarning,
@@ -48,7 +49,6 @@ from ldls.errors import (
 )
 from ldls.io.files import check_outputs, sweep
 from ldls.io.objects import objects_writer
-from ldls.segmenters.registry import segmenter_file
 from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.viewing.formats import BAG, ENDINGS, RESULT, TRACKS, file_name
 
@@ -231,10 +231,17 @@ def _windows(source: Source, chosen: Frames, stamps: Sequence[float | None], swe
 
 
 def _inputs(source: Source, settings: RunSettings) -> Iterator[str | PathLike[str] | None]:
-    """Files that a run reads, and the folder of its masks."""
-    yield from (settings.masks, settings.poses, segmenter_file(settings.segmenter))
+    """Files that a run reads, and the folders of its masks."""
+    yield settings.poses
     for index in range(len(source)):
         yield from source.files(index)
+    images = [(frame, camera) for frame in source.names for camera in source.camera_names]
+    yield from dict.fromkeys(settings.segmenter_file(*image) for image in images)
+    if settings.masks is not None:
+        place = fspath(settings.masks)
+        yield from dict.fromkeys(fill(place, *image) for image in images)
+        # a folder has one for each of several cameras
+        yield from (Path(place) / camera for camera in source.camera_names)
 
 
 def _tracks(
