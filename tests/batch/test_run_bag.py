@@ -100,7 +100,7 @@ def test_a_bag_that_is_whole_stays_and_one_that_lacks_frames_is_written_anew(tmp
     (out / ".labelled.abc.part").mkdir()
     assert command(bag, out, "--formats", "bag").exit_code == 0
     assert len(messages(out / "labelled", "/points_labelled")) == 4
-    assert not list(out.glob(".*"))
+    assert not list(out.glob(".*.part"))
 
 
 def test_the_bag_of_a_finished_run_is_added(tmp_path):
@@ -184,6 +184,39 @@ def test_with_tracks_instances_are_those_of_the_drive(tmp_path):
     inode = (out / "labelled/metadata.yaml").stat().st_ino
     assert command(bag, out, *track).exit_code == 0
     assert (out / "labelled/metadata.yaml").stat().st_ino == inode, "what is whole stays"
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        pytest.param(
+            ["--formats bag", "--formats npz --track", "--formats bag --track"], id="tracks of a run without the bag"
+        ),
+        pytest.param(
+            ["--formats npz --track", "--formats bag", "--formats bag --track"], id="tracks older than the bag"
+        ),
+        pytest.param(
+            [
+                "--sweeps 1 --formats bag",
+                "--sweeps 1 --formats npz --frames 1:",
+                "--sweeps 1 --formats bag --frames 1:",
+            ],
+            id="labels of other windows",
+        ),
+    ],
+)
+def test_a_bag_has_the_labels_that_there_are_now(tmp_path, steps):
+    bag, out = recorded(tmp_path, "mcap", moving=(("odom", "base"),)), tmp_path / "out"
+    turned = tmp_path / f"masks/{START_NS + STEP_NS}.json"
+    masks = json.loads(turned.read_text())
+    turned.write_text(json.dumps(masks | {"annotations": masks["annotations"][::-1]}))
+    for step in steps:
+        outcome = command(bag, out, "--option", "world=odom", *step.split())
+        assert outcome.exit_code == 0, outcome.output
+    of = out / "tracks" if "--track" in steps[-1] else out
+    results = [ldls.read_result(path) for path in sorted(of.glob("*.npz"))]
+    for found, each in zip(instance_ids(out / "labelled"), results, strict=True):
+        np.testing.assert_array_equal(found, each.instance_ids[np.maximum(each.labels, 0)])
 
 
 def instance_ids(path):

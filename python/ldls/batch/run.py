@@ -190,8 +190,7 @@ def run(
         write_failures(folder, failures_of(journal.records(opened.names)))
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
-        anew = n_finished - n_failed > n_earlier
-        unplaced = _write_of_all(tracks, bag, lambda: _stored(journal, opened.names, folder), anew=anew)
+        unplaced = _write_of_all(tracks, bag, lambda: _stored(journal, opened.names, folder))
         if write_objects is not None:
             write_objects(objects_of(_found(journal, names, tracks)))
         n_objects = count_objects(_found(journal, names, tracks))
@@ -256,16 +255,11 @@ def _tracks(
     return None
 
 
-def _write_of_all(
-    tracks: RunTracks | None, bag: RunBag | None, stored: Callable[[], Iterator[Record]], *, anew: bool
-) -> list[str]:
+def _write_of_all(tracks: RunTracks | None, bag: RunBag | None, stored: Callable[[], Iterator[Record]]) -> list[str]:
     """Write the tracks, and the bag, which has them, of all frames that are `stored`; the frames without tracks."""
-    unplaced: list[str] = []
-    if tracks is not None:
-        # a bag of other tracks must not outlive a run that is killed
-        unplaced = tracks.write(stored, (lambda: None) if bag is None else bag.remove)
+    unplaced = [] if tracks is None else tracks.write(stored)
     if bag is not None:
-        bag.write([record["frame"] for record in stored()], anew=anew)
+        bag.write(stored)
     return unplaced
 
 

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from ldls.batch.journal import Record
+from ldls.batch.run_tracks import digest_of_records
 from ldls.datasets import Source
 from ldls.datasets.rosbag import RosBag
 from ldls.errors import BatchError, FileFormatError, ParameterError
 from ldls.io import read_result
+from ldls.io.files import open_file, whole_file
 from ldls.io.labelled_bag import TOPIC, LabelledBag
 from ldls.io.ros.bags import open_bag
 from ldls.io.ros.writer import UNFINISHED_BAG
 from ldls.viewing.formats import RESULT, file_name
 
-NAME = "labelled"
+NAME, NOTE = "labelled", ".ldls-bag"
+"""The bag, and the file that says what it was made of."""
 MARGIN_NS = 1_000_000_000
 """Images and transforms from so long before the first sweep to so long after the last are copied."""
 
@@ -58,24 +62,25 @@ class RunBag:
                 f"{self.path}: is there and is no bag of labelled clouds; remove it, or choose another folder"
             )
 
-    def write(self, frames: Sequence[str], *, anew: bool) -> None:
-        """Write the bag of the frames that are done, in the order of the source.
+    def write(self, records: Callable[[], Iterable[Record]]) -> None:
+        """Write the bag of the frames that are done, in the order of the source; one that was made of the same stays.
 
         Args:
-            frames: Their names.
-            anew: True if some were done since the bag was written; otherwise one with as many frames stays.
+            records: Gives the journal's records of the frames that have a stored result.
 
         Raises:
             CorruptFileError: The source is damaged.
             LimitError: A category id is beyond 255.
             OSError: It cannot be written, as on a full disk; nothing of it stays.
         """
-        if not anew and self._n_clouds() == len(frames):
+        done = {record["frame"] for record in records()}
+        tracked = [folder.name for folder in self._folders[:-1]]
+        made_of = " ".join([digest_of_records(records()), *tracked]).encode()
+        if self._note() == made_of and self._n_clouds() == len(done):
             return
         self.remove()
-        if not frames:
+        if not done:
             return
-        done = set(frames)
         chosen = [index for index, name in enumerate(self._source.names) if name in done]
         received = [self._source.received_ns(index) for index in chosen]
         with LabelledBag(self.path, self._source.storage) as bag:
@@ -90,12 +95,23 @@ class RunBag:
                 # frames without a pose have no tracks
                 path = next(folder / name for folder in self._folders if (folder / name).is_file())
                 bag.write(read_result(path), self._source.header(index), received_ns=received_ns)
+        with whole_file(self._folder / NOTE) as file:
+            file.write(made_of)
 
     def remove(self) -> None:
         """Remove the bag."""
+        (self._folder / NOTE).unlink(missing_ok=True)
         if self.path.is_dir():
             shutil.rmtree(self.path)
         self.path.unlink(missing_ok=True)
+
+    def _note(self) -> bytes | None:
+        """What the bag that is there was made of; None where nothing says it."""
+        try:
+            with open_file(self._folder / NOTE, "note of the bag") as file:
+                return file.read()
+        except FileNotFoundError:
+            return None
 
     def _n_clouds(self) -> int | None:
         """Number of labelled clouds in the bag that is there; None without any."""

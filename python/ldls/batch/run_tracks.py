@@ -75,14 +75,13 @@ class RunTracks:
         self._folder, self.folder, self._map = folder, folder / TRACKS, map_file
         self._formats = {"label", *formats}
 
-    def write(self, records: Callable[[], Iterable[Record]], before: Callable[[], None] = lambda: None) -> list[str]:
+    def write(self, records: Callable[[], Iterable[Record]]) -> list[str]:
         """Number the objects of all frames that are done, if that was not done; the frames left out, without a pose.
 
         One window at a time is in memory.
 
         Args:
             records: Gives the journal's records of the frames that have a stored result, in the order of the source.
-            before: Called before tracks become others than they were.
 
         Raises:
             LimitError: There are more objects than a file has numbers for, or the map has too many voxels.
@@ -92,7 +91,7 @@ class RunTracks:
         """
         refuse_link(self.folder)
         unplaced = [record["frame"] for record in records() if not _is_placed(record)]
-        made_of, noted = _digest(records()), self._before()
+        made_of, noted = digest_of_records(records()), self._before()
         files: dict[str, list[int | str]] = noted["files"]
         frames = [record["frame"] for record in records() if _is_placed(record)]
         # those of earlier runs stay
@@ -104,8 +103,6 @@ class RunTracks:
         current = current and all(is_written(self._folder / name, files[name]) for name in files)
         if current and self._map is None:
             return unplaced
-        if not current:
-            before()
         places = LabelledMap()
         self.folder.mkdir(exist_ok=True)
         sweep(self.folder)
@@ -203,8 +200,8 @@ def _line(objects: FrameObjects) -> bytes:
     return json.dumps(record, sort_keys=True, separators=(",", ":")).encode() + b"\n"
 
 
-def _digest(records: Iterable[Record]) -> str:
-    """Digest of all that tracks depend on."""
+def digest_of_records(records: Iterable[Record]) -> str:
+    """Digest of all that is made of frames together depends on, as tracks."""
     digest = hashlib.sha256(_ldls.__version__.encode())
     for record in records:
         name = file_name(record["frame"], RESULT)
