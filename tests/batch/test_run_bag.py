@@ -219,5 +219,15 @@ def test_a_bag_has_the_labels_that_there_are_now(tmp_path, steps):
         np.testing.assert_array_equal(found, each.instance_ids[np.maximum(each.labels, 0)])
 
 
+def test_a_bag_of_labels_that_a_run_of_other_formats_replaces_is_removed(tmp_path):
+    bag, out = recorded(tmp_path, "rosbag1", moving=(("odom", "base"),)), tmp_path / "out"
+    of_run = ("--option", "world=odom", "--sweeps", "1")
+    command(bag, out, *of_run, "--formats", "bag")
+    assert "warning" not in command(bag, out, *of_run, "--formats", "npz").output
+    outcome = command(bag, out, *of_run, "--formats", "npz", "--frames", "1:")
+    assert "removed labelled.bag (--formats bag makes it again)" in " ".join(outcome.output.split())
+    assert not (out / "labelled.bag").exists()
+
+
 def instance_ids(path):
     return [decode(cloud).fields["instance_id"] for _, _, cloud in messages(path, "/points_labelled")]

@@ -21,6 +21,7 @@ from ldls.batch.poses import Poses
 from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import (
+    LdlsWarning,
     LeftOutWarning,
     LimitError,
     ParameterError,
@@ -231,6 +232,19 @@ def test_a_finished_run_is_not_tracked_again(drive, tracked, numbered):
     run(drive, out)
     assert numbered == []
     assert tracks(out) == before
+
+
+def test_tracks_of_labels_that_a_run_without_them_replaces_are_removed(drive, tmp_path):
+    out = tmp_path / "out"
+    run(drive, out, frames=slice(0, 6))
+    (out / "tracks/notes.txt").write_text("the user's own")
+    run(drive, out, frames=slice(6, 8), track=False)
+    run(drive, out, frames=slice(0, 6), track=False, formats=("label",))
+    assert len(rows(out)) > 0, "those of labels that are the same stay"
+    with pytest.warns(LdlsWarning, match=r"labelled together with others .* removed tracks/ .*--track") as caught:
+        run(drive, out, frames=slice(1, 6), track=False)
+    assert [warning.filename for warning in caught] == [__file__]
+    assert tracks(out) == {"tracks/notes.txt": b"the user's own"}
 
 
 @pytest.mark.parametrize("name", ["tracks/000004.label", "tracks.csv", "tracks/objects.jsonl", "tracks/tracks.json"])

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from functools import partial
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,8 @@ from ldls.batch.journal import Journal, Record, formats_begun
 from ldls.batch.lock import only_run
 from ldls.batch.plan import check_apart, check_names, check_places, chosen_of, windows_of
 from ldls.batch.poses import Poses, with_odometry
-from ldls.batch.run_bag import RunBag
-from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks
+from ldls.batch.run_bag import NOTE, RunBag
+from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks, remove_tracks
 from ldls.batch.settings import RunSettings, source_record
 from ldls.batch.summary import (
     FAILURES_NAME,
@@ -169,7 +170,8 @@ def run(
             start = time.perf_counter()
             seconds: Counter[str] = Counter()
             n_finished, n_failed = n_earlier, 0
-            with warnings.catch_warnings(), closing(_recorded(runner(work, pending), journal)) as outcomes:
+            outdate = partial(_outdate, opened, settings, folder)
+            with warnings.catch_warnings(), closing(_recorded(runner(work, pending), journal, outdate)) as outcomes:
                 # said of all frames at once, below
                 warnings.simplefilter("ignore", NothingInView)
                 warnings.simplefilter("ignore", NoUsablePoints)
@@ -292,14 +294,19 @@ def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> li
     return [window for window in windows if any(name not in done for _, name in window)]
 
 
-def _recorded(outcomes: Generator[Outcome], journal: Journal) -> Generator[Outcome]:
-    """The outcomes, their records in the journal within `GROUP_S` or by the end, however it comes."""
+def _recorded(outcomes: Generator[Outcome], journal: Journal, outdate: Callable[[], None]) -> Generator[Outcome]:
+    """The outcomes, their records in the journal within `GROUP_S` or by the end, however it comes.
+
+    `outdate` is called before those of frames that have other labels than they had.
+    """
     waiting: list[Record] = []
     since = time.monotonic()
     # whoever keeps an error of the journal would keep the engine at work
     with closing(outcomes):
         try:
             for outcome in outcomes:
+                if _has_other_labels(outcome, journal):
+                    outdate()
                 waiting.extend(outcome.records)
                 if time.monotonic() - since > GROUP_S:
                     _flush(journal, waiting)
@@ -307,6 +314,29 @@ def _recorded(outcomes: Generator[Outcome], journal: Journal) -> Generator[Outco
                 yield outcome
         finally:
             _flush(journal, waiting)
+
+
+def _has_other_labels(outcome: Outcome, journal: Journal) -> bool:
+    """True if frames that an earlier run labelled were labelled together with others now, or failed."""
+    earlier = journal.kept(record["frame"] for record in outcome.records)
+    pairs = [(earlier.get(record["frame"]), record) for record in outcome.records]
+    return any(
+        before is not None and "error" not in before and before["window"] != now.get("window") for before, now in pairs
+    )
+
+
+def _outdate(source: Source, settings: RunSettings, folder: Path) -> None:
+    """Remove the tracks, and the bag, of earlier labels, where this run does not write them anew; warns of it."""
+    removed = []
+    if not settings.track and remove_tracks(folder):
+        removed.append(f"{TRACKS}/ and {TRACKS_TABLE} (--track makes them again)")
+    if BAG not in settings.formats and (folder / NOTE).is_file():
+        bag = RunBag(source, folder)
+        bag.remove()
+        removed.append(f"{bag.path.name} (--formats bag makes it again)")
+    if removed:
+        message = f"{folder}: frames are labelled together with others than before; removed {' and '.join(removed)}"
+        warnings.warn(message, LdlsWarning, stacklevel=5)
 
 
 def _flush(journal: Journal, waiting: list[Record]) -> None:

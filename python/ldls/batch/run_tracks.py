@@ -18,6 +18,7 @@ import hashlib
 import io
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,7 @@ class RunTracks:
         """
         refuse_link(self.folder)
         unplaced = [record["frame"] for record in records() if not _is_placed(record)]
-        made_of, noted = digest_of_records(records()), self._before()
+        made_of, noted = digest_of_records(records()), _note(self._folder)
         files: dict[str, list[int | str]] = noted["files"]
         frames = [record["frame"] for record in records() if _is_placed(record)]
         # those of earlier runs stay
@@ -165,16 +166,30 @@ class RunTracks:
                     )
                 yield each["frame"], placed, result
 
-    def _before(self) -> dict[str, Any]:
-        """What an earlier run noted of its tracks."""
-        try:
-            with open_file(self.folder / TRACKS_STATE, "note of tracks", limit=LARGE_BYTES) as file:
-                match json.loads(file.text()):
-                    case {"files": dict() as files, "made_of": str() as made_of}:
-                        return {"files": {name: files[name] for name in files if _is_ours(name)}, "made_of": made_of}
-        except (FileNotFoundError, ValueError, RecursionError):
-            pass
-        return {"files": {}, "made_of": None}
+
+def remove_tracks(folder: Path) -> bool:
+    """Remove the tracks that an earlier run noted in `folder`; True if there were some."""
+    refuse_link(folder / TRACKS)
+    files = _note(folder)["files"]
+    for name in files:
+        (folder / name).unlink(missing_ok=True)
+    if files:
+        (folder / TRACKS / TRACKS_STATE).unlink()
+    with suppress(OSError):  # files of others stay, and so does what holds them
+        (folder / TRACKS).rmdir()
+    return bool(files)
+
+
+def _note(folder: Path) -> dict[str, Any]:
+    """What an earlier run noted of its tracks in `folder`."""
+    try:
+        with open_file(folder / TRACKS / TRACKS_STATE, "note of tracks", limit=LARGE_BYTES) as file:
+            match json.loads(file.text()):
+                case {"files": dict() as files, "made_of": str() as made_of}:
+                    return {"files": {name: files[name] for name in files if _is_ours(name)}, "made_of": made_of}
+    except (FileNotFoundError, ValueError, RecursionError):
+        pass
+    return {"files": {}, "made_of": None}
 
 
 def _is_placed(record: Record) -> bool:
