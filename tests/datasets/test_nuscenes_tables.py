@@ -66,3 +66,52 @@ def test_the_row_and_its_value_are_named(tmp_path):
     path.write_text(json.dumps(rows))
     with pytest.raises(ldls.CorruptFileError, match=r"sample\.json, row 2: timestamp is 'noon', expected int | float"):
         open_source(folder, kind="nuscenes")
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "message"),
+    [
+        pytest.param(
+            "scene", lambda rows: rows[:1],
+            r"sample\.json, scene-0002 0: scene_token is 'token scene-0002', which scene\.json has no row of",
+            id="no scene",
+        ),
+        pytest.param(
+            "sensor", lambda rows: [row for row in rows if row["channel"] != "CAM_BACK"],
+            r"calibrated_sensor\.json, calibrated CAM_BACK: sensor_token is 'sensor CAM_BACK', which sensor\.json",
+            id="no sensor",
+        ),
+        pytest.param(
+            "calibrated_sensor", lambda rows: [row for row in rows if "CAM_BACK'" not in str(row)],
+            r"sample_data\.json, scene-0001 0 CAM_BACK: calibrated_sensor_token is 'calibrated CAM_BACK', which calib",
+            id="no calibrated sensor",
+        ),
+        pytest.param(
+            "calibrated_sensor", lambda rows: [row | {"camera_intrinsic": []} for row in rows],
+            r"calibrated_sensor\.json, calibrated CAM_FRONT: camera_intrinsic of CAM_FRONT has the shape \(0,\)",
+            id="a camera without intrinsics",
+        ),
+        pytest.param(
+            "ego_pose", lambda rows: [*rows, rows[0] | {"translation": [50, 0, 0]}],
+            r"ego_pose\.json, pose scene-0001 0 LIDAR_TOP: two rows with this token have two poses",
+            id="two poses of one token",
+        ),
+        pytest.param(
+            "scene", lambda rows: [row | {"name": "scene-0001"} for row in rows],
+            r"scene\.json: two scenes are named 'scene-0001'", id="two scenes of one name",
+        ),
+    ],
+)  # fmt: skip
+def test_tables_that_contradict_one_another_are_named(tmp_path, table, change, message):
+    folder = layouts.nuscenes(tmp_path, scenes=("scene-0001", "scene-0002"))
+    path = folder / f"v1.0-mini/{table}.json"
+    path.write_text(json.dumps(change(json.loads(path.read_text()))))
+    with pytest.raises((ldls.CorruptFileError, ldls.CalibrationError), match=message):
+        open_source(folder, kind="nuscenes")
+
+
+def test_a_pose_may_stand_there_twice(tmp_path):
+    folder = layouts.nuscenes(tmp_path)
+    path = folder / "v1.0-mini/ego_pose.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) * 2))
+    assert len(open_source(folder)) == 2

@@ -75,7 +75,7 @@ class NuScenesSource:
         Raises:
             SourceError: A table is missing, no frame is whole, or there is no such scene.
             FileFormatError: A table is broken.
-            CalibrationError: A pose is none.
+            CalibrationError: A pose is none, or a camera has no intrinsic matrix.
             UnsafePathError: A table names a file out of the folder.
             FileNotFoundError: There is no such folder.
         """
@@ -89,8 +89,9 @@ class NuScenesSource:
         # nuScenes' own cameras in its order
         self.camera_names = tuple(sorted(cameras, key=lambda c: CAMERAS.index(c) if c in CAMERAS else len(CAMERAS)))
         channels = (self._lidar, *self.camera_names)
-        self._sensors = tables.read_sensors(folder, channels)
-        readings = tables.read_readings(folder, samples, self._sensors)
+        sensors = tables.read_sensors(folder)
+        readings = tables.read_readings(folder, samples, sensors, channels)
+        self._sensors = {token: sensor for token, sensor in sensors.items() if sensor.channel in channels}
         missing = _missing(self.path, readings, channels)
         self.left_out = {samples[token]: f"no {' and no '.join(what)}" for token, what in missing.items()}
         self.names = tuple(name for token, name in samples.items() if token not in missing)

@@ -5,12 +5,12 @@ Tables are read a row at a time; only rows of the key frames that are wanted are
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from ldls.io.json_rows import read_json_rows
 from ldls.io.labels.nuscenes_labels import NUSCENES
 from ldls.labeling import MOST_CODES
 
+T = TypeVar("T")
 Number = int | float
 Side = int | None
 HUGE = 2**63
@@ -99,12 +100,15 @@ def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
         CorruptFileError: A table is broken.
     """
     names = {row["token"]: row["name"] for row in _rows(tables, "scene", {"token": str, "name": str})}
+    twice = [name for name, count in Counter(names.values()).items() if count > 1]
+    if twice:
+        raise CorruptFileError(f"{tables / 'scene.json'}: two scenes are named {twice[0]!r}, expected a name for each")
     if scene is not None:
         choose(tables, "scene", sorted(names.values()), scene)
     samples: dict[str, list[tuple[int, str]]] = defaultdict(list)
     for row in _rows(tables, "sample", {"token": str, "scene_token": str, "timestamp": Number}):
-        name = names.get(row["scene_token"])
-        if name is not None and scene in (None, name):
+        name = _named(tables, "sample", row, "scene", names)
+        if scene in (None, name):
             samples[name].append((row["timestamp"], row["token"]))
     in_order = sorted((sorted(own), name) for name, own in samples.items())
     return {token: f"{name}_{number:03d}" for own, name in in_order for number, (_, token) in enumerate(own)}
@@ -123,35 +127,36 @@ def read_channels(tables: Path) -> tuple[list[str], list[str]]:
     return channels["lidar"], channels["camera"]
 
 
-def read_sensors(tables: Path, channels: tuple[str, ...]) -> dict[str, CalibratedSensor]:
-    """The calibrated sensors of the wanted channels, by token.
+def read_sensors(tables: Path) -> dict[str, CalibratedSensor]:
+    """The calibrated sensors, by token.
 
     Raises:
-        CalibrationError: A pose is none.
-        CorruptFileError: A table is broken.
+        CalibrationError: A pose is none, or a camera has no intrinsic matrix.
+        CorruptFileError: A table is broken, or lacks a sensor.
     """
-    named = {row["token"]: row["channel"] for row in _rows(tables, "sensor", {"token": str, "channel": str})}
+    kinds = {row["token"]: row for row in _rows(tables, "sensor", {"token": str, "channel": str, "modality": str})}
     columns = {"token": str, "sensor_token": str, "translation": list, "rotation": list, "camera_intrinsic": list}
-    path = tables / "calibrated_sensor.json"
-    return {
-        row["token"]: CalibratedSensor(
-            named[row["sensor_token"]],
-            _transform(f"{path}, {row['token']}", row),
-            _numbers(f"{path}, {row['token']}", row["camera_intrinsic"]),
-            _distortion(f"{path}, {row['token']}", row.get("camera_distortion") or []),
-        )
-        for row in _rows(tables, "calibrated_sensor", columns)
-        if named.get(row["sensor_token"]) in channels
-    }
+    sensors: dict[str, CalibratedSensor] = {}
+    for row in _rows(tables, "calibrated_sensor", columns):
+        kind = _named(tables, "calibrated_sensor", row, "sensor", kinds)
+        place = f"{tables / 'calibrated_sensor.json'}, {row['token']}"
+        intrinsic = _numbers(place, row["camera_intrinsic"])
+        if kind["modality"] == "camera" and intrinsic.shape not in ((3, 3), (3, 4)):
+            raise CalibrationError(
+                f"{place}: camera_intrinsic of {kind['channel']} has the shape {intrinsic.shape}, expected (3, 3)"
+            )
+        distortion = _distortion(place, row.get("camera_distortion") or [])
+        sensors[row["token"]] = CalibratedSensor(kind["channel"], _transform(place, row), intrinsic, distortion)
+    return sensors
 
 
 def read_readings(
-    tables: Path, samples: Mapping[str, str], sensors: Mapping[str, CalibratedSensor]
+    tables: Path, samples: Mapping[str, str], sensors: Mapping[str, CalibratedSensor], channels: Sequence[str]
 ) -> dict[str, dict[str, Reading]]:
-    """Readings of `sensors` for the key frames `samples`, by sample and channel.
+    """Readings of the wanted channels for the key frames `samples`, by sample and channel.
 
     Raises:
-        CorruptFileError: The table is broken.
+        CorruptFileError: The table is broken, or `sensors`, all that there are, lack one of its.
     """
     readings: dict[str, dict[str, Reading]] = {token: {} for token in samples}
     sizes: dict[tuple[int, int], tuple[int, int]] = {}
@@ -161,8 +166,10 @@ def read_readings(
         "ego_pose_token": str, "filename": str, "timestamp": Number, "height": Side, "width": Side,
     }  # fmt: skip
     for row in _rows(tables, "sample_data", columns):
-        sensor = own.get(row["calibrated_sensor_token"])
-        if not row["is_key_frame"] or sensor is None or row["sample_token"] not in readings:
+        if not row["is_key_frame"] or row["sample_token"] not in readings:
+            continue
+        sensor = _named(tables, "sample_data", row, "calibrated_sensor", own)
+        if sensors[sensor].channel not in channels:
             continue
         size = (row["height"] or 0, row["width"] or 0)
         readings[row["sample_token"]][sensors[sensor].channel] = Reading(
@@ -181,11 +188,15 @@ def read_poses(tables: Path, tokens: set[str]) -> dict[str, NDArray[np.float64]]
 
     Raises:
         CalibrationError: One is no pose.
-        CorruptFileError: The table is broken, or lacks one.
+        CorruptFileError: The table is broken, lacks one, or has two of one token.
     """
     rows = _rows(tables, "ego_pose", {"token": str, "translation": list, "rotation": list})
     path = tables / "ego_pose.json"
-    poses = {row["token"]: _transform(f"{path}, {row['token']}", row) for row in rows if row["token"] in tokens}
+    poses: dict[str, NDArray[np.float64]] = {}
+    for row in (row for row in rows if row["token"] in tokens):
+        pose = _transform(f"{path}, {row['token']}", row)
+        if not np.array_equal(poses.setdefault(row["token"], pose), pose):
+            raise CorruptFileError(f"{path}, {row['token']}: two rows with this token have two poses, expected one")
     if len(poses) < len(tokens):
         raise CorruptFileError(f"{path}: lacks {len(tokens) - len(poses)} of {len(tokens)} poses of sample_data.json")
     return poses
@@ -224,6 +235,16 @@ def read_classes(tables: Path) -> dict[int, str]:
             raise CorruptFileError(f"{place}: index is {index}, as in another row")
         own[index] = row["name"]
     return {0: NUSCENES[0]} | own if own else NUSCENES
+
+
+def _named(tables: Path, name: str, row: Mapping[str, Any], other: str, rows: Mapping[str, T]) -> T:
+    """The one of `rows`, those of the table `other` by token, that a row of the table `name` names."""
+    token = row[f"{other}_token"]
+    if token not in rows:
+        raise CorruptFileError(
+            f"{tables / name}.json, {row['token']}: {other}_token is {token!r}, which {other}.json has no row of"
+        )
+    return rows[token]
 
 
 def _transform(place: str, row: Mapping[str, Any]) -> NDArray[np.float64]:
