@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -140,6 +141,20 @@ def test_a_failure_leaves_no_bag(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert command(bag, out, "--formats", "bag").exit_code == 0
     assert len(messages(out / "labelled", "/points_labelled")) == 4
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_full_disk_is_named_and_the_run_goes_on(tmp_path, small_disk, kind):
+    bag, out = recorded(tmp_path, kind, sweeps=12), small_disk / "out"
+    subprocess.run(["mount", "-o", "remount,size=280k", str(small_disk)], check=True)
+    outcome = command(bag, out, "--formats", "bag")
+    assert outcome.exit_code == 1
+    said = " ".join(outcome.output.split())
+    assert f"labelled{'.bag' if kind == 'rosbag1' else ''}: " in said
+    assert "full while writing the bag" in said or "No space left on device while writing the bag" in said
+    assert len(list(out.glob("*.npz"))) == 12 and not [path for path in out.iterdir() if "labelled" in path.name]
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    assert command(bag, out, "--formats", "bag").exit_code == 0
 
 
 def test_what_is_in_the_place_of_the_bag_and_none_of_ours_stays(tmp_path):

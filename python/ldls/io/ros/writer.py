@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
+import sqlite3
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
@@ -53,7 +56,12 @@ class BagWriter:
 
     def __enter__(self) -> Self:
         self._folder = Path(tempfile.mkdtemp(prefix=f".{self.path.name}.", suffix=UNFINISHED_BAG, dir=self.path.parent))
-        self._writer = self._opened(self._folder / self.path.name)
+        try:
+            with _names_bag(self.path):
+                self._writer = self._opened(self._folder / self.path.name)
+        except BaseException:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise
         return self
 
     def _opened(self, path: Path) -> Any:  # noqa: ANN401
@@ -70,12 +78,14 @@ class BagWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            if error is not None:
-                self._writer.abort()
-                return
-            self._writer.close()
-            (self._folder / self.path.name).rename(self.path)
+            if error is None:
+                with _names_bag(self.path):
+                    self._writer.close()
+                (self._folder / self.path.name).rename(self.path)
         finally:
+            # closes what is open still; on a full disk this fails, too, and says less than what failed first
+            with suppress(OSError, sqlite3.Error):
+                self._writer.abort()
             shutil.rmtree(self._folder, ignore_errors=True)
 
     def add_topic(self, topic: Topic, types: Types | None = None) -> None:
@@ -104,8 +114,29 @@ class BagWriter:
         self.write_raw(topic, serialize(self.types, message, kind, ros2=self.ros2), received_ns)
 
     def write_raw(self, topic: str, raw: bytes, received_ns: int) -> None:
-        """Write a serialised message as if received at that time."""
-        self._writer.write(self._connections[topic][0], received_ns, raw)
+        """Write a serialised message as if received at that time.
+
+        Raises:
+            OSError: It cannot be written, as on a full disk.
+        """
+        with _names_bag(self.path):
+            self._writer.write(self._connections[topic][0], received_ns, raw)
+
+
+@contextmanager
+def _names_bag(path: Path) -> Iterator[None]:
+    """Gives errors of writing the name of the bag; those of SQLite become errors of the system."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        code = errno.ENOSPC if error.sqlite_errorname == "SQLITE_FULL" else errno.EIO
+        raise _unwritten(path, code, str(error)) from error
+    except OSError as error:
+        raise _unwritten(path, error.errno, error.strerror or str(error)) from error
+
+
+def _unwritten(path: Path, code: int | None, found: str) -> OSError:
+    return OSError(code, f"{found} while writing the bag; mend it and try again", str(path))
 
 
 def _keep_last(latched: bool) -> Any:  # noqa: ANN401
