@@ -201,6 +201,8 @@ def test_oxts_without_a_stamp_are_left_out(tmp_path):
         pytest.param("data/0000000001.txt", "49 8.4 inf" + " 0" * 27 + "\n", ldls.CorruptFileError,
                      "line 1: expected fini",
                      id="inf"),
+        pytest.param("data/0000000001.txt", "49 8.4 0 0.01 0 90" + " 0" * 24 + "\n", ldls.CorruptFileError,
+                     "0000000001.txt: line 1: roll 0.01, pitch 0, yaw 90, expected radians", id="angles in degrees"),
         pytest.param("data/0000000001.txt", "90 8.4 0" + " 0" * 27 + "\n", ldls.CorruptFileError, "latitude 90",
                      id="pole"),
         pytest.param("data/0000000001.txt", ("49 8.4 0" + " 0" * 27 + "\n") * 2, ldls.CorruptFileError, "2 lines",

@@ -29,6 +29,7 @@ COLUMNS = (
     "lat lon alt roll pitch yaw vn ve vf vl vu ax ay az af al au wx wy wz wf wl wu pos_accuracy vel_accuracy navstat "
     "numsats posmode velmode orimode"
 )
+ANGLES = ("roll", "pitch", "yaw")
 EARTH_RADIUS_M = 6_378_137.0
 MAX_BYTES = 1 << 16
 
@@ -75,6 +76,10 @@ def _read_one(path: Path) -> NDArray[np.float64]:
         latitude, longitude = rows[0, :2]
         if not (abs(latitude) < 90 and abs(longitude) <= 180):
             raise CorruptFileError(f"line 1: latitude {latitude:g}, longitude {longitude:g}, expected degrees")
+        angles = rows[0, 3:6]
+        if not (np.abs(angles) <= 2 * np.pi).all():
+            found = ", ".join(f"{name} {angle:g}" for name, angle in zip(ANGLES, angles, strict=True))
+            raise CorruptFileError(f"line 1: {found}, expected radians, at most 2 pi; are they in degrees?")
     return rows[0, :6]
 
 
