@@ -67,10 +67,7 @@ def _views(masks: InstanceMasks | Sequence[View], camera: Camera | None) -> tupl
     if not isinstance(masks, InstanceMasks):
         if camera is not None:
             raise InputError("camera: expected None beside views, which have cameras of their own")
-        for view in masks:
-            if not isinstance(view, View):
-                raise InputError(f"masks: expected InstanceMasks or a list of View, got {type(view).__name__} in it")
-        return tuple(view for view in masks if isinstance(view, View))
+        return tuple(masks)
     # a View refuses what is no camera
     return (View(masks, camera),)  # type: ignore[arg-type]
 

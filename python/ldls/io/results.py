@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ldls.checks import checked
-from ldls.errors import InputError, UnsupportedFormatError
+from ldls.errors import UnsupportedFormatError
 from ldls.io import result_npz, tables
 from ldls.io.labels import kitti_objects, nuscenes_labels, semantic_kitti
 from ldls.io.masks.formats import write_masks
@@ -99,8 +99,6 @@ def save(thing: Segmentation | InstanceMasks | LabelledMap, path: str | PathLike
     if isinstance(thing, LabelledMap):
         _save_map(thing, path, options)
         return
-    if not isinstance(thing, Segmentation):
-        raise InputError(f"save: expected a Segmentation, LabelledMap or InstanceMasks, got {type(thing).__name__}")
     # a name that is an ending has none
     fitting = [each for each in FORMATS.values() if path.suffix and path.name.lower().endswith(each.ending)]
     if not fitting:
