@@ -72,23 +72,19 @@ def _ids_by_type(names: Mapping[int, str]) -> dict[str, int]:
     return {folded(name).replace(" ", "_"): category for category, name in names.items()}
 
 
-def read(
-    path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
-) -> InstanceMasks:
+def read(path: str | PathLike[str], *, image_size: tuple[int, int], names: Mapping[int, str] | None) -> InstanceMasks:
     """One rectangle for each object of a label_2 file, as `read_boxes` finds them.
 
     Args:
         path: Label file, or a detector's results in its layout.
-        image_size: (height, width) of the image in pixels, which the file does not say.
+        image_size: (height, width) of the image in pixels.
         names: Names of further category ids, for classes that are not KITTI's, or for KITTI's in the place of its own;
             0 is passed over.
 
     Raises:
-        MaskError: No image size, a class without category id, or a box that is none.
+        MaskError: A class without category id, or a box that is none.
         FileFormatError: The file is broken; see `read_kitti_objects`.
     """
-    if image_size is None:
-        raise MaskError(f"{path}: says nothing of the image's size; give its image_size=(height, width)")
     objects = read_boxes(path, names=names)
     with within(path):
         return InstanceMasks.from_boxes(

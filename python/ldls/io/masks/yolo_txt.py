@@ -36,24 +36,20 @@ def is_yolo(lines: Sequence[str]) -> bool:
     return NUMBER.fullmatch(first) is not None
 
 
-def read(
-    path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
-) -> InstanceMasks:
+def read(path: str | PathLike[str], *, image_size: tuple[int, int], names: Mapping[int, str] | None) -> InstanceMasks:
     """One mask for each line, but none for those of a class that is named background.
 
     Args:
         path: `.txt` file.
-        image_size: (height, width) of the image in pixels, which the file does not say.
+        image_size: (height, width) of the image in pixels.
         names: Name of each class by its number. Without them those of a data.yaml or classes.txt in the folder of the
             file or one of the two above it, and else COCO's 80. Names of COCO get COCO's ids, others 100 and the
             number.
 
     Raises:
-        MaskError: No image size, boxes instead of polygons, or a class without a name.
+        MaskError: Boxes instead of polygons, or a class without a name.
         CorruptFileError: A line that is none of YOLO's.
     """
-    if image_size is None:
-        raise MaskError(f"{path}: says nothing of the image's size; give its image_size=(height, width)")
     if names is None:
         names = _names_beside(Path(path)) or CONTIGUOUS_NAMES
     ids, names_of_ids = category_ids(names)
