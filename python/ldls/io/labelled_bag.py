@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.errors import LimitError, UnsupportedFormatError
-from ldls.io.labelled_points import colors, instances
+from ldls.io.labelled_points import instances, packed_colors, positions
 from ldls.io.ros.bags import open_bag
 from ldls.io.ros.messages import POINTS, Header, Topic
 from ldls.io.ros.point_cloud2 import encode
@@ -122,16 +122,11 @@ def labelled_columns(result: Segmentation) -> dict[str, NDArray[Any]]:
     categories = result.categories
     if categories.size and categories.max() > HIGHEST_CLASS:
         raise LimitError(f"class_id: category {categories.max()} is beyond the {HIGHEST_CLASS} that a byte holds")
-    colours = colors(result).astype(np.uint32)
-    packed = colours[:, 0] << 16 | colours[:, 1] << 8 | colours[:, 2]
-    columns: dict[str, NDArray[Any]] = {
-        name: result.points[:, column].astype(np.float32)
-        for column, name in enumerate(("x", "y", "z", "intensity")[: result.points.shape[1]])
-    }
+    columns: dict[str, NDArray[Any]] = {name: each.astype(np.float32) for name, each in positions(result).items()}
     columns.setdefault("intensity", np.zeros(len(categories), np.float32))
     return columns | {
         "instance_id": instances(result),
         "class_id": categories.astype(np.uint8),
         "probability": result.confidence,
-        "rgb": packed.astype(np.uint32).view(np.float32),
+        "rgb": packed_colors(result),
     }

@@ -36,6 +36,13 @@ def colors(result: Labelled) -> NDArray[np.uint8]:
     return colours
 
 
+def packed_colors(result: Labelled) -> NDArray[np.float32]:
+    """(N,) float32 whose bits are the colour 0x00RRGGBB, as the Point Cloud Library and viewers of ROS have it."""
+    red, green, blue = colors(result).astype(np.uint32).T
+    packed: NDArray[np.float32] = (red << 16 | green << 8 | blue).view(np.float32)
+    return packed
+
+
 def names(result: Segmentation) -> list[str | None]:
     """Category name of each label 0, 1, ..., and of -1 at the end; None for background and out of view."""
     return [None, *(instance.name for instance in result.instances), None]

@@ -16,7 +16,7 @@ from ldls._optional import require
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file, whole_file
-from ldls.io.labelled_points import Labelled, colors, instances, positions
+from ldls.io.labelled_points import Labelled, instances, packed_colors, positions
 from ldls.io.points.named_columns import NamedColumns
 from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
 
@@ -243,7 +243,7 @@ def write(path: Path, result: Labelled) -> None:
     """Write all points: x y z (and intensity), `label` (category id), `instance`, `confidence` and `rgb`.
 
     Of a map or a tracked result, `instance` is the track. Points out of view have label and instance 0, as the
-    background has. The colour is packed as the Point Cloud Library has it: the bits of 0x00RRGGBB as a float.
+    background has.
 
     Raises:
         ImportError: The extra `pcd` is not installed.
@@ -254,16 +254,10 @@ def write(path: Path, result: Labelled) -> None:
         "label": result.categories.astype(np.uint32),
         "instance": instances(result),
         "confidence": result.confidence,
-        "rgb": _packed(colors(result)),
+        "rgb": packed_colors(result),
     }
     cloud = pypcd4.PointCloud.from_points(
         list(columns.values()), list(columns), [column.dtype for column in columns.values()]
     )
     with whole_file(path) as file:
         cloud.save(file, pypcd4.Encoding.BINARY)
-
-
-def _packed(rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
-    red, green, blue = rgb.astype(np.uint32).T
-    packed: NDArray[np.float32] = (red << 16 | green << 8 | blue).view(np.float32)
-    return packed
