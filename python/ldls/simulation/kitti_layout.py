@@ -81,9 +81,7 @@ def write_points(path: Path, frame: SimulatedFrame) -> None:
 
 def write_picture(path: Path, image: NDArray[np.uint8]) -> None:
     """Write a PNG and its folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as file:
-        file.write(png_of(Image.fromarray(image)))
+    _write(path, png_of(Image.fromarray(image)))
 
 
 def write_masks(path: Path, masks: InstanceMasks, image_id: int) -> None:
