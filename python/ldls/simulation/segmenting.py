@@ -105,11 +105,8 @@ def _merged(found: list[_Find], errors: SegmenterErrors, rng: np.random.Generato
 
 def _meet(one: Mask, other: Mask) -> bool:
     """True where the boxes of two masks overlap or touch."""
-    spans = [
-        [(np.flatnonzero(mask.any(axis=axis))[0], np.flatnonzero(mask.any(axis=axis))[-1]) for axis in (1, 0)]
-        for mask in (one, other)
-    ]
-    return all(a[0] <= b[1] + 2 and b[0] <= a[1] + 2 for a, b in zip(*spans, strict=True))
+    pairs = zip(_window(one, 0), _window(other, 0), strict=True)
+    return all(a.start <= b.stop + 1 and b.start <= a.stop + 1 for a, b in pairs)
 
 
 def _scored(find: _Find, errors: SegmenterErrors, rng: np.random.Generator) -> _Find:
