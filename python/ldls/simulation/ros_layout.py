@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ldls.camera.extrinsic import OPTICAL_FROM_BODY
 from ldls.camera.rigid import to_quaternion
 from ldls.io.images import png_of
 from ldls.io.ros.messages import (
@@ -44,8 +45,6 @@ LATENCY_NS = 3_000_000
 """Time from the stamp of a message to its reception."""
 POINTS_TOPIC, INFO_TOPIC, IMAGE_TOPIC = "/velodyne_points", "/camera/camera_info", "/camera/image_raw"
 LIDAR_FRAME, OPTICAL_FRAME = "velodyne", "camera_optical_frame"
-OPTICAL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
-"""Axes of an optical frame (right, down, forward), as columns in those of a body (forward, left, up)."""
 
 
 def write_robot_drive(
@@ -200,10 +199,9 @@ def _camera_info(types: Any, header: Any) -> Any:  # noqa: ANN401
 
 def _static_transforms(types: Any) -> Any:  # noqa: ANN401
     """From the robot's body to the lidar, to the camera, and from the camera's body to its optical frame."""
-    lidar, camera, optical = np.eye(4), np.eye(4), np.eye(4)
+    lidar, camera, optical = np.eye(4), np.eye(4), OPTICAL_FROM_BODY.T
     lidar[2, 3] = ROBOT.height_m
     camera[:3, 3] = lidar[:3, 3] + ROBOT.cameras[0].position_m
-    optical[:3, :3] = OPTICAL
     edges = (
         ("base_link", LIDAR_FRAME, lidar),
         ("base_link", "camera_link", camera),
