@@ -37,8 +37,7 @@ class Letterbox:
     @classmethod
     def fit(cls, image_size: tuple[int, int], input_size: tuple[int, int], *, stride: int | None = None) -> Letterbox:
         """The largest fit; with a `stride`, the input shrinks to the least multiple of it that holds the image."""
-        ratio = min(input_size[0] / image_size[0], input_size[1] / image_size[1])
-        height, width = (max(round(side * ratio), 1) for side in image_size)
+        height, width = _fitted(image_size, input_size)
         spare_rows, spare_columns = input_size[0] - height, input_size[1] - width
         if stride is not None:
             spare_rows, spare_columns = spare_rows % stride, spare_columns % stride
