@@ -24,20 +24,14 @@ COLUMNS = (
 
 def object_rows(
     objects: Sequence[SegmentedObject], sources: Sequence[Sequence[tuple[int, int]]], views: Sequence[SeenView]
-) -> list[Row]:
-    """Return a row for each object with points.
+) -> Iterator[Row]:
+    """Yield a row for each object with points.
 
     Args:
         objects: The objects of a result.
         sources: View and mask of each, as `Segmentation.sources`.
         views: The views of the result.
     """
-    return list(_rows(objects, sources, views))
-
-
-def _rows(
-    objects: Sequence[SegmentedObject], sources: Sequence[Sequence[tuple[int, int]]], views: Sequence[SeenView]
-) -> Iterator[Row]:
     cameras = camera_names(views)
     for each, own in zip(objects, sources, strict=True):
         if each.centroid is None or each.box is None:

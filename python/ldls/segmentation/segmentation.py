@@ -201,7 +201,7 @@ class Segmentation:
         - `camera`: name of the first camera that shows it, and `mask_left_px`, `mask_top_px`, `mask_width_px`,
           `mask_height_px`: the smallest box around its mask there.
         """
-        return object_rows(self.objects, self.sources, self.views)
+        return list(object_rows(self.objects, self.sources, self.views))
 
     def _object(self, instance: Instance, rows: NDArray[np.int64]) -> SegmentedObject:
         xyz = self.points[rows, :3].astype(np.float64)
