@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, category_ids
@@ -49,8 +49,7 @@ def contiguous_coco_classes(first: int) -> Classes:
     return Classes(dict(enumerate(CONTIGUOUS_IDS, start=first)), COCO_NAMES)
 
 
-def named_classes(names: Mapping[int, str] | Sequence[str]) -> Classes:
+def named_classes(names: Mapping[int, str]) -> Classes:
     """Classes by their names, with the ids of `ldls.categories.category_ids`."""
-    by_class = dict(names) if isinstance(names, Mapping) else dict(enumerate(names))
-    ids, own = category_ids(by_class)
+    ids, own = category_ids(names)
     return Classes(ids, COCO_NAMES | own)
