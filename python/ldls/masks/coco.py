@@ -89,10 +89,10 @@ def parts(content: object) -> tuple[list[dict[str, Any]], dict[Any, dict[str, An
         CorruptFileError: It is neither.
     """
     if isinstance(content, list | tuple):
-        return _records("results", content), {}, {}
+        return records("results", content), {}, {}
     if not isinstance(content, Mapping) or "annotations" not in content:
         raise CorruptFileError("expected COCO's object with images, annotations and categories, or a list of results")
-    annotations = _records("annotations", content["annotations"])
+    annotations = records("annotations", content["annotations"])
     images = by_id("images", content.get("images", []), (int, str))
     return annotations, images, category_names(content)
 
@@ -113,9 +113,8 @@ def by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[
     Raises:
         CorruptFileError: It is no list of objects, an id is of none of the types, or two records have the same.
     """
-    records = _records(name, values)
     by_id: dict[Any, dict[str, Any]] = {}
-    for i, record in enumerate(records):
+    for i, record in enumerate(records(name, values)):
         key = record.get("id")
         if type(key) not in types:
             expected = " or ".join(t.__name__ for t in types)
@@ -125,7 +124,12 @@ def by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[
     return by_id
 
 
-def _records(name: str, values: object) -> list[dict[str, Any]]:
+def records(name: str, values: object) -> list[dict[str, Any]]:
+    """The `values` of that name, which are a list of objects.
+
+    Raises:
+        CorruptFileError: They are not.
+    """
     if not isinstance(values, list | tuple) or not all(isinstance(value, dict) for value in values):
         raise CorruptFileError(f"expected {name} to be a list of objects")
     return list(values)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, category_ids, class_id, folded, is_object
 from ldls.errors import CorruptFileError, MaskError, within
+from ldls.masks.coco import records
 from ldls.masks.pixels import checked_size
 
 CIRCLE_CORNERS = 64
@@ -43,7 +44,7 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
     """
     size = checked_size((content.get("imageHeight"), content.get("imageWidth")))
     parts: dict[tuple[str, object], tuple[str, list[list[float]]]] = {}
-    for i, shape in enumerate(_listed(content, "shapes")):
+    for i, shape in enumerate(records("shapes", content["shapes"])):
         label, group = str(shape.get("label")), shape.get("group_id")
         if not is_object(label):
             continue
@@ -68,7 +69,7 @@ def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None 
     """
     height, width = (content.get(f"img{side}", content.get(side.lower())) for side in ("Height", "Width"))
     labels, polygons = [], []
-    for i, each in enumerate(_listed(content, "objects")):
+    for i, each in enumerate(records("objects", content["objects"])):
         parts = str(each.get("label")).split("--")
         if each.get("deleted") or not (parts[0] in THINGS if len(parts) == 1 else parts[0] in MAPILLARY_THINGS):
             continue
@@ -78,13 +79,6 @@ def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None 
         known = (part for part in reversed(plain) if folded(part) in COCO_NAMES.values())
         labels.append(next(known, plain[-1]))
     return _arguments(checked_size((height, width)), labels, polygons, names)
-
-
-def _listed(content: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
-    listed = content[key]
-    if not isinstance(listed, list) or not all(isinstance(each, dict) for each in listed):
-        raise CorruptFileError(f"expected {key} to be a list of objects")
-    return listed
 
 
 def _arguments(
