@@ -143,25 +143,17 @@ def _pixel_labels(
     weights, mass = sparse.csr_array(shape, dtype=np.float32), np.zeros(shape[0], np.float32)
     for seen, groups in zip(result.views, depths, strict=True):
         slots = np.flatnonzero(np.isin(seen.in_view, in_graph))
-        own = _pixel_labels_of(seen, slots, groups, result)
+        own = stages.pixel_labels(
+            seen.pixels[slots],
+            seen.view.masks,
+            window=result.params.window,
+            depths=None if groups is None else groups.of_points(slots),
+            pixel_weight=result.params.pixel_weight,
+            threads=result.params.threads,
+        )
         rows = np.searchsorted(in_graph, seen.in_view[slots])
         entries = own.weights.tocoo()
         place = (rows[entries.row], np.array([0, *seen.labels])[entries.col])
         weights = weights + sparse.csr_array((entries.data, place), shape=shape)
         mass[rows] += own.mass
     return stages.PixelLabels(weights, mass)
-
-
-def _pixel_labels_of(
-    seen: SeenView, slots: NDArray[np.int64], depths: stages.DepthGroups | None, result: Segmentation
-) -> stages.PixelLabels:
-    """The pixel edges of some of the points that a view sees, at `slots` of it."""
-    params = result.params
-    return stages.pixel_labels(
-        seen.pixels[slots],
-        seen.view.masks,
-        window=params.window,
-        depths=None if depths is None else depths.of_points(slots),
-        pixel_weight=params.pixel_weight,
-        threads=params.threads,
-    )
