@@ -46,7 +46,7 @@ def read(path: Path, content: Mapping[str, Any], *, image_id: int | str | None =
     annotation = _annotation(annotations, chosen)
     file_name = annotation["file_name"]
     segments = by_id("segments_info", annotation.get("segments_info"), (int,))
-    paths = [strictly_below(folder, file_name, place=str(path)) for folder in _folders(path)]
+    paths = [strictly_below(folder, file_name, place=str(path)) for folder in (path.parent, path.with_suffix(""))]
     png = next((each for each in paths if each.exists()), paths[0])
     colours = read_image(png)
     _check_size(path, images.get(chosen, {}), png, colours.shape[:2])
@@ -97,7 +97,3 @@ def _check_size(path: Path, image: Mapping[str, Any], png: Path, size: tuple[int
             LdlsWarning,
             stacklevel=7,
         )
-
-
-def _folders(path: Path) -> tuple[Path, Path]:
-    return path.parent, path.parent / path.stem

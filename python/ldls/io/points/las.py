@@ -106,15 +106,11 @@ def _records(file: InputFile, header: Header) -> tuple[NDArray[np.int32], NDArra
 
 def _unpacked(file: InputFile, header: Header) -> tuple[NDArray[np.int32], NDArray[np.uint16]]:
     """The same, of packed points."""
-    laszip = laszip_record(_vlrs(file, header))
+    file.seek(header.header_bytes)
+    laszip = laszip_record(file.read(header.offset - header.header_bytes))
     check_chunks(file, laszip, header.offset, header.record_bytes, header.n_points)
     file.seek(0)
     return _ldls.unpack_laz(file.read(), header.offset, laszip, header.n_points)
-
-
-def _vlrs(file: InputFile, header: Header) -> bytes:
-    file.seek(header.header_bytes)
-    return file.read(header.offset - header.header_bytes)
 
 
 def _read_header(file: InputFile) -> Header:

@@ -201,7 +201,7 @@ def _parse(lines: list[Row]) -> Header:
 
 
 def _n_points(entries: dict[str, list[str]]) -> int:
-    numbers = {key: _one_number(key, words) for key, words in entries.items() if key in COUNTS}
+    numbers = {key: whole_number(key, " ".join(words)) for key, words in entries.items() if key in COUNTS}
     if not numbers.keys() & {"POINTS", "WIDTH"}:
         raise CorruptFileError(f"neither POINTS nor WIDTH in the header; found {' '.join(entries)}")
     if "WIDTH" not in numbers:
@@ -211,10 +211,6 @@ def _n_points(entries: dict[str, list[str]]) -> int:
     if points != width * height:
         raise CorruptFileError(f"POINTS {points}, WIDTH {width} x HEIGHT {height} is {width * height}")
     return points
-
-
-def _one_number(key: str, words: list[str]) -> int:
-    return whole_number(key, " ".join(words))
 
 
 def _fields(entries: dict[str, list[str]]) -> list[Field]:
