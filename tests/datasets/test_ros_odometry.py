@@ -119,7 +119,7 @@ def test_worlds_are_told_by_names_alone(tmp_path, monkeypatch):
         raise CalibrationError("a quaternion of zeros")
 
     bag = opened(written(tmp_path, {}, moving=(("odom", "base"), ("base", "arm"))), None)
-    monkeypatch.setattr("ldls.datasets.ros_transforms._matrix", refuse)
+    monkeypatch.setattr("ldls.datasets.ros_transforms.matrix_of", refuse)
     assert bag.worlds() == ["odom"]
 
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ldls.camera.rigid import from_parts, from_quaternion
-from ldls.datasets.ros_transforms import Matrix, plain
+from ldls.datasets.ros_transforms import Matrix, matrix_of, plain
 from ldls.errors import CalibrationError, PoseError, within
 from ldls.io.ros.bags import Bag
 from ldls.io.ros.messages import NANOSECONDS, ODOMETRY, Message, nanoseconds, read_header, seconds
@@ -108,14 +107,13 @@ def _way(topic: str, messages: Iterable[Message]) -> Odometry:
     return Odometry(topic, robot, Trajectory(stamps_ns / NANOSECONDS, np.array(poses)[first]))
 
 
-def _pose(message: Message) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def _pose(message: Message) -> Matrix:
     """(4, 4) from coordinates of the robot to those of the world."""
-    q, t = message.pose.pose.orientation, message.pose.pose.position
+    pose = message.pose.pose
     try:
-        rotation = from_quaternion("orientation", np.array([q.w, q.x, q.y, q.z], np.float64))
+        return matrix_of("orientation", pose.orientation, pose.position)
     except CalibrationError as error:
         raise PoseError(f"pose at {seconds(nanoseconds(message.header.stamp))} s: {error}") from None
-    return from_parts(rotation, np.array([t.x, t.y, t.z], np.float64))
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -90,7 +90,8 @@ class TransformTree:
                 if edge is None or edge.parent != parent:
                     edge = self._edges[child] = _Edge(parent, f"transforms from {parent} to {child}")
                 edge.stamps_ns.append(nanoseconds(one.header.stamp))
-                edge.transforms.append(_matrix(one.transform, f"{parent} to {child}"))
+                name, transform = f"transforms: from {parent} to {child}", one.transform
+                edge.transforms.append(matrix_of(name, transform.rotation, transform.translation))
 
     def lookup(self, target: str, source: str, stamp_ns: int) -> Matrix:
         """(4, 4) from coordinates in the frame `source` to coordinates in `target`, at the nearest times there are.
@@ -194,10 +195,9 @@ def plain(frame_id: str) -> str:
     return frame_id.removeprefix("/")
 
 
-def _matrix(message: Message, name: str) -> Matrix:
-    """(4, 4) from translation in metres and unit quaternion."""
-    q, t = message.rotation, message.translation
-    rotation = from_quaternion(f"transforms: from {name}", np.array([q.w, q.x, q.y, q.z], np.float64))
+def matrix_of(name: str, q: Message, t: Message) -> Matrix:
+    """(4, 4) of a unit quaternion and a translation in metres; errors as of `from_quaternion`."""
+    rotation = from_quaternion(name, np.array([q.w, q.x, q.y, q.z], np.float64))
     return from_parts(rotation, np.array([t.x, t.y, t.z], np.float64))
 
 
