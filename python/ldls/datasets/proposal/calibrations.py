@@ -16,7 +16,7 @@ from ldls.camera import Camera
 from ldls.camera.extrinsic import extrinsic
 from ldls.camera.fields import Fields
 from ldls.camera.rigid import inverse, rigid
-from ldls.cloud import Points
+from ldls.cloud import Points, finite_rows
 from ldls.errors import LdlsError, LimitError, SourceError
 from ldls.io import read_camera
 from ldls.io.cameras.extrinsic_file import as_extrinsic
@@ -129,8 +129,7 @@ def view_of(camera: Camera, points: Points, size: tuple[int, int]) -> tuple[bool
     """True where z of the lidar points up in the image, and the share of the points that the image sees."""
     x, y, _ = camera.T_camera_lidar[:3, 2]
     in_view, _ = project(points, camera, image_size=camera.image_size or size)
-    finite = int(np.isfinite(np.asarray(points)[:, :3]).all(axis=1).sum())
-    return bool(-y > 0.5 * np.hypot(x, y)), len(in_view) / max(finite, 1)
+    return bool(-y > 0.5 * np.hypot(x, y)), len(in_view) / max(len(finite_rows(points)), 1)
 
 
 def quoted(text: str) -> str:

@@ -33,7 +33,7 @@ def read(path: Path, *, T_camera_lidar: Extrinsic | None = None) -> Trajectory:
         for number, length in zip(lines, lengths, strict=True):
             if not abs(length - 1) <= ROTATION_LIMIT:
                 raise CorruptFileError(f"line {number}: quaternion qx qy qz qw has length {length:.6g}, expected 1")
-    rotations = [from_quaternion(str(path), np.roll(row[4:], 1)) for row in rows]
+    rotations = [from_quaternion(str(path), row[4:], "xyzw") for row in rows]
     poses = [from_parts(rotation, row[1:4]) for rotation, row in zip(rotations, rows, strict=True)]
     with within(path), np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are none
         return Trajectory(rows[:, 0], np.array(poses) @ from_lidar)
