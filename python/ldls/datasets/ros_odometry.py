@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ldls.datasets.ros_transforms import Matrix, matrix_of, plain
+from ldls.camera.rigid import Matrix
+from ldls.datasets.ros_transforms import matrix_of, plain
 from ldls.errors import CalibrationError, PoseError, within
 from ldls.io.ros.bags import Bag
 from ldls.io.ros.messages import NANOSECONDS, ODOMETRY, Message, nanoseconds, read_header, seconds

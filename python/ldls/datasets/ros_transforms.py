@@ -11,13 +11,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import from_parts, from_quaternion, inverse
+from ldls.camera.rigid import Matrix, from_parts, from_quaternion, inverse
 from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
 from ldls.io.ros.messages import NANOSECONDS, Message, nanoseconds
 from ldls.sequences import Trajectory
-
-Matrix = NDArray[np.float64]
 
 
 @dataclass

@@ -8,9 +8,8 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.segmenters.resampling import bilinear_weights, resize
+from ldls.segmenters.resampling import F32, bilinear_weights, resize
 
-F32 = NDArray[np.float32]
 GREY = 114
 FARTHEST = 1e6
 """Pixels at which boxes are cut, before anything overflows."""

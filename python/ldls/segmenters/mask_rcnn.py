@@ -18,8 +18,8 @@ from ldls.segmenters.crops import Crop, assemble
 from ldls.segmenters.onnx_graph import Signature, Value
 from ldls.segmenters.outputs import check_finite, check_scores, expect_shape
 from ldls.segmenters.pasting import padded_paste, plain_paste
+from ldls.segmenters.resampling import F32
 
-F32 = NDArray[np.float32]
 ROLES = ("boxes", "labels", "scores", "masks")
 ZOO_CELLS = 28
 ZOO_SHORT_SIDE = 800.0

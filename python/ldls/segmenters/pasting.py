@@ -6,11 +6,9 @@ Only the part of a box that lies within the image is computed.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ldls.segmenters.resampling import bilinear_weights
+from ldls.segmenters.resampling import F32, bilinear_weights
 
-F32 = NDArray[np.float32]
 MAX_SIDE = 1 << 20
 """Longer boxes, in pixels, are cut; nothing sound draws them."""
 

@@ -17,9 +17,9 @@ from ldls.segmenters.crops import Crop, assemble
 from ldls.segmenters.letterbox import Letterbox
 from ldls.segmenters.onnx_graph import Signature, Value, image_input
 from ldls.segmenters.outputs import check_finite, check_scores, expect_shape
+from ldls.segmenters.resampling import F32
 from ldls.segmenters.suppression import suppress
 
-F32 = NDArray[np.float32]
 I64 = NDArray[np.int64]
 N_COCO = 80
 MAX_INSTANCES = 300

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.simulation.raycasting import MISS, RayCaster
+from ldls.simulation.raycasting import F64, MISS, RayCaster
 from ldls.simulation.scenes import Scene
 
-F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.simulation.raycasting import MISS, RayCaster
+from ldls.simulation.raycasting import F64, MISS, RayCaster
 from ldls.simulation.rigs import MountedCamera
 from ldls.simulation.scenes import Scene
 from ldls.simulation.shapes.shape import Material, Shape
@@ -19,7 +19,6 @@ HAZE = np.array([0.78, 0.84, 0.90])
 ZENITH = np.array([0.38, 0.58, 0.86])
 REFLECTED_SKY = np.array([0.50, 0.58, 0.66])
 PANE = np.array([0.16, 0.20, 0.25])
-F64 = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

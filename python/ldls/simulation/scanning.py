@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 
 from ldls.simulation.lidars import Lidar
 from ldls.simulation.motion import Motion
-from ldls.simulation.moving_caster import MovingCaster
-from ldls.simulation.raycasting import MISS, RayCaster
+from ldls.simulation.moving_caster import I64, MovingCaster
+from ldls.simulation.raycasting import F64, MISS, RayCaster
 from ldls.simulation.scenes import Scene
 from ldls.simulation.shapes.shape import Material
 
 GLASS_PASSES = 0.9
 """Share of laser pulses that a window lets through."""
 MAX_WINDOWS = 6
-F64 = NDArray[np.float64]
-I64 = NDArray[np.int64]
 Cast = Callable[[I64, F64], tuple[F64, I64]]
 """Range and triangle that pulses (r,) meet next, each after so many metres (r,) of its way; ranges count from there."""
 
