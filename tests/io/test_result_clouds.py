@@ -9,22 +9,17 @@ import numpy as np
 import pytest
 
 import ldls
+from ldls.camera.rigid import from_parts
 from ldls.errors import PrecisionWarning
 from ldls.palette import instance_colours
 
 
 def segmented(scene, dtype=np.float32, shift=(0, 0, 0), **changes):
     points, masks, camera = scene
-    camera = replace(camera, T_camera_lidar=translation(-np.array(shift, float)))
+    camera = replace(camera, T_camera_lidar=from_parts(np.eye(3), -np.array(shift, float)))
     points = np.vstack([points, [[0, 0, -5]]]).astype(dtype) + np.array(shift, dtype)  # the last is out of view
     intensity = np.linspace(0, 1, len(points), dtype=dtype)
     return replace(ldls.segment(np.column_stack([points, intensity]), masks, camera), **changes)
-
-
-def translation(offset):
-    matrix = np.eye(4)
-    matrix[:3, 3] = offset
-    return matrix
 
 
 def renamed(result, *names):
@@ -243,7 +238,8 @@ def places(result):
     """A map of the result: a person of track 7 and a car of track 5."""
     instances = tuple(replace(i, track=track) for i, track in zip(result.instances, (7, 5), strict=True))
     drawn = ldls.LabelledMap(0.1)
-    drawn.add(ldls.Sweep(result.points, [], translation([5e5, 5.4e6, 0]), 0.0), replace(result, instances=instances))
+    sweep = ldls.Sweep(result.points, [], from_parts(np.eye(3), [5e5, 5.4e6, 0]), 0.0)
+    drawn.add(sweep, replace(result, instances=instances))
     return drawn
 
 

@@ -13,6 +13,7 @@ import pytest
 
 import ldls
 from conftest import pinhole
+from ldls.camera.rigid import from_parts
 from ldls.errors import (
     DuplicateWarning,
     ImageSizeWarning,
@@ -236,7 +237,7 @@ def test_points_without_coordinates_are_left_out_and_counted(small_scene):
 
 def test_the_origin_can_be_a_point(small_scene):
     _, masks, _ = small_scene
-    camera = pinhole(T_camera_lidar=translation([0, 0, 5]))
+    camera = pinhole(T_camera_lidar=from_parts(np.eye(3), [0, 0, 5]))
     origin = np.zeros((1, 3))
     assert ldls.segment(origin, masks, camera).labels.tolist() == [-1]
     assert ldls.segment(origin, masks, camera, keep_origin=True).labels.tolist() == [0]
@@ -319,7 +320,7 @@ def test_map_coordinates_in_double_precision_keep_their_precision(small_scene):
     points, masks, camera = small_scene
     points = np.round(points.astype(np.float64) * 1024) / 1024
     offset = np.array([500_000.0, 5_000_000.0, 100.0])
-    shifted = ldls.Camera(projection=camera.projection, T_camera_lidar=translation(-offset))
+    shifted = ldls.Camera(projection=camera.projection, T_camera_lidar=from_parts(np.eye(3), -offset))
     local = ldls.segment(points, masks, camera)
     far = ldls.segment(points + offset, masks, shifted)
     assert far.labels.tobytes() == local.labels.tobytes()
@@ -338,12 +339,6 @@ def test_single_precision_is_warned_of_once_its_steps_pass_a_centimetre(small_sc
         ldls.segment(far, masks, camera)
 
 
-def translation(offset):
-    transform = np.eye(4)
-    transform[:3, 3] = offset
-    return transform
-
-
 def test_millimetres_for_metres_are_suspected(small_scene):
     points, masks, camera = small_scene
     with pytest.warns(ScaleWarning, match="are they in metres"):
@@ -354,7 +349,7 @@ def test_millimetres_for_metres_are_suspected(small_scene):
 def test_a_translation_in_millimetres_is_suspected(small_scene):
     _, masks, camera = small_scene
     around = np.random.default_rng(3).uniform(-60, 60, (500, 3))
-    far = replace(camera, T_camera_lidar=translation([-270, 60, -80]))
+    far = replace(camera, T_camera_lidar=from_parts(np.eye(3), [-270, 60, -80]))
     with pytest.warns(ScaleWarning, match="camera 0: T_camera_lidar: the lidar is 288 m from the camera"):
         ldls.segment(around, masks, far)
     # a map whose origin is elsewhere, points of a part of it, and a camera amid them
