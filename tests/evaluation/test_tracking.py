@@ -38,7 +38,7 @@ def iou(a, b):
     return len(a & b) / len(a | b)
 
 
-def by_definition(sweeps, names, minimum):
+def by_definition(sweeps, minimum):
     """(S_assoc, id switches, object frames, false positives), with every tube and instance as a set of points."""
     true_tubes, predicted_tubes, histories = {}, {}, {}
     frames = invented = 0
@@ -79,7 +79,7 @@ def test_it_is_the_definition_on_500_random_drives():
             sweeps.append((replace(noisy, instances=numbers[noisy.instances]), truth))
         names, minimum = truth.names[1:], int(generator.integers(0, 5))
         scores = scored(sweeps, names, minimum_points=minimum)
-        s_assoc, switches, frames, invented = by_definition(sweeps, names, minimum)
+        s_assoc, switches, frames, invented = by_definition(sweeps, minimum)
         assert scores.s_assoc == (None if s_assoc is None else pytest.approx(s_assoc))
         assert (scores.id_switches, scores.object_frames, scores.total.counts.fp) == (switches, frames, invented)
         if frames:

@@ -18,7 +18,7 @@ LOW, HIGH = [115, 95, 175, 115], [115, 60, 175, 85]
 """Boxes around slabs of points below the camera and above it, in the image."""
 
 
-def street(T_camera_lidar, shift_m: float = 0.0) -> ldls.Segmentation:
+def street(T_camera_lidar) -> ldls.Segmentation:
     """A box 12 m ahead and 3 m to the left on a ground, in the lidar's axes."""
     generator = np.random.default_rng(3)
     ground = generator.uniform([-8, 1.5, 3], [8, 1.6, 25], (3000, 3))

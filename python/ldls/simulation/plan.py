@@ -47,9 +47,7 @@ class Plan:
         """Put an object there that moves along its heading; False where there is no room."""
         return self._put(category, {category: shape}, x_m, y_m, yaw, speed_m_s)
 
-    def put_cyclist(
-        self, body: Shape, bicycle: Shape, x_m: float, y_m: float, *, yaw: float = 0.0, speed_m_s: float = 0.0
-    ) -> bool:
+    def put_cyclist(self, body: Shape, bicycle: Shape, x_m: float, y_m: float, *, yaw: float, speed_m_s: float) -> bool:
         """Put a person on a bicycle there, who moves along the heading; False where there is no room."""
         return self._put(CYCLIST, {PERSON: body, BICYCLE: bicycle}, x_m, y_m, yaw, speed_m_s)
 

@@ -63,7 +63,7 @@ def make_scene(seed: int = 0, *, kind: str = "street") -> Scene:
     return build(make_plan(seed, kind=kind))
 
 
-def make_plan(seed: int = 0, *, kind: str = "street") -> Plan:
+def make_plan(seed: int, *, kind: str) -> Plan:
     """The plan of the scene of a seed.
 
     Raises:

@@ -32,7 +32,7 @@ def street(rng: np.random.Generator) -> Plan:
     right, left = -rng.uniform(3.9, 4.6), rng.uniform(6.6, 7.8)
     across = Profile(right, left, right - rng.uniform(4.0, 6.5), left + rng.uniform(4.0, 6.5))
     plan = Plan(_ground(across, rng))
-    _traffic(plan, across, rng)
+    _traffic(plan, rng)
     _parked(plan, across, rng)
     for side, kerb, front in ((-1, right, across.right_front_m), (1, left, across.left_front_m)):
         _roadside(plan, side, kerb, rng)
@@ -56,7 +56,7 @@ def _ground(across: Profile, rng: np.random.Generator) -> Ground:
     return Ground(strips, slope, float(rng.uniform(0, 0.1)), float(rng.uniform(0, 6.28)))
 
 
-def _traffic(plan: Plan, across: Profile, rng: np.random.Generator) -> None:
+def _traffic(plan: Plan, rng: np.random.Generator) -> None:
     """Vehicles ahead in the sensor's lane and in the one that comes towards it."""
     kinds = (
         (CAR, vehicles.car),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls._optional import require
+from ldls.simulation.shapes.paints import METAL, RUBBER
 from ldls.simulation.shapes.shape import Colour, Material, Shape, join, painted
 
 Triangles = tuple[NDArray[np.float64], NDArray[np.int64]]
@@ -71,12 +72,12 @@ def ring(centre_m: ArrayLike, radius_m: float, thickness_m: float, colour: Colou
     return painted(upright + np.asarray(centre_m), faces[:, ::-1], colour)
 
 
-def wheel(x_m: float, y_m: float, radius_m: float, width_m: float, hub: Colour) -> Shape:
+def wheel(x_m: float, y_m: float, radius_m: float, width_m: float) -> Shape:
     """A tyre and its hub, standing on the ground, its axle along y."""
     half = width_m / 2
-    tyre = tube((x_m, y_m - half, radius_m), (x_m, y_m + half, radius_m), radius_m, (0.06, 0.06, 0.07), sides=20)
+    tyre = tube((x_m, y_m - half, radius_m), (x_m, y_m + half, radius_m), radius_m, RUBBER, sides=20)
     rim = half + 0.008
-    disc = tube((x_m, y_m - rim, radius_m), (x_m, y_m + rim, radius_m), 0.6 * radius_m, hub, sides=14)
+    disc = tube((x_m, y_m - rim, radius_m), (x_m, y_m + rim, radius_m), 0.6 * radius_m, METAL, sides=14)
     return join([tyre, disc])
 
 

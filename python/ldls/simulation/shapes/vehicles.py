@@ -73,12 +73,12 @@ def _lamps(nose: float, tail: float, width: float, z: float) -> list[Shape]:
     side_m = 0.36 * width
     front = [box((nose - 0.1, s * side_m, z - 0.04), (0.16, 0.26, 0.12), paints.LAMP) for s in (-1, 1)]
     rear = [box((tail + 0.06, s * (side_m + 0.04), z), (0.1, 0.2, 0.16), paints.TAIL_LAMP) for s in (-1, 1)]
-    plates = [box((x, 0, 0.5), (0.03, 0.5, 0.11), paints.PLATE, Material.REFLECTOR) for x in (nose - 0.0, tail + 0.0)]
+    plates = [box((x, 0, 0.5), (0.03, 0.5, 0.11), paints.PLATE, Material.REFLECTOR) for x in (nose, tail)]
     return [*front, *rear, *plates]
 
 
 def _wheels(axles_m: tuple[float, ...], track_m: float, radius_m: float, width_m: float) -> list[Shape]:
-    return [wheel(x, side * track_m, radius_m, width_m, paints.METAL) for x in axles_m for side in (-1, 1)]
+    return [wheel(x, side * track_m, radius_m, width_m) for x in axles_m for side in (-1, 1)]
 
 
 def bus(rng: np.random.Generator) -> Shape:
