@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.sequences.track import Floats, Footprint, Sighting, Track, brought, gap, squared_distances
+from ldls.sequences.step import Floats
+from ldls.sequences.track import Footprint, Sighting, Track, brought, gap, squared_distances
 
 NEAR_M = 2.0
 """Distance up to which an object may be a track."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion, transformed
 from ldls.sequences.grid import cell_keys
+from ldls.sequences.step import Floats
 
 CELL_M = 1.0
 STANDING_M = 0.3
@@ -23,8 +24,6 @@ NOISE_M = 0.03
 ROUNDS = 8
 LARGEST_M, LARGEST_DEG = 0.2, 2.0
 """No error of a pose from one sweep to the next is as large; such ground is another."""
-
-Floats = NDArray[np.float64]
 
 
 def split_standing(xyz: Floats) -> tuple[Floats, Floats]:

@@ -27,6 +27,8 @@ from ldls.checks import checked
 from ldls.errors import InputError, LimitError, ParameterError
 from ldls.segmentation import Segmentation
 from ldls.sequences.grid import cell_keys
+from ldls.sequences.moment import Ints
+from ldls.sequences.step import Floats
 from ldls.sequences.sweeps import Sweep, check_points
 
 MOVED_M = 0.4
@@ -42,9 +44,6 @@ MOST_ROWS = 20_000_000
 """Most rows, one for each voxel and object in it: some 1 GB, and thrice that for a moment while sweeps are added."""
 ROWS_AT_ONCE = 1_000_000
 """Rows of new sweeps are kept until there are as many, or a quarter of those of the map, and then added together."""
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 class _Rows(NamedTuple):

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import transformed
 from ldls.segmentation import Segmentation
+from ldls.sequences.step import Floats
 from ldls.sequences.sweeps import Sweep
-from ldls.sequences.track import Floats
 
 Ints = NDArray[np.int64]
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.sequences.moment import Boxes, Ints, Moment
-from ldls.sequences.track import MEMORY_S, Floats, Track
+from ldls.sequences.step import Floats
+from ldls.sequences.track import MEMORY_S, Track
 from ldls.sequences.trajectory import SAME_S
 
 ENOUGH_IMAGES = 5

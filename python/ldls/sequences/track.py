@@ -9,10 +9,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.segmentation import Instance
+from ldls.sequences.step import Floats
 from ldls.sequences.trajectory import SAME_S
 
 MEMORY_S = 2.0
@@ -26,7 +26,6 @@ MOVES = 0.5
 standing object moves too, but its points stay where they are. And share of the variance of the middles: they jump where
 another part becomes visible, and lie on no line."""
 
-Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """Least x and y, and largest, in metres."""
 

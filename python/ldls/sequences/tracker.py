@@ -24,8 +24,9 @@ from ldls.segmentation.segmentation import by_name
 from ldls.sequences.comparison import compared
 from ldls.sequences.moment import Ints, Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
+from ldls.sequences.step import Floats
 from ldls.sequences.sweeps import Sweep, check_order, check_points
-from ldls.sequences.track import MEMORY_S, Floats, Footprint, Sighting, Track
+from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track
 from ldls.sequences.trajectory import SAME_S
 
 LONGEST_GAP_S = 10.0
