@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.checks import checked
-from ldls.evaluation.classes import ClassSet
+from ldls.evaluation.classes import CLASS_SHIFT, ClassSet, object_codes
 from ldls.evaluation.on_masks import overlaps_with_masks, points_on_masks
 from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
@@ -32,12 +32,10 @@ def bound_labels(result: Segmentation, truth: Labeling, classes: ClassSet) -> ND
     labels = np.full(len(true), -1, np.int32)
     labels[result.in_view] = 0
     rows = np.flatnonzero((labels == 0) & ~true.ignored)
-    # the pair (class, instance) names an object; 0 is none
-    keys = np.where(true.instances[rows] > 0, true.classes[rows].astype(np.int64) << 32 | true.instances[rows], 0)
-    names, objects = np.unique(keys, return_inverse=True)
+    codes, objects = np.unique(object_codes(true.classes[rows], true.instances[rows]), return_inverse=True)
     iou = overlaps_with_masks(objects, points_on_masks(result)[rows])
     of_masks = np.array([classes.index(instance.name) for instance in result.instances], np.int64)
-    iou[(names[:, None] >> 32 != of_masks) | (names[:, None] == 0)] = 0
+    iou[(codes[:, None] >> CLASS_SHIFT != of_masks) | (codes[:, None] < 0)] = 0
     order = np.argsort(-iou, axis=None, kind="stable")[: np.count_nonzero(iou)]
     for k, m in zip(*np.unravel_index(order, iou.shape), strict=True):
         if iou[k, m] > 0:

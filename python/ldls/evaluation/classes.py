@@ -21,6 +21,7 @@ from ldls.io.labels.semantic_kitti import SEMANTIC_KITTI
 from ldls.io.labels.squeezeseg import SQUEEZESEG
 from ldls.labeling import BACKGROUND, Labeling
 
+CLASS_SHIFT = 32
 SITTING = "Person_sitting"
 LEFT_OUT: tuple[str, ...] = ("Van", "Cyclist", "Misc", "DontCare")
 """KITTI's classes that look so much like a scored one that neither finding nor missing them is an error."""
@@ -201,11 +202,16 @@ class ClassSet:
             )
 
 
+def object_codes(classes: NDArray[np.int32], instances: NDArray[np.int32]) -> NDArray[np.int64]:
+    """One number for class and instance of each point's object, the class from `CLASS_SHIFT` on; -1 for none."""
+    return np.where((classes > 0) & (instances > 0), classes.astype(np.int64) << CLASS_SHIFT | instances, -1)
+
+
 def _distinct_instances(labeling: Labeling, classes: NDArray[np.int32]) -> NDArray[np.int32]:
     """Instances of scored classes, numbered anew where two classes that become one share a number."""
     instances = np.where(classes > 0, labeling.instances, 0).astype(np.int32)
     rows = np.flatnonzero(instances)
-    own, mapped = (k[rows].astype(np.int64) << 32 | labeling.instances[rows] for k in (labeling.classes, classes))
+    own, mapped = (object_codes(k[rows], labeling.instances[rows]) for k in (labeling.classes, classes))
     before, numbers = np.unique(own, return_inverse=True)
     if len(before) > len(np.unique(mapped)):
         instances[rows] = numbers.reshape(-1) + 1

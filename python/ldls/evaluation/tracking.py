@@ -24,10 +24,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ldls.checks import checked, whole_number
 from ldls.errors import ParameterError
+from ldls.evaluation.classes import CLASS_SHIFT, object_codes
 from ldls.evaluation.counts import Counts
 from ldls.evaluation.instance import instance_overlaps, overlaps
 from ldls.evaluation.panoptic import MATCH_ABOVE
@@ -187,7 +187,7 @@ class TrackingScores:
         rows = np.flatnonzero(~(truth.ignored | prediction.ignored))
         instances = prediction.instances[rows]
         numbers = np.where(instances > 0, instances, -1)
-        overlap = overlaps(numbers, _codes(truth, rows))
+        overlap = overlaps(numbers, object_codes(truth.classes[rows], truth.instances[rows]))
         counts = overlap.truth_points >= self.minimum_points
         codes, numbers = overlap.truth_ids.tolist(), overlap.prediction_ids.tolist()
         self._predicted.update(dict(zip(numbers, overlap.prediction_points.tolist(), strict=True)))
@@ -218,13 +218,3 @@ class TrackingScores:
             if code >> CLASS_SHIFT == k
         )
         return TrackingQuality(sum(code >> CLASS_SHIFT == k for code in self._true), float(total))
-
-
-CLASS_SHIFT = 32
-
-
-def _codes(truth: Labeling, rows: NDArray[np.intp]) -> NDArray[np.int64]:
-    """One number for class and number of each point's object; -1 for none."""
-    codes = truth.classes[rows].astype(np.int64) << CLASS_SHIFT | truth.instances[rows]
-    named = (truth.classes[rows] > 0) & (truth.instances[rows] > 0)
-    return np.where(named, codes, -1)
