@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ldls.camera import Camera
 from ldls.checks.values import number_of
 from ldls.errors import CalibrationError, ParameterError, within
-from ldls.io.files import open_file
+from ldls.io.files import read_lines
 
 MAX_BYTES = 1 << 20
 OBJECT_ARCHIVE = "data_object_calib"
@@ -131,10 +131,8 @@ def _read_matrices(path: Path, sizes: Mapping[str, int], spellings: Mapping[str,
     Raises:
         CalibrationError: A key is doubled, or a line does not hold the numbers it should.
     """
-    with open_file(path, "calibration", limit=MAX_BYTES) as file:
-        lines = file.text().splitlines()
     matrices: Matrices = {}
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_lines(path, "calibration", limit=MAX_BYTES), start=1):
         words = line.partition("#")[0].split()
         key = spellings.get(words[0].rstrip(":"), words[0].rstrip(":")) if words else ""
         if key not in sizes:
