@@ -6,7 +6,6 @@ import re
 import socket
 import subprocess
 import sys
-import time
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from PIL import Image
 from rerun.error_utils import RerunWarning
 
 import ldls
+from batch import runs
 from conftest import pinhole
 from ldls import stages
 from ldls.explaining import rebuild
@@ -556,22 +556,15 @@ def test_what_listens_for_viewers_gets_all(tmp_path, no_display, result):
     command = [program, "--save", path, "--port", str(viewer.PORT)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as listener:
         try:
-            wait_for(viewer.is_open)
+            runs.wait_for(viewer.is_open)
             with open_recording("spawn") as made:
                 made.add(result)
-            wait_for(lambda: (rrd := received(path)) and LAST_LOGGED in rrd.entities)
+            runs.wait_for(lambda: (rrd := received(path)) and LAST_LOGGED in rrd.entities)
         finally:
             listener.terminate()
 
 
 LAST_LOGGED = "world/statistics/milliseconds/components"
-
-
-def wait_for(condition, seconds=300):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it takes too long"
-        time.sleep(0.1)
 
 
 def received(path):
