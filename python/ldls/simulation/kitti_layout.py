@@ -28,7 +28,7 @@ from ldls.errors import ParameterError
 from ldls.io.files import read_lines, whole_file
 from ldls.io.images import png_of
 from ldls.io.labels import write_annotations
-from ldls.io.labels.kitti_objects import in_camera_frame
+from ldls.io.labels.kitti_objects import in_camera_frame, wrapped
 from ldls.masks import InstanceMasks
 from ldls.simulation.scene_object import KITTI_TYPES, SceneObject
 from ldls.simulation.simulated_frame import SimulatedFrame, SimulatedImage
@@ -159,7 +159,7 @@ def _row(thing: SceneObject, camera: Camera, visible: float) -> str:
     heading = np.array([np.cos(thing.yaw), np.sin(thing.yaw), 0.0])
     ahead = camera.T_camera_lidar[:3, :3] @ heading
     turn = float(np.arctan2(-ahead[2], ahead[0]))
-    alpha = _wrapped(turn - float(np.arctan2(x, z)))
+    alpha = wrapped(turn - float(np.arctan2(x, z)))
     box, truncated = _image_box(thing, camera)
     occluded = 0 if visible >= 0.7 else 1 if visible >= 0.35 else 2
     size = (thing.height_m, thing.width_m, thing.length_m)
@@ -179,7 +179,3 @@ def _image_box(thing: SceneObject, camera: Camera) -> tuple[tuple[float, float, 
     share = float(np.prod(cut_high - cut_low) / max(float(np.prod(high - low)), 1e-9))
     box = (float(cut_low[0]), float(cut_low[1]), float(cut_high[0]), float(cut_high[1]))
     return box, float(np.clip(1 - share, 0, 1))
-
-
-def _wrapped(angle: float) -> float:
-    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -198,7 +198,7 @@ def _from_result(result: Segmentation, label: int) -> KittiObject:
         box,
         # any other name stays, with `_` for blanks, which separate fields
         type=own_name(instance.name, KITTI, {}) or "_".join(instance.name.split()) or "Misc",
-        alpha=_wrapped(box.rotation_y - math.atan2(x, z)),
+        alpha=wrapped(box.rotation_y - math.atan2(x, z)),
         bbox=bbox,
         score=float(instance.score),
     )
@@ -218,7 +218,7 @@ def _upright_box(points_camera: NDArray[np.float64]) -> KittiObject:
         bbox=(0, 0, 0, 0),
         dimensions=(0, 0, 0),
         location=(round(-left, DECIMALS), _above(-bottom), round(forward, DECIMALS)),
-        rotation_y=round(_wrapped(-box.yaw - math.pi / 2), DECIMALS),
+        rotation_y=round(wrapped(-box.yaw - math.pi / 2), DECIMALS),
     )
     along, up_from_bottom, across = placed.in_box_frame(points_camera).T
     height, width, length = up_from_bottom.max(), 2 * np.abs(across).max(), 2 * np.abs(along).max()
@@ -231,7 +231,7 @@ def _above(number: float) -> float:
     return (math.floor(number * steps) + 1) / steps
 
 
-def _wrapped(angle: float) -> float:
+def wrapped(angle: float) -> float:
     """The angle from -pi to pi."""
     return math.remainder(angle, 2 * math.pi)
 
