@@ -129,3 +129,11 @@ def pinhole(focal_px=100.0, center=(40.0, 30.0), **options):
     u, v = center
     matrix = [[focal_px, 0, u, 0], [0, focal_px, v, 0], [0, 0, 1, 0]]
     return ldls.Camera(projection=matrix, **options)
+
+
+def moved(x, y=0.0, z=0.0, yaw=0.0):
+    """A pose there, turned by `yaw` about z."""
+    pose = np.eye(4)
+    pose[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    pose[:3, 3] = x, y, z
+    return pose

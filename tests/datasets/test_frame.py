@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ldls
+from conftest import moved
 from datasets import layouts
 from ldls.datasets import CameraImage, Frame
 
@@ -12,11 +13,7 @@ CAMERA = ldls.Camera(projection=layouts.K, T_camera_lidar=layouts.T, image_size=
 
 def pose(seconds):
     """5 m/s ahead, and 10 degrees a second to the left."""
-    turn = np.radians(10 * seconds)
-    made = np.eye(4)
-    made[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
-    made[0, 3] = 5 * seconds
-    return made
+    return moved(5 * seconds, yaw=np.radians(10 * seconds))
 
 
 STAMPS = 20 + 0.1 * np.arange(5)

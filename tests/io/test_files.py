@@ -156,23 +156,23 @@ def test_a_name_that_is_too_long_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_folders_are_synced_and_swept_where_none_can_be_opened(tmp_path, monkeypatch):
+@pytest.fixture
+def no_folder_opens(monkeypatch):
     """As on Windows, where opening a folder is not permitted."""
 
     def refuse(path, flags):
         raise PermissionError(errno.EACCES, "Permission denied", str(path))
 
-    (tmp_path / f".0123{UNFINISHED}").touch()
     monkeypatch.setattr(os, "open", refuse)
+
+
+def test_folders_are_synced_and_swept_where_none_can_be_opened(tmp_path, no_folder_opens):
+    (tmp_path / f".0123{UNFINISHED}").write_bytes(b"")
     sync_folder(tmp_path)
     assert sweep(tmp_path) == 1
 
 
-def test_folders_are_refused_where_none_can_be_opened(tmp_path, monkeypatch):
-    def refuse(path, flags):
-        raise PermissionError(errno.EACCES, "Permission denied", str(path))
-
-    monkeypatch.setattr(os, "open", refuse)
+def test_folders_are_refused_where_none_can_be_opened(tmp_path, no_folder_opens):
     with pytest.raises(ldls.FileFormatError, match="got a folder"), open_file(tmp_path, "file"):
         pass
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ldls
-from conftest import pinhole
+from conftest import moved, pinhole
 from ldls.sequences import labelled_map
 
 CAMERA, MASKS = pinhole(), ldls.InstanceMasks.from_boxes([], (60, 80))
@@ -34,13 +34,6 @@ def added(places, points, labels, confidence=None, pose=None, objects=OBJECTS, s
     )
     places.add(ldls.Sweep(points, [], np.eye(4) if pose is None else pose, stamp), result)
     return places
-
-
-def moved(x, y=0.0, z=0.0, yaw=0.0):
-    pose = np.eye(4)
-    pose[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
-    pose[:3, 3] = x, y, z
-    return pose
 
 
 def drive(seed, n_sweeps=5):

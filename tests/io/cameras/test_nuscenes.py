@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ldls
+from conftest import moved
 
 RECORDS = ("calibrated_camera", "ego_pose_camera", "calibrated_lidar", "ego_pose_lidar")
 
@@ -26,13 +27,6 @@ def record(matrix, **more):
     return {"rotation": quaternion(matrix[:3, :3]), "translation": matrix[:3, 3].tolist(), **more}
 
 
-def pose(yaw, x, y, z=0.0):
-    matrix = np.eye(4)
-    matrix[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
-    matrix[:3, 3] = x, y, z
-    return matrix
-
-
 def records(to_camera, lidar_to_ego, intrinsics, start, end):
     """Records of a car that stands at `start` for the sweep and at `end` for the image."""
     camera_to_ego = np.linalg.inv(end) @ start @ lidar_to_ego @ np.linalg.inv(to_camera)
@@ -49,10 +43,10 @@ def sample():
     to_camera = np.array([[0, -1, 0, 0.1], [0, 0, -1, -0.2], [1, 0, 0, -0.3], [0, 0, 0, 1]])
     return records(
         to_camera,
-        pose(-1.57, 0.94, 0, 1.84),
+        moved(0.94, 0, 1.84, yaw=-1.57),
         [[1266.4, 0, 816.3], [0, 1266.4, 491.5], [0, 0, 1]],
-        pose(-1.9, 411.3, 1180.9),
-        pose(-1.89, 411.4, 1181.2),
+        moved(411.3, 1180.9, yaw=-1.9),
+        moved(411.4, 1181.2, yaw=-1.89),
     )
 
 
@@ -65,8 +59,8 @@ def test_the_cameras_of_a_real_frame(data_folder, name):
         expected,
         np.array(frame["lidar"]["lidar_to_ego"]),
         found["intrinsics"],
-        pose(-1.9, 411, 1181),
-        pose(-1.88, 412, 1180),
+        moved(411, 1181, yaw=-1.9),
+        moved(412, 1180, yaw=-1.88),
     )
     camera = ldls.Camera.from_nuscenes(*(made[key] for key in RECORDS), image_size=(900, 1600))
     np.testing.assert_allclose(camera.T_camera_lidar, expected, rtol=0, atol=1e-6)
@@ -87,7 +81,7 @@ def test_a_quaternion_is_w_x_y_z():
     turn = {"rotation": [np.cos(0.5), 0, 0, np.sin(0.5)], "translation": [0, 0, 0]}
     still = {"rotation": [1, 0, 0, 0], "translation": [0, 0, 0]}
     camera = ldls.Camera.from_nuscenes(still | {"camera_intrinsic": np.eye(3).tolist()}, still, turn, still)
-    np.testing.assert_allclose(camera.T_camera_lidar, pose(1, 0, 0), atol=1e-15)
+    np.testing.assert_allclose(camera.T_camera_lidar, moved(0, 0, yaw=1), atol=1e-15)
 
 
 @pytest.mark.parametrize(
