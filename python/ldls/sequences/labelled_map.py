@@ -254,25 +254,13 @@ def _voted(rows: _Rows, names: NDArray[np.int32], origin: Floats) -> _Voxels:
 
 def _merged(parts: Sequence[_Rows]) -> _Rows:
     """The rows of all parts, those of the same voxel and object added up in their order."""
-    all_rows = _Rows(
-        np.concatenate([part.voxels for part in parts]),
-        np.concatenate([part.objects for part in parts]),
-        np.concatenate([part.counts for part in parts]),
-        np.concatenate([part.sums for part in parts]),
-        np.concatenate([part.confidence for part in parts]),
-    )
+    all_rows = _Rows(*map(np.concatenate, zip(*parts, strict=True)))
     if not len(all_rows.voxels):
         return all_rows
     order = np.lexsort((all_rows.objects, all_rows.voxels))
     voxels, objects = all_rows.voxels[order], all_rows.objects[order]
     starts = np.flatnonzero((np.diff(voxels, prepend=-1) != 0) | (np.diff(objects, prepend=-1) != 0))
-    return _Rows(
-        voxels[starts],
-        objects[starts],
-        np.add.reduceat(all_rows.counts[order], starts),
-        np.add.reduceat(all_rows.sums[order], starts),
-        np.add.reduceat(all_rows.confidence[order], starts),
-    )
+    return _Rows(voxels[starts], objects[starts], *(np.add.reduceat(column[order], starts) for column in all_rows[2:]))
 
 
 def _no_rows() -> _Rows:
