@@ -12,10 +12,9 @@ from ldls.camera.rigid import inverse
 from ldls.datasets import odometry_of, open_source
 from ldls.simulation import LIDARS, Drive, SensorErrors, drive_folder, drive_frame, robot_drive, write_drive
 from ldls.simulation.drives import ROBOT_SPEED_M_S, drive_poses, poses_after
-from ldls.simulation.motion import Motion
 from ldls.simulation.moving_caster import MovingCaster
 from ldls.simulation.raycasting import RayCaster
-from ldls.simulation.scanning import scan_moving
+from ldls.simulation.scanning import Motion, scan_moving
 from ldls.simulation.scene_object import CAR, SceneObject
 from ldls.simulation.scenes import Scene, make_scene
 from ldls.simulation.shapes.primitives import box

@@ -20,9 +20,9 @@ from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.ground import Ground
 from ldls.simulation.lidars import VLP_16, Lidar
-from ldls.simulation.motion import Motion
 from ldls.simulation.plan import Plan
 from ldls.simulation.rigs import ROBOT_LENS, MountedCamera, Rig, make_rig
+from ldls.simulation.scanning import Motion
 from ldls.simulation.scene_object import SceneObject
 from ldls.simulation.scenes import Scene, build, make_plan, make_scene
 from ldls.simulation.simulated_frame import SimulatedFrame, take_frame

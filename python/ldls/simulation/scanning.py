@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.simulation.lidars import Lidar
-from ldls.simulation.motion import Motion
 from ldls.simulation.moving_caster import I64, MovingCaster
 from ldls.simulation.raycasting import F64, MISS, RayCaster
 from ldls.simulation.scenes import Scene
@@ -37,6 +36,21 @@ class Sweep:
     instances: NDArray[np.int32]
     rings: NDArray[np.int32]
     times: F64 | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Where a rig and M objects are at each of the n firings of a turn, as seen from the rig at the stamp of the sweep.
+
+    Attributes:
+        times: (n,) seconds since the stamp, negative before it.
+        rig: (n, 4, 4) transform from the ground below the rig at each firing to that below it at the stamp.
+        ways_m: (M, n, 3) way of each object since the stamp, in metres.
+    """
+
+    times: F64
+    rig: F64
+    ways_m: F64
 
 
 def scan(scene: Scene, caster: RayCaster, lidar: Lidar, height_m: float, rng: np.random.Generator) -> Sweep:

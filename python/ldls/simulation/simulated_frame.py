@@ -12,11 +12,10 @@ from ldls.datasets.frame import CameraImage, Frame
 from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
-from ldls.simulation.motion import Motion
 from ldls.simulation.photograph import PixelTruth, photograph
 from ldls.simulation.raycasting import RayCaster
 from ldls.simulation.rigs import Rig, make_rig
-from ldls.simulation.scanning import scan, scan_moving
+from ldls.simulation.scanning import Motion, scan, scan_moving
 from ldls.simulation.scene_object import CLASS_NAMES, SceneObject
 from ldls.simulation.scenes import Scene, make_scene
 from ldls.simulation.segmenting import segmented, true_masks
