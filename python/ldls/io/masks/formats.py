@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ldls.checks import checked
 from ldls.errors import UnsupportedFormatError, within
-from ldls.io.masks import coco_json, instance_png, json_file, npz, numpy_stack, png_folder, text
+from ldls.io.masks import instance_png, json_file, npz, numpy_stack, png_folder, text
 from ldls.io.options import check_options
 from ldls.masks import InstanceMasks
 from ldls.masks.pixels import check_same_size, checked_size
@@ -25,7 +25,7 @@ READERS: dict[str, Callable[..., InstanceMasks]] = {
 }
 
 WRITERS: dict[str, Callable[..., None]] = {
-    ".json": coco_json.write,
+    ".json": json_file.write,
     ".png": instance_png.write,
     ".npz": npz.write,
     ".npy": numpy_stack.write,

@@ -8,10 +8,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ldls.io.files import open_file
+from ldls.checks import as_python
+from ldls.io.files import open_file, whole_file
 from ldls.io.masks import panoptic_png
-from ldls.io.masks.coco_json import MAX_FILE_BYTES
 from ldls.masks import InstanceMasks, adapters, coco, labelled_polygons
+
+MAX_FILE_BYTES = 1 << 30
+"""Larger files hold whole data sets; parsed, they take many times their size in memory."""
 
 
 def read(
@@ -37,6 +40,29 @@ def read(
     with open_file(path, "JSON file", limit=MAX_FILE_BYTES) as file:
         content = json.loads(file.text(), parse_constant=refuse_constant)
         return parse(content, Path(path), image_id=image_id, image_size=image_size, names=names)
+
+
+def write(
+    path: str | PathLike[str],
+    masks: InstanceMasks,
+    *,
+    image_id: int = 1,
+    file_name: str | None = None,
+    results: bool = False,
+) -> None:
+    """Write COCO's: a data set of one image, or a bare list of results.
+
+    Args:
+        path: `.json` file.
+        masks: Masks.
+        image_id: Id of the image.
+        file_name: Name of the image's file; without one there is none in the data set.
+        results: Whether to write the bare list of results, which has no names and, without masks, no image size.
+    """
+    own = coco.results(masks, masks.image_size, as_python(image_id))
+    content = own if results else masks.to_coco(image_id=image_id, file_name=file_name)
+    with whole_file(path) as file:
+        file.write(json.dumps(content, separators=(",", ":")).encode())
 
 
 def parse(
