@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ldls.errors import CorruptFileError, InputError, MaskError, UnsupportedFormatError, some, within
-from ldls.io.files import open_file, parsing
+from ldls.io.files import MAX_TEXT_BYTES, open_file, parsing
 from ldls.io.masks import json_file
 from ldls.io.masks.image_name import ImageName
 from ldls.masks import InstanceMasks
@@ -53,7 +53,7 @@ class MaskDataSet:
         self._head: dict[str, Any] = {}
         self._starts: defaultdict[int | str, list[int]] = defaultdict(list)
         self.names: dict[int | str, str] = {}
-        with open_file(self.path, "JSON file", limit=json_file.MAX_FILE_BYTES) as file:
+        with open_file(self.path, "JSON file", limit=MAX_TEXT_BYTES) as file:
             content = file.read()
             self.sha256 = hashlib.sha256(content).hexdigest()
             self._text = content.decode("utf-8-sig")

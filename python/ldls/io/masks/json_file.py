@@ -9,12 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ldls.checks import as_python
-from ldls.io.files import open_file, whole_file
+from ldls.io.files import MAX_TEXT_BYTES, open_file, whole_file
 from ldls.io.masks import panoptic_png
 from ldls.masks import InstanceMasks, adapters, coco, labelled_polygons
-
-MAX_FILE_BYTES = 1 << 30
-"""Larger files hold whole data sets; parsed, they take many times their size in memory."""
 
 
 def read(
@@ -37,7 +34,7 @@ def read(
         CorruptFileError: The file is not JSON, or of none of these.
         LimitError: The file is too large.
     """
-    with open_file(path, "JSON file", limit=MAX_FILE_BYTES) as file:
+    with open_file(path, "JSON file", limit=MAX_TEXT_BYTES) as file:
         content = json.loads(file.text(), parse_constant=refuse_constant)
         return parse(content, Path(path), image_id=image_id, image_size=image_size, names=names)
 
