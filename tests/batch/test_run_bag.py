@@ -240,8 +240,54 @@ def test_a_bag_of_labels_that_a_run_of_other_formats_replaces_is_removed(tmp_pat
     command(bag, out, *of_run, "--formats", "bag")
     assert "warning" not in command(bag, out, *of_run, "--formats", "npz").output
     outcome = command(bag, out, *of_run, "--formats", "npz", "--frames", "1:")
-    assert "removed labelled.bag (--formats bag makes it again)" in " ".join(outcome.output.split())
+    assert "labelled.bag: labels or tracks are others than before; removed" in " ".join(outcome.output.split())
     assert not (out / "labelled.bag").exists()
+
+
+def test_a_bag_of_other_tracks_is_removed_before_there_are_new_ones(tmp_path, monkeypatch):
+    bag, out = recorded(tmp_path, "mcap", moving=(("odom", "base"),)), tmp_path / "out"
+    track = ("--option", "world=odom", "--track")
+    command(bag, out, *track, "--formats", "npz,bag", "--frames", "1:")
+    outcome = command(bag, out, *track, "--formats", "npz")
+    assert "labels or tracks are others than before; removed" in " ".join(outcome.output.split())
+    assert not (out / "labelled").exists()
+    command(bag, out, *track, "--formats", "npz,bag")
+    assert (out / "labelled").exists()
+    (out / "tracks.csv").unlink()
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("ldls.batch.run_bag.RunBag.write", killed)
+    command(bag, out, *track, "--formats", "npz,bag")
+    assert (out / "tracks.csv").exists()
+    assert not (out / "labelled").exists()
+
+
+@pytest.fixture
+def elsewhere(tmp_path):
+    """A bag of results, which was moved out of the folder of its run, and a command that labels otherwise."""
+    bag, out = recorded(tmp_path, "mcap", moving=(("odom", "base"),)), tmp_path / "out"
+    of_run = ("--option", "world=odom", "--sweeps", "1", "--formats")
+    command(bag, out, *of_run, "bag")
+    (out / "labelled").rename(tmp_path / "elsewhere")
+    return tmp_path / "elsewhere", out / "labelled", lambda: command(bag, out, *of_run, "npz", "--frames", "1:")
+
+
+def test_what_took_the_place_of_a_bag_stays(elsewhere):
+    _, place, label = elsewhere
+    place.mkdir()
+    (place / "mine.txt").write_text("by hand")
+    assert "warning" not in label().output
+    assert (place / "mine.txt").read_text() == "by hand"
+
+
+def test_a_link_to_a_bag_is_removed_and_not_the_bag(elsewhere):
+    bag, place, label = elsewhere
+    place.symlink_to(bag)
+    assert label().exit_code == 0
+    assert not place.is_symlink()
+    assert (bag / "metadata.yaml").is_file()
 
 
 def instance_ids(path):

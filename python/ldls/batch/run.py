@@ -192,7 +192,8 @@ def run(
         write_failures(folder, failures_of(journal.records(opened.names)))
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
-        unplaced = _write_of_all(tracks, bag, lambda: _stored(journal, opened.names, folder))
+        stored = partial(_stored, journal, opened.names, folder)
+        unplaced = _write_of_all(tracks, bag, stored, partial(_outdate_bag, opened, settings, folder))
         if write_objects is not None:
             write_objects(objects_of(_found(journal, names, tracks)))
         n_objects = count_objects(_found(journal, names, tracks))
@@ -257,9 +258,15 @@ def _tracks(
     return None
 
 
-def _write_of_all(tracks: RunTracks | None, bag: RunBag | None, stored: Callable[[], Iterator[Record]]) -> list[str]:
+def _write_of_all(
+    tracks: RunTracks | None,
+    bag: RunBag | None,
+    stored: Callable[[], Iterator[Record]],
+    before: Callable[[], None],
+) -> list[str]:
     """Write the tracks, and the bag, which has them, of all frames that are `stored`; the frames without tracks."""
-    unplaced = [] if tracks is None else tracks.write(stored)
+    # a bag of other tracks must not outlive a run that is killed
+    unplaced = [] if tracks is None else tracks.write(stored, before)
     if bag is not None:
         bag.write(stored)
     return unplaced
@@ -326,17 +333,24 @@ def _has_other_labels(outcome: Outcome, journal: Journal) -> bool:
 
 
 def _outdate(source: Source, settings: RunSettings, folder: Path) -> None:
-    """Remove the tracks, and the bag, of earlier labels, where this run does not write them anew; warns of it."""
-    removed = []
+    """Remove the tracks of earlier labels, where this run writes none anew, with a warning, and the bag."""
     if not settings.track and remove_tracks(folder):
-        removed.append(f"{TRACKS}/ and {TRACKS_TABLE} (--track makes them again)")
-    if BAG not in settings.formats and (folder / NOTE).is_file():
-        bag = RunBag(source, folder)
-        bag.remove()
-        removed.append(f"{bag.path.name} (--formats bag makes it again)")
-    if removed:
-        message = f"{folder}: frames are labelled together with others than before; removed {' and '.join(removed)}"
+        message = (
+            f"{folder}: frames are labelled together with others than before; removed {TRACKS}/ and {TRACKS_TABLE} "
+            "(--track makes them again)"
+        )
         warnings.warn(message, LdlsWarning, stacklevel=5)
+    _outdate_bag(source, settings, folder)
+
+
+def _outdate_bag(source: Source, settings: RunSettings, folder: Path) -> None:
+    """Remove the bag of earlier labels or tracks, with a warning where this run writes none anew."""
+    if not (folder / NOTE).is_file():
+        return
+    bag = RunBag(source, folder)
+    if bag.remove() and BAG not in settings.formats:
+        message = f"{bag.path}: labels or tracks are others than before; removed (--formats bag makes it again)"
+        warnings.warn(message, LdlsWarning, stacklevel=6)
 
 
 def _flush(journal: Journal, waiting: list[Record]) -> None:

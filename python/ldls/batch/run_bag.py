@@ -98,12 +98,17 @@ class RunBag:
         with whole_file(self._folder / NOTE) as file:
             file.write(made_of)
 
-    def remove(self) -> None:
-        """Remove the bag."""
+    def remove(self) -> bool:
+        """Remove the bag, and nothing else that may be there; True if there was one."""
+        was_there = self._n_clouds() is not None
+        if was_there:
+            # at once: of a run that is killed meanwhile no part stays under its name
+            gone = self._folder / f".{self.path.name}.gone{UNFINISHED_BAG}"
+            _delete(gone)
+            self.path.rename(gone)
+            _delete(gone)
         (self._folder / NOTE).unlink(missing_ok=True)
-        if self.path.is_dir():
-            shutil.rmtree(self.path)
-        self.path.unlink(missing_ok=True)
+        return was_there
 
     def _note(self) -> bytes | None:
         """What the bag that is there was made of; None where nothing says it."""
@@ -123,3 +128,10 @@ class RunBag:
             return bag.topics[TOPIC].count if TOPIC in bag.topics else None
         finally:
             bag.close()
+
+
+def _delete(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

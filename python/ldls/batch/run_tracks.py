@@ -76,13 +76,14 @@ class RunTracks:
         self._folder, self.folder, self._map = folder, folder / TRACKS, map_file
         self._formats = {"label", *formats}
 
-    def write(self, records: Callable[[], Iterable[Record]]) -> list[str]:
+    def write(self, records: Callable[[], Iterable[Record]], before: Callable[[], None]) -> list[str]:
         """Number the objects of all frames that are done, if that was not done; the frames left out, without a pose.
 
         One window at a time is in memory.
 
         Args:
             records: Gives the journal's records of the frames that have a stored result, in the order of the source.
+            before: Called before tracks become others than they were.
 
         Raises:
             LimitError: There are more objects than a file has numbers for, or the map has too many voxels.
@@ -104,6 +105,8 @@ class RunTracks:
         current = current and all(is_written(self._folder / name, files[name]) for name in files)
         if current and self._map is None:
             return unplaced
+        if not current:
+            before()
         places = LabelledMap()
         self.folder.mkdir(exist_ok=True)
         sweep(self.folder)
