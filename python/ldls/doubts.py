@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.camera.rigid import doubt_of_distance, inverse, transformed
@@ -85,16 +84,7 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
                 "the lidar points up, turn points and T_camera_lidar until z does"
             )
             yield message, UprightWarning
-    yield from dict.fromkeys(
-        (f"{name}: {doubt}", category)
-        for each in results
-        for name, seen in _named(each.views)
-        for doubt, category in (
-            (_doubt_of_place(seen.view.camera.T_camera_lidar, each.points), ScaleWarning),
-            (_doubt_of_size(seen.view), ImageSizeWarning),
-        )
-        if doubt is not None
-    )
+    yield from dict.fromkeys(doubt for each in results for doubt in _doubts_of_views(each))
 
 
 def _named(views: Sequence[SeenView]) -> Iterator[tuple[str, SeenView]]:
@@ -113,20 +103,27 @@ def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning
         yield f"{place}{doubt}", NoUsablePoints if doubt == NOT_FINITE else NothingInView
 
 
-def _doubt_of_place(T_camera_lidar: NDArray[np.float64], points: Points) -> str | None:
-    """What is odd about the distance from lidar to camera, where the lidar is amid its points and the camera is not."""
-    doubt = doubt_of_distance(T_camera_lidar)
-    if doubt is None:
-        return None
-    # those of a map may be far from its origin, and some of a cloud from both
-    known = points[finite_rows(points), :3]
+def _doubts_of_views(result: Segmentation) -> Iterator[tuple[str, type[Warning]]]:
+    """What is odd about the place of cameras, and the sizes of their images."""
+    far = {}
+    for name, seen in _named(result.views):
+        size = _doubt_of_size(seen.view)
+        if size is not None:
+            yield f"{name}: {size}", ImageSizeWarning
+        distance = doubt_of_distance(seen.view.camera.T_camera_lidar)
+        if distance is not None:
+            far[name] = (seen, distance)
+    known = result.points[finite_rows(result.points), :3] if far else result.points[:0, :3]
     if not len(known):
-        return None
+        return
     low, high = known.min(axis=0), known.max(axis=0)
-    lidar_is_amid, camera_is_amid = (
-        bool(((low <= place) & (place <= high)).all()) for place in (np.zeros(3), inverse(T_camera_lidar)[:3, 3])
-    )
-    return doubt if lidar_is_amid and not camera_is_amid else None
+    # those of a map may be far from its origin, and some of a cloud from lidar and camera
+    if not ((low <= 0) & (high >= 0)).all():
+        return
+    for name, (seen, distance) in far.items():
+        place = inverse(seen.view.camera.T_camera_lidar)[:3, 3]
+        if not ((low <= place) & (place <= high)).all():
+            yield f"{name}: {distance}", ScaleWarning
 
 
 def _doubt_of_size(view: View) -> str | None:
@@ -134,7 +131,8 @@ def _doubt_of_size(view: View) -> str | None:
     if view.camera.image_size is not None:
         return None
     height, width = view.masks.image_size
-    u, v = view.camera.projection[:2, 2].tolist()
+    projection = view.camera.projection
+    u, v = (projection[:2, 2] / projection[2, 2]).tolist()
     scales = (2 * u / width, 2 * v / height)
     if _are_near_one(scales):
         return None
@@ -149,7 +147,7 @@ def _doubt_of_size(view: View) -> str | None:
         return None
     return (
         f"masks: of an image of {height} x {width}, but the camera's principal point ({u:.1f}, {v:.1f}) is the middle "
-        f"of about {2 * v:.0f} x {2 * u:.0f}; {mend} If this is the camera's image, Camera(image_size=) says so"
+        f"of about {2 * v:.0f} x {2 * u:.0f}; {mend} A camera that knows the size of its image has no such doubt"
     )
 
 

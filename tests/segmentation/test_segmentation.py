@@ -376,7 +376,7 @@ def test_masks_of_rows_for_columns_are_doubted():
 )
 def test_masks_of_a_resized_image_are_doubted(size, doubtful):
     points, masks = np.array([[0.0, 0, 10]] * 9), ldls.InstanceMasks.from_boxes([[3, 2, 5, 4]], size)
-    camera = ldls.Camera(projection=[[100, 0, 80], [0, 100, 60], [0, 0, 1]])
+    camera = ldls.Camera(projection=2 * np.array([[100, 0, 80], [0, 100, 60], [0, 0, 1]]))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         ldls.segment(points, masks, camera)

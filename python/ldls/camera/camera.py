@@ -63,7 +63,8 @@ class Camera:
         projection: (3, 4) from homogeneous points in the camera frame (metres; x right, y down, z forward) to
             homogeneous pixels; pixel centres lie at integer coordinates. A (3, 3) intrinsic matrix K is taken as
             [K | 0], a matrix of negative sign, which projects alike, as its negative, and one of which the third row
-            is not the depth, K [R | t] for points of the lidar, as K, its [R | t] before `T_camera_lidar`.
+            is not the depth, K [R | t] for points of the lidar, as K; its [R | t] then comes after `T_camera_lidar`,
+            which holds both.
         T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates, column vectors.
         distortion: How the lens departs from a pinhole; nothing by default, as in rectified images. With one,
             `projection` is the intrinsic matrix K of the raw image.

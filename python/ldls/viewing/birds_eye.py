@@ -82,7 +82,7 @@ def birds_eye_of(shown: Shown, ground: Ground, canvas: Canvas, *, boxes: bool) -
             around = [tuple(place) for place in (FINE * corners[[0, 1, 2, 3, 0]]).tolist()]
             draw.line(around, colour, 2 * FINE, joint="curve")
             # a name whose object is elsewhere would stand at the edge as if the object did
-            if ((corners >= 0) & (corners < ground.size_px)).all(axis=1).any():
+            if (corners.max(axis=0) >= 0).all() and (corners.min(axis=0) < ground.size_px).all():
                 tags.append(Tag(shown.names[each.label - 1], colour, _around(corners)))
     picture = fine.reduce(FINE).convert("RGB")
     written = _write_ranges(picture, ground, step_m)

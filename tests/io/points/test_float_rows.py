@@ -29,16 +29,20 @@ def test_bin_files_hold_rows_of_floats(tmp_path, name, columns, options):
     assert points.flags.writeable, "as points of other formats"
 
 
+@pytest.mark.parametrize("columns", [3, 4, 5, 6])
 @pytest.mark.parametrize("other", [">f4", "<f8", ">f8"])
-def test_rows_of_other_numbers_are_refused_with_what_mends_them(tmp_path, other):
-    path, sweep = tmp_path / "sweep.bin", sample_frame().points
+def test_rows_of_other_numbers_are_refused_with_what_mends_them(tmp_path, other, columns):
+    # of as many bytes as some rows of four float32
+    n = 1004 if other == ">f4" else 1002
+    path, sweep = tmp_path / "sweep.bin", np.resize(sample_frame().points[:n].T, (columns, n)).T
     sweep.astype(other).tofile(path)
     with pytest.raises(ldls.FileFormatError, match=f"as '{other}' none does; write the file anew"):
         ldls.read_points(path)
     np.fromfile(path, other).astype("<f4").tofile(path)
-    np.testing.assert_array_equal(ldls.read_points(path), sweep)
+    np.testing.assert_array_equal(ldls.read_points(path, columns=columns), sweep)
     sweep.astype(other).tofile(path)
-    assert ldls.read_points(path, columns=4).tobytes() == path.read_bytes()
+    if columns == 4:
+        assert ldls.read_points(path, columns=columns).tobytes() == path.read_bytes()
 
 
 def test_npy_files_keep_their_precision(tmp_path):

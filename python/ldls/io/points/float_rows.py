@@ -85,8 +85,8 @@ def _check_positions(values: NDArray[np.float32], columns: int) -> None:
     if likeliest is not None:
         raise _wrong_guess(columns, f"then points lie farther than {FARTHEST_M:.0e} m", likeliest)
     for other in OTHER_NUMBERS:
-        fits = values.nbytes % (columns * np.dtype(other).itemsize) == 0
-        if fits and _are_positions(values.view(other), columns):
+        numbers = np.frombuffer(values, other, count=values.nbytes // np.dtype(other).itemsize)
+        if any(_are_positions(numbers[: numbers.size // tried * tried], tried) for tried in range(3, MOST_TRIED + 1)):
             raise FileFormatError(
                 f"as float32 points lie farther than {FARTHEST_M:.0e} m, as {other!r} none does; write the file anew: "
                 f"numpy.fromfile(path, {other!r}).astype('<f4').tofile(path)"
