@@ -660,8 +660,8 @@ NUSCENES_TABLES = tuple(f"v1.0-mini/{name}.json" for name in (*nuscenes_tables.T
 def read_tables(folder):
     tables = nuscenes_tables.find_tables(folder, None)
     samples = nuscenes_tables.read_sample_names(tables, None)
-    sensors = nuscenes_tables.read_sensors(tables)
-    readings = nuscenes_tables.read_readings(tables, samples, sensors, ("LIDAR_TOP", "CAM_FRONT"))
+    sensors = nuscenes_tables.read_sensors(tables, ("LIDAR_TOP", "CAM_FRONT"))
+    readings = nuscenes_tables.read_readings(tables, samples, sensors)
     taken = [each for frame in readings.values() for each in frame.values()]
     poses = nuscenes_tables.read_poses(tables, {each.pose for each in taken})
     return poses, nuscenes_tables.read_truth_files(tables, "lidarseg", {each.token for each in taken})

@@ -89,9 +89,9 @@ class NuScenesSource:
         # nuScenes' own cameras in its order
         self.camera_names = tuple(sorted(cameras, key=lambda c: CAMERAS.index(c) if c in CAMERAS else len(CAMERAS)))
         channels = (self._lidar, *self.camera_names)
-        sensors = tables.read_sensors(folder)
-        readings = tables.read_readings(folder, samples, sensors, channels)
-        self._sensors = {token: sensor for token, sensor in sensors.items() if sensor.channel in channels}
+        sensors = tables.read_sensors(folder, channels)
+        readings = tables.read_readings(folder, samples, sensors)
+        self._sensors = {token: sensor for token, sensor in sensors.items() if sensor is not None}
         missing = _missing(self.path, readings, channels)
         self.left_out = {samples[token]: f"no {' and no '.join(what)}" for token, what in missing.items()}
         self.names = tuple(name for token, name in samples.items() if token not in missing)

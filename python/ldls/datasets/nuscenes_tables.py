@@ -5,6 +5,7 @@ Tables are read a row at a time; only rows of the key frames that are wanted are
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from ldls.camera import Distortion
 from ldls.camera.rigid import from_parts, from_quaternion
 from ldls.datasets.file_source import choose
-from ldls.errors import CalibrationError, CorruptFileError, SourceError, some, within
+from ldls.errors import CalibrationError, CorruptFileError, LeftOutWarning, SourceError, some, within
 from ldls.io.files import parsing
 from ldls.io.json_rows import read_json_rows
 from ldls.io.labels.nuscenes_labels import NUSCENES
@@ -95,6 +96,8 @@ def find_tables(path: Path, version: str | None) -> Path:
 def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
     """Names of the samples of a scene, or of all scenes, by token: scene and number, in the order of their time.
 
+    Those of scenes that the table of scenes does not have, as that of a part of a data set, are left out with a warning.
+
     Raises:
         SourceError: There is no such scene.
         CorruptFileError: A table is broken.
@@ -106,10 +109,18 @@ def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
     if scene is not None:
         choose(tables, "scene", sorted(names.values()), scene)
     samples: dict[str, list[tuple[int, str]]] = defaultdict(list)
+    strange: Counter[str] = Counter()
     for row in _rows(tables, "sample", {"token": str, "scene_token": str, "timestamp": Number}):
-        name = _named(tables, "sample", row, "scene", names)
-        if scene in (None, name):
+        name = names.get(row["scene_token"])
+        if name is None:
+            strange[row["scene_token"]] += 1
+        elif scene in (None, name):
             samples[name].append((row["timestamp"], row["token"]))
+    if strange:
+        message = (
+            f"{tables / 'sample.json'}: {strange.total():,} key frames are left out, of scenes that scene.json lacks"
+        )
+        warnings.warn(f"{message}: {some(list(strange))}", LeftOutWarning, stacklevel=4)
     in_order = sorted((sorted(own), name) for name, own in samples.items())
     return {token: f"{name}_{number:03d}" for own, name in in_order for number, (_, token) in enumerate(own)}
 
@@ -127,8 +138,8 @@ def read_channels(tables: Path) -> tuple[list[str], list[str]]:
     return channels["lidar"], channels["camera"]
 
 
-def read_sensors(tables: Path) -> dict[str, CalibratedSensor]:
-    """The calibrated sensors, by token.
+def read_sensors(tables: Path, channels: Sequence[str]) -> dict[str, CalibratedSensor | None]:
+    """The calibrated sensors of the wanted channels, by token; None for each of the others.
 
     Raises:
         CalibrationError: A pose is none, or a camera has no intrinsic matrix.
@@ -136,9 +147,12 @@ def read_sensors(tables: Path) -> dict[str, CalibratedSensor]:
     """
     kinds = {row["token"]: row for row in _rows(tables, "sensor", {"token": str, "channel": str, "modality": str})}
     columns = {"token": str, "sensor_token": str, "translation": list, "rotation": list, "camera_intrinsic": list}
-    sensors: dict[str, CalibratedSensor] = {}
+    sensors: dict[str, CalibratedSensor | None] = {}
     for row in _rows(tables, "calibrated_sensor", columns):
         kind = _named(tables, "calibrated_sensor", row, "sensor", kinds)
+        if kind["channel"] not in channels:
+            sensors[row["token"]] = None
+            continue
         place = f"{tables / 'calibrated_sensor.json'}, {row['token']}"
         intrinsic = _numbers(place, row["camera_intrinsic"])
         if kind["modality"] == "camera" and intrinsic.shape not in ((3, 3), (3, 4)):
@@ -151,16 +165,17 @@ def read_sensors(tables: Path) -> dict[str, CalibratedSensor]:
 
 
 def read_readings(
-    tables: Path, samples: Mapping[str, str], sensors: Mapping[str, CalibratedSensor], channels: Sequence[str]
+    tables: Path, samples: Mapping[str, str], sensors: Mapping[str, CalibratedSensor | None]
 ) -> dict[str, dict[str, Reading]]:
-    """Readings of the wanted channels for the key frames `samples`, by sample and channel.
+    """Readings of `sensors`, None of which are not wanted, for the key frames `samples`, by sample and channel.
 
     Raises:
-        CorruptFileError: The table is broken, or `sensors`, all that there are, lack one of its.
+        CorruptFileError: The table is broken, or has readings of a sensor that `sensors` lack.
     """
     readings: dict[str, dict[str, Reading]] = {token: {} for token in samples}
     sizes: dict[tuple[int, int], tuple[int, int]] = {}
-    own = {token: token for token in sensors}
+    # one token for each sensor, where each row has one of its own
+    own = {token: (token, sensor) for token, sensor in sensors.items()}
     columns: dict[str, type | UnionType] = {
         "token": str, "sample_token": str, "is_key_frame": Number, "calibrated_sensor_token": str,
         "ego_pose_token": str, "filename": str, "timestamp": Number, "height": Side, "width": Side,
@@ -168,15 +183,15 @@ def read_readings(
     for row in _rows(tables, "sample_data", columns):
         if not row["is_key_frame"] or row["sample_token"] not in readings:
             continue
-        sensor = _named(tables, "sample_data", row, "calibrated_sensor", own)
-        if sensors[sensor].channel not in channels:
+        token, sensor = _named(tables, "sample_data", row, "calibrated_sensor", own)
+        if sensor is None:
             continue
         size = (row["height"] or 0, row["width"] or 0)
-        readings[row["sample_token"]][sensors[sensor].channel] = Reading(
+        readings[row["sample_token"]][sensor.channel] = Reading(
             token=row["token"],
             filename=row["filename"],
             stamp_us=row["timestamp"],
-            sensor=sensor,
+            sensor=token,
             pose=row["ego_pose_token"],
             size=sizes.setdefault(size, size),
         )
