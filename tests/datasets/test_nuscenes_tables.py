@@ -116,9 +116,7 @@ def test_a_part_of_the_scenes_may_be_there(tmp_path):
     folder = layouts.nuscenes(tmp_path, scenes=("scene-0001", "scene-0002"))
     path = folder / "v1.0-mini/scene.json"
     path.write_text(json.dumps(json.loads(path.read_text())[:1]))
-    with pytest.warns(
-        LeftOutWarning, match="key frames are left out, of scenes that scene.json lacks: token scene-0002"
-    ):
+    with pytest.warns(LeftOutWarning, match="frames are left out, of scenes that scene.json lacks: token scene-0002"):
         source = open_source(folder, kind="nuscenes")
     assert {name[:-4] for name in source.names} == {"scene-0001"}
 

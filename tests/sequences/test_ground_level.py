@@ -22,6 +22,16 @@ def test_levelling_undoes_a_wrong_height_roll_and_pitch_and_leaves_the_rest():
     assert np.array_equal(levelled(wrong, later + np.array([500, 0, 0]), np.eye(4), hills), wrong)
 
 
+def test_ground_that_slopes_in_the_world_is_level_with_itself_wherever_the_lines_of_a_sweep_lie():
+    def ground(first_m):
+        """Lines across the way, on a plane that rises by 9 cm a metre, as for a lidar that is mounted with pitch."""
+        x, y = np.meshgrid(np.arange(first_m, 20, 2.3), np.arange(-20, 20, 0.2))
+        return np.column_stack([x.ravel(), y.ravel(), 0.09 * x.ravel() + 0.03 * y.ravel() - 1.7])
+
+    before, later = ground(-20.0), ground(-19.6)
+    np.testing.assert_allclose(levelled(np.eye(4), later, np.eye(4), before), np.eye(4), atol=1e-9)
+
+
 def test_points_stand_above_the_lowest_of_their_column():
     generator = np.random.default_rng(1)
     xyz = generator.uniform([-4, -4, -2], [4, 4, 0], (400, 3))

@@ -96,7 +96,7 @@ def find_tables(path: Path, version: str | None) -> Path:
 def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
     """Names of the samples of a scene, or of all scenes, by token: scene and number, in the order of their time.
 
-    Those of scenes that the table of scenes does not have, as that of a part of a data set, are left out with a warning.
+    Those of scenes that the table of scenes lacks, as that of a part of a data set does, are left out with a warning.
 
     Raises:
         SourceError: There is no such scene.

@@ -53,8 +53,10 @@ def levelled(
         _, own, others = np.intersect1d(keys, keys_before, assume_unique=True, return_indices=True)
         if len(own) < LEAST_CELLS:
             return pose
-        too_high = means[own, 2] - means_before[others, 2]
-        above, by_x, by_y = _plane(means[own, :2] - moved[:2, 3], too_high)
+        step = means[own] - means_before[others]
+        # the means of a cell lie apart, and ground slopes in the world of a lidar that is mounted with roll or pitch
+        _, *slopes = _plane(means_before[others, :2] - moved[:2, 3], means_before[others, 2])
+        above, by_x, by_y = _plane(means[own, :2] - moved[:2, 3], step[:, 2] - step[:, :2] @ slopes)
         half = np.array([-by_y, by_x]) / 2
         turn = from_quaternion("turn", np.array([1.0, *half, 0.0]) / np.sqrt(1 + half @ half))
         moved = from_parts(turn @ moved[:3, :3], moved[:3, 3] - [0, 0, above])
