@@ -267,6 +267,18 @@ def test_stuff_and_groups_of_cityscapes_are_background(tmp_path):
     np.testing.assert_array_equal(masks[1].to_array(), SQUARE)
 
 
+def test_cityscapes_numbers_instances_from_0(tmp_path):
+    values = np.where(SQUARE, 26000, 7).astype(np.uint16)
+    values[0], values[1] = 26001, 24000
+    Image.fromarray(values).save(tmp_path / "city_000001_gtFine_instanceIds.png")
+    masks = ldls.read_masks(tmp_path / "city_000001_gtFine_instanceIds.png", scores=[0.5, 0.75, 1])
+    assert [(mask.name, mask.score, mask.area) for mask in masks] == [
+        ("person", 0.5, 80),
+        ("car", 0.75, 300),
+        ("car", 1, 80),
+    ]
+
+
 def test_an_empty_segmentation_is_left_out(tmp_path):
     content = ldls.InstanceMasks.from_array(SQUARE[None], categories=[1]).to_coco()
     content["annotations"].append(content["annotations"][0] | {"id": 9, "segmentation": []})

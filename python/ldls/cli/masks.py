@@ -93,7 +93,7 @@ def convert(
         int | None,
         typer.Option(
             metavar="N",
-            help="Of a .png with class * DIVISOR + instance: 256 of KITTI, 1000 of Cityscapes.",
+            help="Of a .png with class * DIVISOR + instance: 256 of KITTI, 1000 of KITTI-360.",
             show_default=False,
         ),
     ] = None,

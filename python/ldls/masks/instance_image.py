@@ -33,7 +33,8 @@ def arguments(
         scores: As `categories`; all 1 without them.
         names: Name of each category id.
         class_divisor: Where numbers hold the class as well, what to divide them by: the quotient is the category, and
-            a remainder of 0 is background. KITTI's images have 256, Cityscapes' 1000, below which is background.
+            a remainder of 0 is background. KITTI's images have 256, KITTI-360's 1000, below which is background.
+            Cityscapes' numbers begin at 0, as 26000, which only `read_masks` of its files knows.
 
     Raises:
         MaskError: Another shape, or values that are no instance numbers.
@@ -46,7 +47,7 @@ def arguments(
                 f"class_divisor: got {class_divisor}, expected 2 or more, and no categories beside it; "
                 "the quotient is the category"
             )
-        # below Cityscapes' divisor there are stuff and groups
+        # below 1000 there are stuff and groups
         least = 1 if class_divisor == CITYSCAPES_DIVISOR else 0
         pairs = [divmod(int(number), class_divisor) for number in numbers]
         given = names or {}

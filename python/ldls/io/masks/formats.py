@@ -56,7 +56,7 @@ def read_masks(
         image_size: (height, width) in pixels; `.txt` needs it, and others must agree with it.
         image_id: Which image of a `.json` with several.
         instance_axis: Axis of a `.npy` that counts the masks, 0 or -1, where sizes do not tell.
-        class_divisor: For a `.png` whose numbers hold the class as well: 256 for KITTI's, 1000 for Cityscapes'.
+        class_divisor: For a `.png` whose numbers hold the class as well: 256 for KITTI's, 1000 for KITTI-360's.
         categories: Category ids for a `.png` or `.npy`, which are all 1, "object", without them.
         scores: Scores for a `.png` or `.npy`, which are all 1 without them.
         names: Name of each category id, for all but `.npz`, where the file does not say.

@@ -80,14 +80,17 @@ def read(
 
 
 def _cityscapes(values: NDArray[Any], scores: ArrayLike | None, names: Mapping[int, str] | None) -> InstanceMasks:
-    """Things of Cityscapes, by the ids of COCO where it has the class."""
-    arguments = instance_image.arguments(values, scores=scores, class_divisor=CITYSCAPES_DIVISOR)
+    """Things of Cityscapes, which it numbers from 0 (26000 is a car), by the ids of COCO where it has the class."""
+    # below the divisor there are stuff and groups
+    numbers, rles = instance_image.split(np.where(values < CITYSCAPES_DIVISOR, 0, values))
+    classes = (numbers // CITYSCAPES_DIVISOR).tolist()
     ids, own = category_ids(CITYSCAPES_NAMES | dict(names or {}))
-    unknown = sorted(set(arguments["categories"]) - ids.keys())
+    unknown = sorted(set(classes) - ids.keys())
     if unknown:
         raise MaskError(f"class {unknown[0]} is none of Cityscapes'; pass names={{{unknown[0]}: '...'}}")
-    categories = np.array([ids[each] for each in arguments["categories"]], np.int64)
-    return InstanceMasks(**(arguments | {"categories": categories, "names": COCO_NAMES | own}))
+    categories = np.array([ids[each] for each in classes], np.int64)
+    height, width = values.shape
+    return InstanceMasks(rles, (height, width), categories=categories, scores=scores, names=COCO_NAMES | own)
 
 
 def write(path: str | PathLike[str], masks: InstanceMasks) -> None:
