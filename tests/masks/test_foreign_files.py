@@ -138,6 +138,30 @@ def test_polygons_of_cityscapes_and_mapillary(tmp_path, size, thing, surface, na
         ldls.read_masks(tmp_path / "a.json")
 
 
+def test_later_objects_of_cityscapes_cover_earlier_ones(tmp_path):
+    corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
+    pole = [[25, 0], [30, 0], [30, 60], [25, 60]]
+    objects = [
+        {"label": "pole", "polygon": corners},
+        {"label": "car", "polygon": corners},
+        {"label": "person", "polygon": [[35, 10], [50, 10], [50, 40], [35, 40]]},
+        {"label": "pole", "polygon": pole},
+        {"label": "pole", "polygon": corners[:2]},
+        {"label": "license plate", "polygon": corners},
+        {"label": "road", "polygon": corners, "deleted": 1},
+    ]
+    person = np.zeros_like(SQUARE)
+    person[10:40, 35:50] = True
+    car = SQUARE & ~person
+    car[:, 25:30] = False
+    (tmp_path / "a.json").write_text(json.dumps({"imgHeight": 60, "imgWidth": 80, "objects": objects}))
+    masks = ldls.read_masks(tmp_path / "a.json")
+    assert [mask.name for mask in masks] == ["car", "person"]
+    np.testing.assert_array_equal(pixels(masks), [car, person])
+    (tmp_path / "a.json").write_text(json.dumps({"height": 60, "width": 80, "objects": objects}))
+    assert ldls.read_masks(tmp_path / "a.json")[0].area == SQUARE.sum(), "Mapillary's are whole"
+
+
 @pytest.mark.parametrize("wrapped", [False, True], ids=["list", "SA-1B"])
 def test_records_of_segment_anything(tmp_path, wrapped):
     rle = ldls.InstanceMasks.from_array(SQUARE[None]).to_coco()["annotations"][0]["segmentation"]

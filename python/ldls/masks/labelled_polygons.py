@@ -23,6 +23,8 @@ CIRCLE_CORNERS = 64
 
 THINGS = frozenset(("person", "rider", "car", "truck", "bus", "caravan", "trailer", "train", "motorcycle", "bicycle"))
 """Cityscapes' classes that come one by one; its others are surfaces, and groups of so many."""
+NOT_DRAWN = "license plate"
+"""The one label of Cityscapes that covers nothing."""
 MAPILLARY_THINGS = ("animal", "human", "object")
 """What the labels of Mapillary's things begin with: object--vehicle--car."""
 
@@ -51,13 +53,15 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
         with within(f"shape {i}"):
             own = (folded(label), ("alone", i) if group is None else group)
             parts.setdefault(own, (label, []))[1].append(_polygon(shape))
-    return _arguments(size, [label for label, _ in parts.values()], [part for _, part in parts.values()], names)
+    rles = [_ldls.Rle.from_polygons(*size, part) for _, part in parts.values()]
+    return _arguments(size, [label for label, _ in parts.values()], rles, names)
 
 
 def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:
     """Arguments of `InstanceMasks` from Cityscapes' or Mapillary's polygons of one image; surfaces are background.
 
     Categories are as of `from_shapes`; of a label such as object--vehicle--car the last part that COCO knows counts.
+    Cityscapes draws its objects in their order: later ones, surfaces too, cover earlier ones.
 
     Args:
         content: The parsed JSON.
@@ -68,23 +72,43 @@ def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None 
         CorruptFileError: It is of neither.
     """
     height, width = (content.get(f"img{side}", content.get(side.lower())) for side in ("Height", "Width"))
-    labels, polygons = [], []
+    size = checked_size((height, width))
+    drawn_in_order = "imgHeight" in content
+    labels, things, rles = [], [], []
     for i, each in enumerate(records("objects", content["objects"])):
         parts = str(each.get("label")).split("--")
-        if each.get("deleted") or not (parts[0] in THINGS if len(parts) == 1 else parts[0] in MAPILLARY_THINGS):
+        is_thing = parts[0] in THINGS if len(parts) == 1 else parts[0] in MAPILLARY_THINGS
+        polygon = each.get("polygon") or ()
+        covers = drawn_in_order and parts[0] != NOT_DRAWN and len(polygon) > 2
+        if each.get("deleted") or not (is_thing or covers):
             continue
         with within(f"object {i}"):
-            polygons.append([_polygon({"points": each.get("polygon", ())})])
+            rles.append(_ldls.Rle.from_polygons(*size, [_polygon({"points": polygon})]))
+        if not is_thing:
+            continue
         plain = [part.replace("-", " ") for part in parts]
         known = (part for part in reversed(plain) if folded(part) in COCO_NAMES.values())
         labels.append(next(known, plain[-1]))
-    return _arguments(checked_size((height, width)), labels, polygons, names)
+        things.append(len(rles) - 1)
+    if drawn_in_order:
+        rles = _uncovered(rles)
+    return _arguments(size, labels, [rles[i] for i in things], names)
+
+
+def _uncovered(rles: Sequence[_ldls.Rle]) -> list[_ldls.Rle]:
+    """Each mask without the pixels of those after it."""
+    left: list[_ldls.Rle] = []
+    covered: _ldls.Rle | None = None
+    for rle in reversed(rles):
+        left.append(rle if covered is None else rle.difference(covered))
+        covered = rle if covered is None else covered.union(rle)
+    return left[::-1]
 
 
 def _arguments(
     size: tuple[int, int],
     labels: Sequence[str],
-    polygons: Sequence[list[list[float]]],
+    rles: Sequence[_ldls.Rle],
     names: Mapping[int, str] | None,
 ) -> dict[str, Any]:
     given = {folded(name): category for category, name in (names or {}).items()}
@@ -94,7 +118,7 @@ def _arguments(
     known = dict(names or {})
     of_label = given | {folded(own[each]): class_id(each, own[each], known) for each in ids.values()}
     return {
-        "rles": [_ldls.Rle.from_polygons(*size, each) for each in polygons],
+        "rles": rles,
         "image_size": size,
         "categories": np.array([of_label[folded(label)] for label in labels], np.int64),
         "names": COCO_NAMES | known,
