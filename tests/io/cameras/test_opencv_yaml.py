@@ -59,6 +59,13 @@ def write(tmp_path):
         pytest.param(ROS, id="ROS camera_calibration"),
         pytest.param(OPENCV.replace("camera_matrix", "K").replace("distortion_coefficients", "D"), id="K and D"),
         pytest.param(OPENCV.replace("%YAML:1.0", "%YAML 1.2"), id="OpenCV 5"),
+        pytest.param(
+            OPENCV + "seen: !!opencv-nd-matrix\n   sizes: [ 1, 1, 2 ]\n   dt: d\n   data: [ 1., 2. ]\n", id="n-D"
+        ),
+        pytest.param(
+            OPENCV.replace("!!opencv-matrix\n   rows: 3\n   cols: 3", "!!opencv-nd-matrix\n   sizes: [ 3, 3 ]"),
+            id="n-D K",
+        ),
         pytest.param("\ufeff" + OPENCV.replace("\n", "\r\n"), id="byte order mark, CRLF"),
         pytest.param(f"image_width: 1280\nimage_height: 720\nK: {K}\nD: {D}\n\n# end\n", id="lists"),
         pytest.param(f'{{"image_width": 1280, "image_height": 720, "K": {K}, "D": {D}}}', id="JSON"),

@@ -10,7 +10,7 @@ from ldls.errors import CalibrationError
 MAX_DEPTH = 32
 """Levels of nesting: calibrations have six."""
 TOO_DEEP = f"more than {MAX_DEPTH} levels of nesting"
-OPENCV_MATRIX = "tag:yaml.org,2002:opencv-matrix"
+OPENCV_MATRICES = ("tag:yaml.org,2002:opencv-matrix", "tag:yaml.org,2002:opencv-nd-matrix")
 NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 MAPPING = "tag:yaml.org,2002:map"
 
@@ -83,7 +83,7 @@ def _loader(yaml: Any) -> Any:  # noqa: ANN401
         return text if ":" in text else yaml.SafeLoader.yaml_constructors[node.tag](loader, node)
 
     loader: Any = type("CalibrationLoader", (_safe_loader(yaml),), {})
-    for tag in (MAPPING, OPENCV_MATRIX):
+    for tag in (MAPPING, *OPENCV_MATRICES):
         loader.add_constructor(tag, mapping)
     for tag in NUMBERS:
         loader.add_constructor(tag, number)
