@@ -77,6 +77,18 @@ def test_shapes_of_labelme(tmp_path):
         ldls.read_masks(tmp_path / "a.json")
 
 
+@pytest.mark.parametrize("kind", ["rectangle", "oriented_rectangle"])
+def test_rectangles_of_labelme_may_have_four_corners(tmp_path, kind):
+    shape = {"label": "car", "points": [[20, 15], [40, 15], [40, 30], [20, 30]], "shape_type": kind}
+    content = {"shapes": [shape], "imageHeight": 60, "imageWidth": 80}
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    np.testing.assert_array_equal(pixels(ldls.read_masks(tmp_path / "a.json")), [SQUARE])
+    shape["points"].pop()
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.raises(ldls.MaskError, match=f"shape 0: {kind} of 3 points, expected .* a rectangle of 2 or 4, or"):
+        ldls.read_masks(tmp_path / "a.json")
+
+
 def test_what_labelme_calls_no_object_is_none(tmp_path):
     corners = [[20, 15], [40, 15], [40, 30], [20, 30]]
     line = {"label": "__ignore__", "points": corners[:2], "shape_type": "line"}

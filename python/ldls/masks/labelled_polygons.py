@@ -19,7 +19,8 @@ from ldls.masks.coco import records
 from ldls.masks.pixels import checked_size
 
 CIRCLE_CORNERS = 64
-
+RECTANGLES = ("rectangle", "oriented_rectangle")
+"""labelme's kinds that may have their four corners."""
 
 THINGS = frozenset(("person", "rider", "car", "truck", "bus", "caravan", "trailer", "train", "motorcycle", "bicycle"))
 """Cityscapes' classes that come one by one; its others are surfaces, and groups of so many."""
@@ -135,8 +136,10 @@ def _polygon(shape: Mapping[str, Any]) -> list[float]:
         points = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
     elif kind == "circle" and len(points) == 2:
         points = _circle(*points)
-    elif kind != "polygon" or len(points) < 3:
-        raise MaskError(f"{kind} of {len(points)} points, expected a polygon, a rectangle or a circle")
+    elif not (kind == "polygon" and len(points) > 2) and not (kind in RECTANGLES and len(points) == 4):
+        raise MaskError(
+            f"{kind} of {len(points)} points, expected a polygon of 3 or more, a rectangle of 2 or 4, or a circle of 2"
+        )
     corners: list[float] = points.ravel().tolist()
     return corners
 
