@@ -78,6 +78,9 @@ class FolderSource(FileSource):
         self._data_sets = {
             place: MaskDataSet(self._safe(place)) for place in set(self.stored_masks.values()) if FRAME not in place
         }
+        own = [(each.stamps, each.calibration, each.T_camera_lidar, each.masks) for each in self._cameras.values()]
+        self._places = dict.fromkeys(each for each in (self._described.stamps, *chain(*own)) if isinstance(each, str))
+        self._shared = self._shared_files()
         self.category_names = tuple(data_set.category_names for data_set in self._data_sets.values())
         for key in self._cameras:
             self._camera(key, self.names[0])
@@ -89,12 +92,14 @@ class FolderSource(FileSource):
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from, those of its cameras and stamps among them."""
-        own = [(each.stamps, each.calibration, each.T_camera_lidar, each.masks) for each in self._cameras.values()]
-        named = dict.fromkeys(place for place in (self._described.stamps, *chain(*own)) if isinstance(place, str))
-        paths = [self._one(place, self.names[index]) for place in named]
+        own = (self._one(place, self.names[index]) for place in self._places if FRAME in place)
+        return (*self._shared, *super().files(index), *(path for path in own if path.is_file()))
+
+    def _shared_files(self) -> tuple[Path, ...]:
+        paths = [self._safe(place) for place in self._places if FRAME not in place]
         # a calibration may be the folder of a day of KITTI raw
         paths += [path / name for path in paths if path.is_dir() for name in RAW_FILES]
-        return (self._file, *super().files(index), *(path for path in paths if path.is_file()))
+        return (self._file, *(path for path in paths if path.is_file()))
 
     def _image(self, camera: str, index: int) -> CameraImage:
         name = self.names[index]
