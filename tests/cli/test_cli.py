@@ -239,6 +239,7 @@ def test_tables_fold_what_a_narrow_terminal_has_no_room_for(capsys, width):
     [
         pytest.param("P2: 1\n", None, "image_2", id="KITTI's left colour one"),
         pytest.param("P2: 1\n", "3", "image_3", id="another of KITTI's"),
+        pytest.param("P2: 1\n", "image_3", "image_3", id="another by the name of its images"),
         pytest.param(None, None, "image_02", id="a day of KITTI raw"),
         pytest.param("cam0: {}\n", "cam1", "cam1", id="one of Kalibr's"),
         pytest.param("M1: {}\n", "2", "camera 2", id="one of a pair"),

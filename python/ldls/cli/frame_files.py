@@ -87,4 +87,6 @@ def camera_name(calib: Path, camera: str | None) -> str:
 
 
 def _which(camera: str | None) -> int | str | None:
-    return int(camera) if camera is not None and camera.isdecimal() else camera
+    """The number of a camera that is called by it, or as the folder of its images is in KITTI, or the name."""
+    number = (camera or "").removeprefix("image_")
+    return int(number) if number.isdecimal() else camera
