@@ -173,6 +173,41 @@ def test_two_cameras_have_the_files_of_their_names(rig, frame):
     assert focals == {"front": 721.0, "left": 500.0}
 
 
+def write_rig(rig, frame, names, images="images"):
+    """Images, a calibration and a transform of each camera, without masks; each has its own focal length."""
+    camera = frame.images[0].camera
+    for number, name in enumerate(names):
+        shutil.copytree(rig / "front", rig / images / name, dirs_exist_ok=True)
+        K = [[500 + number, 0, 609.6], [0, 500 + number, 172.9], [0, 0, 1]]
+        calibration = {"camera_matrix": K, "distortion_coefficients": [], "image_width": 1242, "image_height": 375}
+        write(rig / f"{name}.yaml", json.dumps(calibration))
+        write(rig / f"{name}_T.txt", rows(camera.T_camera_lidar))
+    if images:
+        shutil.rmtree(rig / "front")
+    shutil.rmtree(rig / "labels")
+
+
+def check_rig(rig, names):
+    assert run("init", rig).exit_code == 0
+    assert "No file has its name" not in (rig / "ldls.toml").read_text()
+    cameras = described(rig)["cameras"].values()
+    named = {Path(camera["images"]).parent.name: camera["calibration"] for camera in cameras}
+    assert named == {name: f"{name}.yaml" for name in names}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        pytest.param(("front", "rear"), id="two"),
+        pytest.param(("back_left", "left"), id="one in the name of the other"),
+        pytest.param(("r", "l"), id="letters that are in other words"),
+    ],
+)
+def test_cameras_in_a_folder_have_the_files_of_their_names(rig, frame, names):
+    write_rig(rig, frame, names)
+    check_rig(rig, names)
+
+
 def test_names_that_are_times(tmp_path, frame):
     camera = frame.images[0].camera
     for stamp in ("1547131046.353", "1547131046.453", "1547131046.553", "1547131047.653"):

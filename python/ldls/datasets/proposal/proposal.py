@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -104,7 +105,7 @@ def propose(folder: Path) -> Proposal:
         made.missing.append(_no_images(sweeps, pictures))
         made.lines += ["", "# [cameras.NAME]", f'# images = "images/{FRAME}.png"']
     for picture in cameras:
-        _add_camera(made, picture, sweeps, patterns, points, alone=len(cameras) == 1)
+        _add_camera(made, picture, cameras, sweeps, patterns, points)
     return made
 
 
@@ -158,22 +159,20 @@ def _add_truth(made: Proposal, sweeps: Pattern, patterns: Iterable[Pattern], col
 def _add_camera(
     made: Proposal,
     picture: Pattern,
+    cameras: Sequence[Pattern],
     sweeps: Pattern,
     patterns: Sequence[Pattern],
     points: Points,
-    *,
-    alone: bool,
 ) -> None:
-    place = PurePosixPath(picture.text).parent
-    name = "camera" if place == PurePosixPath() else "_".join(place.parts).replace(" ", "_")
+    name = _name(picture)
     common = picture.shared(sweeps)
     size = read_image_size(picture.files[min(common)])
     made.lines += ["", f"[cameras.{quoted(name)}]", f"images = {quoted(picture.text)}"]
     count = f"{_count(picture, 'image')} of {size[0]} x {size[1]} (height x width), {len(common):,} with a sweep"
     made.found.append(f"{picture.text}: {count}")
     own = [pattern for pattern in patterns if pattern not in (picture, sweeps)]
-    _add_masks(made, picture, own, size, alone=alone)
-    _add_calibration(made, name, sweeps, own, points, size, alone=alone)
+    _add_masks(made, picture, own, size, alone=len(cameras) == 1)
+    _add_calibration(made, picture, cameras, sweeps, own, points, size)
 
 
 def _add_masks(
@@ -199,14 +198,14 @@ def _add_masks(
 
 def _add_calibration(
     made: Proposal,
-    name: str,
+    picture: Pattern,
+    cameras: Sequence[Pattern],
     sweeps: Pattern,
     others: Sequence[Pattern],
     points: Points,
     size: tuple[int, int],
-    *,
-    alone: bool,
 ) -> None:
+    name = _name(picture)
     small = [
         pattern
         for pattern in others
@@ -215,7 +214,8 @@ def _add_calibration(
         and (len(pattern.files) == 1 or pattern.shared(sweeps))
     ]
     # of several cameras each has a file that is named like it, if there is one
-    small.sort(key=lambda pattern: not _names(pattern, name))
+    own = [pattern for pattern in small if _owner(pattern, cameras) is picture]
+    small.sort(key=lambda pattern: pattern not in own)
     found = next((each for pattern in small if (each := _camera_of(pattern, sweeps, name)) is not None), None)
     if found is None:
         made.missing.append(f"calibration of {name}: found none; docs/formats.md has the files that are read")
@@ -228,7 +228,7 @@ def _add_calibration(
     if calibrated != size:
         sizes = "the calibration is of {} x {} pixels, images of {} x {}".format(*calibrated, *size)
         made.ask(f"{sizes} (height x width): was one resized?")
-    if not alone and not any(_names(pattern, name) for pattern in small):
+    if len(cameras) > 1 and not own:
         made.ask("is this the calibration of this camera? No file has its name")
     if found.knows_lidar:
         upright, share = view_of(found.camera, points, size)
@@ -275,8 +275,28 @@ def _judge(
         warnings.warn(f"{name}: {doubt}", ScaleWarning, stacklevel=4)
 
 
-def _names(pattern: Pattern, name: str) -> bool:
-    return name.lower() in pattern.text.lower()
+def _name(picture: Pattern) -> str:
+    place = PurePosixPath(picture.text).parent
+    return "camera" if place == PurePosixPath() else "_".join(place.parts).replace(" ", "_")
+
+
+def _owner(pattern: Pattern, cameras: Iterable[Pattern]) -> Pattern | None:
+    """The camera that a file is named like: front_left.yaml is of front_left, not of front; None where it is no one."""
+    text = pattern.text.lower()
+    fits = []
+    for camera in cameras:
+        names = {_name(camera).lower(), PurePosixPath(camera.text).parent.name.lower()} - {""}
+        # a whole word before a part of one
+        fit = max(((_is_word(name, text), len(name)) for name in names if name in text), default=None)
+        if fit is not None:
+            fits.append((fit, camera))
+    best = max((fit for fit, _ in fits), default=None)
+    owners = [camera for fit, camera in fits if fit == best]
+    return owners[0] if len(owners) == 1 else None
+
+
+def _is_word(name: str, text: str) -> bool:
+    return re.search(rf"(?<![^\W_]){re.escape(name)}(?![^\W_])", text) is not None
 
 
 def _count(pattern: Pattern, what: str) -> str:
