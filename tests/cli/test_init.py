@@ -173,17 +173,16 @@ def test_two_cameras_have_the_files_of_their_names(rig, frame):
     assert focals == {"front": 721.0, "left": 500.0}
 
 
-def write_rig(rig, frame, names, images="images"):
+def write_rig(rig, frame, names):
     """Images, a calibration and a transform of each camera, without masks; each has its own focal length."""
     camera = frame.images[0].camera
     for number, name in enumerate(names):
-        shutil.copytree(rig / "front", rig / images / name, dirs_exist_ok=True)
+        shutil.copytree(rig / "front", rig / "images" / name)
         K = [[500 + number, 0, 609.6], [0, 500 + number, 172.9], [0, 0, 1]]
         calibration = {"camera_matrix": K, "distortion_coefficients": [], "image_width": 1242, "image_height": 375}
         write(rig / f"{name}.yaml", json.dumps(calibration))
         write(rig / f"{name}_T.txt", rows(camera.T_camera_lidar))
-    if images:
-        shutil.rmtree(rig / "front")
+    shutil.rmtree(rig / "front")
     shutil.rmtree(rig / "labels")
 
 
@@ -206,6 +205,27 @@ def check_rig(rig, names):
 def test_cameras_in_a_folder_have_the_files_of_their_names(rig, frame, names):
     write_rig(rig, frame, names)
     check_rig(rig, names)
+
+
+@pytest.mark.parametrize("has_own", [True, False], ids=["of its own", "of the other"])
+def test_a_transform_of_the_camera_goes_before_one_that_shows_more_points(rig, frame, has_own):
+    write_rig(rig, frame, ("front", "rear"))
+    turn = np.diag([-1.0, -1, 1, 1])
+    ahead = np.asarray(frame.points[::50, :3]) @ turn[:3, :3]
+    for path in (rig / "lidar").iterdir():
+        points = np.zeros((len(frame.points) + len(ahead), 4), np.float32)
+        points[:, :3] = np.concatenate([frame.points[:, :3], ahead])
+        write(path, points.tobytes())
+    own = rig / "rear_T.txt"
+    if has_own:
+        write(own, rows(frame.images[0].camera.T_camera_lidar @ turn))
+    else:
+        own.unlink()
+    assert run("init", rig).exit_code == 0
+    rear = described(rig)["cameras"]["images_rear"]
+    assert rear["T_camera_lidar"] == ("rear_T.txt" if has_own else "front_T.txt")
+    asked = (rig / "ldls.toml").read_text().count("is this the transform of this camera? Its file is not named like it")
+    assert asked == (0 if has_own else 1)
 
 
 def test_names_that_are_times(tmp_path, frame):

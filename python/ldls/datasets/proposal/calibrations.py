@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path, PurePosixPath
@@ -58,12 +58,14 @@ class FoundTransform:
     Attributes:
         matrix: (4, 4) `T_camera_lidar`.
         line: Its key for ldls.toml.
+        file: The pattern of its file.
         how: Its place and how it was read, for comments.
         is_sure: True where the file says how it is to be read.
     """
 
     matrix: NDArray[np.float64]
     line: str
+    file: str
     how: str
     is_sure: bool
 
@@ -101,21 +103,23 @@ def camera_in(path: Path, pattern: str, hint: str) -> FoundCamera | None:
 def transforms_in(path: Path, pattern: str) -> list[FoundTransform]:
     """The transforms of a file, in all ways in which it can be read; none where it has none."""
     try:
-        return [FoundTransform(as_extrinsic(path), f"T_camera_lidar = {quoted(pattern)}", pattern, True)]
+        return [FoundTransform(as_extrinsic(path), f"T_camera_lidar = {quoted(pattern)}", pattern, pattern, True)]
     except (LdlsError, ImportError, ValueError):
         return [each for name, table in _tables(path) for each in _of_table(name, table, pattern)]
 
 
 def plausible_transforms(
-    found: Iterable[FoundTransform], camera: Camera, points: Points, size: tuple[int, int]
+    found: Iterable[FoundTransform], own: Collection[str], camera: Camera, points: Points, size: tuple[int, int]
 ) -> list[tuple[FoundTransform, float]]:
     """The transforms by which the lidar stands upright and about the most points are in view, and these shares.
 
-    They come in the order in which they were found, the usual ways first; of equal ones there is the first.
+    Those of the camera's `own` files go before all others, however many points these show. They come in the order in
+    which they were found, the usual ways first; of equal ones there is the first.
     """
     placed = [(each, *view_of(replace(camera, T_camera_lidar=each.matrix), points, size)) for each in found]
     seen = [each for each in placed if each[2] > 0]
     upright = [each for each in seen if each[1]] or seen
+    upright = [each for each in upright if each[0].file in own] or upright
     most = max((share for _, _, share in upright), default=0.0)
     different: list[tuple[FoundTransform, float]] = []
     for each, _, share in upright:
@@ -197,7 +201,7 @@ def _of_table(name: str, table: Mapping[str, Any], pattern: str) -> Iterator[Fou
         matrix = _rigid(fields, str(key))
         if matrix is not None:
             for words, read in (("as it stands", matrix), ("turned round", inverse(matrix))):
-                yield _found(read, f"{key} of {pattern}, {words}")
+                yield _found(read, pattern, f"{key} of {pattern}, {words}")
     shift = fields.find(*TRANSLATIONS)
     turn = fields.find(*ROTATIONS)
     if shift is None or turn is None:
@@ -212,7 +216,7 @@ def _of_table(name: str, table: Mapping[str, Any], pattern: str) -> Iterator[Fou
         except (LdlsError, TypeError, ValueError):
             continue
         frame = "" if optical else ", whose x looks ahead"
-        yield _found(matrix, f"{place}, as the pose of the {pose_of}{frame}, {way}")
+        yield _found(matrix, pattern, f"{place}, as the pose of the {pose_of}{frame}, {way}")
 
 
 def _rigid(fields: Fields, key: str) -> NDArray[np.float64] | None:
@@ -227,8 +231,8 @@ def _rigid(fields: Fields, key: str) -> NDArray[np.float64] | None:
         return None
 
 
-def _found(matrix: NDArray[np.float64], how: str) -> FoundTransform:
-    return FoundTransform(matrix, matrix_line("T_camera_lidar", matrix), how, False)
+def _found(matrix: NDArray[np.float64], file: str, how: str) -> FoundTransform:
+    return FoundTransform(matrix, matrix_line("T_camera_lidar", matrix), file, how, False)
 
 
 def _values(value: Any) -> Any:  # noqa: ANN401 - whatever stands in a file

@@ -235,7 +235,8 @@ def _add_calibration(
         _judge(made, name, share, found.camera.T_camera_lidar, upright=upright)
         return
     transforms = [each for pattern in small for each in transforms_in(_file(pattern, sweeps), pattern.text)]
-    plausible = plausible_transforms(transforms, found.camera, points, size)
+    own_files = [pattern.text for pattern in own]
+    plausible = plausible_transforms(transforms, own_files, found.camera, points, size)
     if not plausible:
         turned = f", none of {len(transforms)} tried shows a point" if transforms else ""
         doubt = doubt_of_distance(transforms[0].matrix) if transforms else None
@@ -247,6 +248,8 @@ def _add_calibration(
     chosen, share = plausible[0]
     made.lines.append(chosen.line)
     made.found.append(f"{chosen.how}: where the lidar is, for {name}")
+    if len(cameras) > 1 and chosen.file not in own_files:
+        made.ask("is this the transform of this camera? Its file is not named like it")
     if not chosen.is_sure:
         made.ask(f"T_camera_lidar is {chosen.how}, one of {len(transforms)} ways to read it; is it right?")
         for another, also in plausible[1 : 1 + MOST_OTHERS]:
