@@ -186,25 +186,47 @@ def write_rig(rig, frame, names):
     shutil.rmtree(rig / "labels")
 
 
-def check_rig(rig, names):
-    assert run("init", rig).exit_code == 0
-    assert "No file has its name" not in (rig / "ldls.toml").read_text()
-    cameras = described(rig)["cameras"].values()
-    named = {Path(camera["images"]).parent.name: camera["calibration"] for camera in cameras}
-    assert named == {name: f"{name}.yaml" for name in names}
-
-
 @pytest.mark.parametrize(
     "names",
     [
         pytest.param(("front", "rear"), id="two"),
         pytest.param(("back_left", "left"), id="one in the name of the other"),
         pytest.param(("r", "l"), id="letters that are in other words"),
+        pytest.param(("front", "left", "rear", "right"), id="four"),
+        pytest.param(("cam0", "cam1", "cam2", "cam3"), id="numbered"),
+        pytest.param(("cam7", "cam8", "cam9", "cam10", "cam11"), id="numbered like the frames"),
     ],
 )
 def test_cameras_in_a_folder_have_the_files_of_their_names(rig, frame, names):
     write_rig(rig, frame, names)
-    check_rig(rig, names)
+    for path in rig.rglob("0000*"):
+        path.rename(path.with_stem(str(int(path.stem))))
+    assert run("init", rig).exit_code == 0
+    assert "# ? is this" not in (rig / "ldls.toml").read_text()
+    cameras = described(rig)["cameras"].values()
+    named = {
+        Path(camera["images"]).parent.name: (camera["calibration"], camera["T_camera_lidar"]) for camera in cameras
+    }
+    assert named == {name: (f"{name}.yaml", f"{name}_T.txt") for name in names}
+
+
+@pytest.mark.parametrize("camera", ["front", "7"])
+def test_calibrations_named_like_frames_are_of_frames(rig, frame, camera):
+    in_kitti_files(rig, frame.images[0].camera)
+    for path in rig.rglob("0000*"):
+        path.rename(path.with_stem(str(int(path.stem))))
+    (rig / "front").rename(rig / camera)
+    assert run("init", rig).exit_code == 0
+    assert described(rig)["cameras"][camera]["calibration"] == "calib/{frame}.txt"
+
+
+def test_one_calibration_with_a_number_is_a_file(rig, frame):
+    camera = frame.images[0].camera
+    write(rig / "cam0.yaml", intrinsics(camera))
+    write(rig / "T0.txt", rows(camera.T_camera_lidar))
+    assert run("init", rig).exit_code == 0
+    assert described(rig)["cameras"]["front"]["calibration"] == "cam0.yaml"
+    assert len(open_source(rig)) == len(NAMES)
 
 
 @pytest.mark.parametrize("has_own", [True, False], ids=["of its own", "of the other"])

@@ -20,7 +20,7 @@ NO_NUMBER = "/"
 """In the place of what follows the number, which has no separator."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pattern:
     """Files of one kind, one a frame.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -40,6 +40,8 @@ NO_IMAGE_WORDS = ("mask", "inst", "seg", "label", "panoptic", "birds-eye", "comp
 """Parts of the names of pictures that no camera took."""
 MOST_OTHERS = 3
 """Other ways to read a transform that are listed."""
+MOST_CAMERAS = 32
+"""Files of one pattern that may be of as many cameras, each with its own name."""
 FEWEST_POINTS = 50
 """Rows of numbers that make a text a cloud."""
 
@@ -178,7 +180,7 @@ def _add_camera(
 def _add_masks(
     made: Proposal, picture: Pattern, others: Iterable[Pattern], size: tuple[int, int], *, alone: bool
 ) -> None:
-    place = PurePosixPath(picture.text).parent.name
+    place = _place(picture).name
     fitting = []
     for other in others:
         common = other.shared(picture)
@@ -206,12 +208,12 @@ def _add_calibration(
     size: tuple[int, int],
 ) -> None:
     name = _name(picture)
+    frames = picture.shared(sweeps)
     small = [
-        pattern
+        each
         for pattern in others
-        if pattern.suffix in CALIBRATIONS
-        and pattern.first[1].stat().st_size <= MAX_BYTES
-        and (len(pattern.files) == 1 or pattern.shared(sweeps))
+        if pattern.suffix in CALIBRATIONS and pattern.first[1].stat().st_size <= MAX_BYTES
+        for each in _by_frame_or_camera(pattern, frames, cameras)
     ]
     # of several cameras each has a file that is named like it, if there is one
     own = [pattern for pattern in small if _owner(pattern, cameras) is picture]
@@ -258,6 +260,17 @@ def _add_calibration(
     _judge(made, name, share, chosen.matrix)
 
 
+def _by_frame_or_camera(pattern: Pattern, frames: Set[str], cameras: Sequence[Pattern]) -> Sequence[Pattern]:
+    """The pattern where it has a file a frame, its files where they are of cameras, as cam0.yaml and cam1.yaml."""
+    if len(pattern.files) > MOST_CAMERAS:
+        return [pattern] if frames & pattern.files.keys() else []
+    files = [Pattern(pattern.text.replace(FRAME, name), {name: path}) for name, path in pattern.files.items()]
+    owners = {_owner(file, cameras) for file in files} - {_owner(pattern, cameras), None}
+    # a camera named 2 may have the name of a frame
+    are_of_cameras = any(not _place(owner).name.isdigit() for owner in owners if owner is not None)
+    return [pattern] if frames <= pattern.files.keys() and not are_of_cameras else files
+
+
 def _camera_of(pattern: Pattern, sweeps: Pattern, name: str) -> FoundCamera | None:
     return camera_in(_file(pattern, sweeps), pattern.text, name.rpartition("_")[2])
 
@@ -278,8 +291,12 @@ def _judge(
         warnings.warn(f"{name}: {doubt}", ScaleWarning, stacklevel=4)
 
 
+def _place(picture: Pattern) -> PurePosixPath:
+    return PurePosixPath(picture.text).parent
+
+
 def _name(picture: Pattern) -> str:
-    place = PurePosixPath(picture.text).parent
+    place = _place(picture)
     return "camera" if place == PurePosixPath() else "_".join(place.parts).replace(" ", "_")
 
 
@@ -288,7 +305,7 @@ def _owner(pattern: Pattern, cameras: Iterable[Pattern]) -> Pattern | None:
     text = pattern.text.lower()
     fits = []
     for camera in cameras:
-        names = {_name(camera).lower(), PurePosixPath(camera.text).parent.name.lower()} - {""}
+        names = {_name(camera).lower(), _place(camera).name.lower()} - {""}
         # a whole word before a part of one
         fit = max(((_is_word(name, text), len(name)) for name in names if name in text), default=None)
         if fit is not None:
