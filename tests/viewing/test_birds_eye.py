@@ -166,6 +166,16 @@ def test_an_object_beyond_the_picture_is_not_named_at_its_edge(range_m, is_named
     assert (np.abs(picture - instance_colours([3])[0]).max(axis=2) <= 3).any() == is_named
 
 
+def test_an_object_that_crosses_the_picture_is_named_though_no_corner_lies_in_it(monkeypatch) -> None:
+    train = np.random.default_rng(5).uniform([-20, 0.2, 5], [20, 1.4, 7], (900, 3))
+    masks = ldls.InstanceMasks.from_boxes([[0, 0, 399, 159]], (160, 400), categories=[7])
+    result = ldls.segment(train, masks, ldls.Camera(projection=[[20, 0, 200], [0, 20, 80], [0, 0, 1]]))
+    named = []
+    monkeypatch.setattr("ldls.viewing.birds_eye.draw_tags", lambda _, tags, *_others, **_more: named.extend(tags))
+    birds_eye_view(result, range_m=6)
+    assert [tag.text for tag in named] == ["train 1"]
+
+
 @pytest.mark.parametrize(
     "points",
     [
