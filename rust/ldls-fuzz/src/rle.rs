@@ -171,15 +171,29 @@ fn check(found: Option<&Rle>, expected: Option<&[u32]>, height: usize, width: us
         );
         return Outcome::Refused;
     };
+    let runs = without_empty(runs);
     assert_eq!(
         (found.height(), found.width(), found.runs()),
-        (height, width, runs)
+        (height, width, &runs[..])
     );
-    assert_eq!(found.to_compressed(), compress(runs));
+    assert_eq!(found.to_compressed(), compress(&runs));
     if height as u128 * width as u128 <= MOST_DECODED {
-        check_pixels(found, &decode(runs));
+        check_pixels(found, &decode(&runs));
     }
     Outcome::Accepted
+}
+
+/// The same pixels in runs of which none but the first is empty.
+fn without_empty(runs: &[u32]) -> Vec<u32> {
+    let mut joined = Vec::new();
+    for (at, &run) in runs.iter().enumerate() {
+        if at == 0 || run > 0 && joined.len() % 2 == at % 2 {
+            joined.push(run);
+        } else if let Some(last) = joined.last_mut() {
+            *last += run;
+        }
+    }
+    joined
 }
 
 /// The pixels of runs, column by column.
@@ -222,7 +236,7 @@ pub fn check_pixels(found: &Rle, pixels: &[bool]) {
     let inverted: Vec<bool> = rows.iter().map(|pixel| !pixel).collect();
     assert_eq!(outside.crop([0, 0, height, width]), Ok(inverted));
     let again = Rle::from_pixels(height, width, &rows).expect("it is an image");
-    assert_eq!(again.crop([0, 0, height, width]), Ok(rows));
+    assert_eq!(&again, found);
     assert_eq!(found.union(&outside).area(), pixels.len());
     assert_eq!(found.difference(found).area(), 0);
 }
