@@ -148,7 +148,7 @@ class UprightWarning(LdlsWarning):
 
 
 class ImageSizeWarning(LdlsWarning):
-    """Masks of an image so much larger or smaller than the camera's that one of them was probably resized."""
+    """Masks of an image that is probably not the camera's, but resized, or of rows for columns."""
 
 
 class NothingInView(LdlsWarning):

@@ -167,7 +167,7 @@ def read_sensors(tables: Path, channels: Sequence[str]) -> dict[str, CalibratedS
 def read_readings(
     tables: Path, samples: Mapping[str, str], sensors: Mapping[str, CalibratedSensor | None]
 ) -> dict[str, dict[str, Reading]]:
-    """Readings of `sensors`, None of which are not wanted, for the key frames `samples`, by sample and channel.
+    """Readings of `sensors`, but for those that are None, for the key frames `samples`, by sample and channel.
 
     Raises:
         CorruptFileError: The table is broken, or has readings of a sensor that `sensors` lack.

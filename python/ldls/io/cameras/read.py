@@ -97,7 +97,7 @@ def read_camera(
 
 
 def is_kitti(path: Path) -> bool:
-    """Return True for a calibration file of KITTI, and the folder of a day of KITTI raw."""
+    """True for a calibration file of KITTI, and the folder of a day of KITTI raw."""
     if path.is_dir():
         return True
     with open_file(path, "calibration", limit=kitti.MAX_BYTES) as file:
