@@ -81,10 +81,10 @@ def test_a_signal_handler_that_raises_stops_a_call():
     def raise_(*_):
         raise TimeoutError("enough")
 
+    points = np.random.default_rng(0).uniform(-50, 50, (3_000_000, 3))
     before = signal.signal(signal.SIGALRM, raise_)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)
-        points = np.random.default_rng(0).uniform(-50, 50, (3_000_000, 3))
         with pytest.raises(TimeoutError, match="enough"):
             for _ in range(100):
                 stages.neighbors(points, k=20)
