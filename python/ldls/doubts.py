@@ -22,7 +22,7 @@ from ldls.errors import (
     some,
 )
 from ldls.segmentation import Segmentation
-from ldls.stages import GROUND_M, ground
+from ldls.stages import ground, on_ground
 from ldls.view import SeenView, View, camera_names
 
 COARSEST_STEP_M = 0.01
@@ -182,8 +182,7 @@ def _leans(seen: SeenView, result: Segmentation) -> bool:
 
 def _share_of_ground(points: Points, camera: Camera, threads: int | None) -> float:
     heights = ground(points, camera, threads=threads)
-    low, high = GROUND_M
-    return float(np.mean((heights > low) & (heights < high))) if len(heights) else 0.0
+    return float(on_ground(heights).mean()) if len(heights) else 0.0
 
 
 def nothing_in_view(result: Segmentation) -> str | None:

@@ -141,8 +141,7 @@ def ground(
 
     The ground is a surface of degree 5 through the lowest points of polar cells around the camera, fitted so that what
     stands on it does not count, and with `local_ground` what lies level around each point. Up is z of the lidar frame,
-    or -y where the camera looks along its z, as in clouds that are in the frame of the camera. Points from -0.3 m to
-    0.15 m are the ground's.
+    or -y where the camera looks along its z, as in clouds that are in the frame of the camera.
 
     Args:
         points: (n, >= 3) finite, in metres.
@@ -152,6 +151,17 @@ def ground(
     """
     Params(threads=threads)
     return _ldls.ground(_finite_xyz(points), camera.core, local_ground, threads)
+
+
+@checked
+def on_ground(heights: ArrayLike) -> NDArray[np.bool_]:
+    """(n,) True for points that are the ground's: those from -0.3 m to 0.15 m above it.
+
+    Args:
+        heights: (n,) of `ground`.
+    """
+    above = numbers("heights", heights, np.float64, ("n",))
+    return (above > GROUND_M[0]) & (above < GROUND_M[1])
 
 
 @checked
@@ -239,12 +249,10 @@ def point_graph(
         threads: As in `Params`.
     """
     Params(sigma=sigma, ground_edges=ground_edges, threads=threads)
-    xyz, on_ground = _finite_xyz(points), None
+    xyz = _finite_xyz(points)
     columns = numbers("indices", indices, np.uint32, (len(xyz), "k"))
-    if heights is not None:
-        above = numbers("heights", heights, np.float64, (len(xyz),))
-        on_ground = (above > GROUND_M[0]) & (above < GROUND_M[1])
-    return _csr(_ldls.point_graph(xyz, columns, sigma, on_ground, ground_edges, threads), len(columns))
+    ground_rows = None if heights is None else on_ground(numbers("heights", heights, np.float64, (len(xyz),)))
+    return _csr(_ldls.point_graph(xyz, columns, sigma, ground_rows, ground_edges, threads), len(columns))
 
 
 @checked

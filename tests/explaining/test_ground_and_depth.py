@@ -177,7 +177,7 @@ def test_labels_that_depth_refuses_are_those_of_the_verdicts(street):
 
 def test_edges_that_leave_the_ground_are_told_apart(street):
     result, system, explanations = street
-    low = (system.heights > stages.GROUND_M[0]) & (system.heights < stages.GROUND_M[1])
+    low = stages.on_ground(system.heights)
     leave = 0
     for point, found in explanations.items():
         row = int(result.in_view.searchsorted(point))

@@ -19,7 +19,6 @@ from ldls.datasets import Frame, Source, odometry_of
 from ldls.datasets.file_source import counts_of
 from ldls.datasets.frame import LEAVE_POSES_OUT
 from ldls.datasets.nuscenes import NuScenesSource
-from ldls.datasets.odometry import PERIOD_S
 from ldls.errors import BatchError, LdlsError, LdlsWarning, PoseError, some, within
 from ldls.io import read_poses
 from ldls.io.files import MAX_TEXT_BYTES, digest_of, open_file
@@ -28,6 +27,7 @@ from ldls.io.poses import kitti, tum
 from ldls.io.poses.pose_rows import pose_rows
 from ldls.io.poses.read import format_of
 from ldls.sequences import Trajectory
+from ldls.sequences.odometry import PERIOD_S
 
 KISS_ICP = "kiss-icp"
 """What stands in the place of a file where the sweeps themselves are to say how the lidar moved."""

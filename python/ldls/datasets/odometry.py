@@ -9,10 +9,8 @@ from ldls.checks import checked
 from ldls.datasets.frame import Frame, Source
 from ldls.errors import InputError, LdlsError, LeftOutWarning, PoseError, SourceError, some, within
 from ldls.sequences import Trajectory
-from ldls.sequences.odometry import Parts, Way
+from ldls.sequences.odometry import PERIOD_S, Parts, Way
 
-PERIOD_S = 0.1
-"""Time between sweeps where the source has no stamps: lidars turn ten times a second."""
 MOST_LEFT_OUT = 2
 """With more sweeps in a row left out the way may be lost unseen: at 14 m/s two cost nothing, three some metres."""
 BEGINNING = 3

@@ -138,10 +138,7 @@ def _ground(result: Segmentation, system: Rebuilt) -> NDArray[np.bool_]:
     """(n,) True for points of the ground, where edges that leave it are weakened."""
     if system.heights is None or result.params.ground_edges == 1:
         return np.zeros(len(system.in_graph), bool)
-    lowest, highest = stages.GROUND_M
-    heights = system.heights[np.searchsorted(result.in_view, system.in_graph)]
-    on_ground: NDArray[np.bool_] = (heights > lowest) & (heights < highest)
-    return on_ground
+    return stages.on_ground(system.heights[np.searchsorted(result.in_view, system.in_graph)])
 
 
 def _likelihoods(z: NDArray[np.float64], diffused_label: int) -> tuple[Likelihood, ...]:

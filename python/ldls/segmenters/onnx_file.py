@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 from typing import Any
 
 from ldls._optional import require
@@ -20,10 +20,9 @@ from ldls.errors import (
     CorruptFileError,
     LimitError,
     TruncatedFileError,
-    UnsafePathError,
     UnsupportedFormatError,
 )
-from ldls.io.files import open_file
+from ldls.io.files import open_file, strictly_below
 
 MAX_BYTES = 2 << 30
 """Largest model file; protobuf, of which ONNX is made, ends there. Larger weights lie in files of their own."""
@@ -202,7 +201,8 @@ def _dense(sparse_tensors: Iterable[Any]) -> Iterator[Any]:
 
 def _check_external(path: Path, tensor: Any) -> None:  # noqa: ANN401
     entries = {entry.key: entry.value for entry in tensor.external_data}
-    weights = _contained(path, tensor.name, entries.get("location", ""))
+    folder = path.resolve().parent
+    weights = strictly_below(folder, entries.get("location", ""), place=f"tensor {tensor.name!r}")
     offset = _whole_number(tensor.name, entries.get("offset", "0"))
     length = _whole_number(tensor.name, entries.get("length", str(_bytes_needed(tensor))))
     if not os.path.isfile(weights):  # noqa: PTH113 - unlike Path.is_file, it takes any name
@@ -215,21 +215,6 @@ def _check_external(path: Path, tensor: Any) -> None:  # noqa: ANN401
             f"{weights}: tensor {tensor.name!r} ends at byte {offset + length}, the file after {size}; "
             "download it again"
         )
-
-
-def _contained(path: Path, name: str, location: str) -> Path:
-    """The file at `location`, which must lie in the model's folder when every link is followed."""
-    folder = path.resolve().parent
-    posix, windows = PurePosixPath(location), PureWindowsPath(location)
-    leads_out = posix.is_absolute() or windows.drive or windows.root or ".." in windows.parts or "\0" in location
-    if location and not leads_out:
-        weights = (folder / location).resolve()
-        if weights.is_relative_to(folder):
-            return weights
-    raise UnsafePathError(
-        f"tensor {name!r} lies at {location!r}, expected a file in the model's folder; "
-        "put it there and save the model again"
-    )
 
 
 def _whole_number(name: str, text: str) -> int:

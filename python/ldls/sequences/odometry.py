@@ -26,7 +26,7 @@ from ldls.sequences.trajectory import LONGEST_GAP_S, Trajectory, is_gap
 BEGINNINGS = 2
 """Times that the first two sweeps are laid on each other again, each time with less of their motion in them."""
 PERIOD_S = 0.1
-"""Time between sweeps, as long as it is not known."""
+"""Time between sweeps, as long as it is not known: lidars turn ten times a second."""
 FARTHEST_M = 100.0
 """Points farther away are too sparse to be found again."""
 VOXEL_M = 0.5

@@ -29,7 +29,7 @@ from ldls.sequences.sweeps import Sweep, check_order, check_points
 from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track
 from ldls.sequences.trajectory import SAME_S
 
-LONGEST_GAP_S = 10.0
+KEPT_S = 10.0
 """Time without a point after which a track ends."""
 TWO_OBJECTS = 4
 """Sweeps of the last two seconds with masks of both, from which on two tracks are two objects, however near."""
@@ -163,7 +163,7 @@ class Tracker:
             going_on: Tracks that have a label at the moment or later. Another label goes on with one if it is in its
                 place or a few points on it, and they are joined with no other.
         """
-        self._tracks = [track for track in self._tracks if stamp - track.stamp <= LONGEST_GAP_S + SAME_S]
+        self._tracks = [track for track in self._tracks if stamp - track.stamp <= KEPT_S + SAME_S]
         if not sightings:
             return {}
         labels = list(sightings)
