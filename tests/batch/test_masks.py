@@ -1,11 +1,14 @@
 """Runs with one file of all masks, and with the masks that a source names itself."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
+import ldls
 from batch import runs
 from datasets import layouts
 from ldls import batch
@@ -117,6 +120,31 @@ def test_a_changed_file_of_the_source_s_masks_is_refused(folder, tmp_path):
     layouts.write_text(folder / "masks/b.json", json.dumps(layouts.coco(45)))
     with pytest.raises(BatchError, match=r"masks/b\.json, of which frame b was made, was changed since"):
         run(folder, tmp_path / "out")
+
+
+@pytest.mark.parametrize("given", [False, True], ids=["of the source", "given"])
+@pytest.mark.parametrize("change", ["another", "one more", "one less"])
+def test_masks_that_are_a_folder_of_pictures(folder, tmp_path, given, change):
+    """As Segment Anything's script writes them, one picture an instance."""
+    for name in "ab":
+        masks = ldls.read_masks(folder / f"masks/{name}.json")
+        (folder / f"masks/{name}").mkdir()
+        for number, mask in enumerate(masks.to_array()):
+            Image.fromarray(mask.astype(np.uint8) * 255).save(folder / f"masks/{name}/{number}.png")
+    text = (folder / "ldls.toml").read_text()
+    layouts.write_text(folder / "ldls.toml", text.replace("masks/{frame}.json", "masks/{frame}"))
+    place = f"{folder}/masks/{{frame}}" if given else None
+    assert run(folder, tmp_path / "out", place).n_done == 2
+    assert run(folder, tmp_path / "out", place).n_earlier == 2
+    first = folder / "masks/b/0.png"
+    if change == "another":
+        Image.fromarray(255 - np.asarray(Image.open(first))).save(first)
+    elif change == "one more":
+        shutil.copy(first, first.with_stem("7"))
+    else:
+        first.unlink()
+    with pytest.raises(BatchError, match="masks/b, of which frame b was made, was changed since"):
+        run(folder, tmp_path / "out", place)
 
 
 def test_a_frame_whose_masks_the_source_names_and_does_not_have_fails(folder, tmp_path):

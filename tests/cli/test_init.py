@@ -210,12 +210,15 @@ def test_cameras_in_a_folder_have_the_files_of_their_names(rig, frame, names):
     assert named == {name: (f"{name}.yaml", f"{name}_T.txt") for name in names}
 
 
+@pytest.mark.parametrize("lacks_one", [False, True], ids=["each", "not each"])
 @pytest.mark.parametrize("camera", ["front", "7"])
-def test_calibrations_named_like_frames_are_of_frames(rig, frame, camera):
+def test_calibrations_named_like_frames_are_of_frames(rig, frame, camera, lacks_one):
     in_kitti_files(rig, frame.images[0].camera)
     for path in rig.rglob("0000*"):
         path.rename(path.with_stem(str(int(path.stem))))
     (rig / "front").rename(rig / camera)
+    if lacks_one:
+        min((rig / "calib").iterdir()).unlink()
     assert run("init", rig).exit_code == 0
     assert described(rig)["cameras"][camera]["calibration"] == "calib/{frame}.txt"
 

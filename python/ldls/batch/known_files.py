@@ -1,7 +1,11 @@
-"""What is known of the files of a run, so that changes are noticed: size, time of change and digest."""
+"""What is known of the files of a run, so that changes are noticed: size, time of change and digest.
+
+A folder, as of masks that are a file each, has the sum, the latest and the digest of those of its files.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from functools import lru_cache
 from pathlib import Path
 
@@ -44,10 +48,10 @@ class KnownFiles:
 def look(path: Path) -> Look:
     """Size and time of change of a file."""
     try:
-        found = path.stat()
+        found = [file.stat() for file in _files(path)]
     except (FileNotFoundError, ValueError):  # a name with a NUL, for one
         return None
-    return found.st_size, found.st_mtime_ns
+    return sum(each.st_size for each in found), max((each.st_mtime_ns for each in found), default=0)
 
 
 def written(path: Path) -> list[int | str]:
@@ -62,4 +66,11 @@ def is_written(path: Path, state: list[int | str]) -> bool:
 
 def _digest(path: Path, seen: Look) -> str:
     """Digest of a file; `seen` tells two states of it apart."""
-    return digest_of(path)
+    if not path.is_dir():
+        return digest_of(path)
+    lines = "".join(f"{digest_of(file)} {file.name}\n" for file in _files(path))
+    return hashlib.sha256(lines.encode(errors="surrogateescape")).hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
+    return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]

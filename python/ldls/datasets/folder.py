@@ -93,7 +93,7 @@ class FolderSource(FileSource):
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from, those of its cameras and stamps among them."""
         own = (self._one(place, self.names[index]) for place in self._places if FRAME in place)
-        return (*self._shared, *super().files(index), *(path for path in own if path.is_file()))
+        return (*self._shared, *super().files(index), *(path for path in own if path.exists()))
 
     def _shared_files(self) -> tuple[Path, ...]:
         paths = [self._safe(place) for place in self._places if FRAME not in place]

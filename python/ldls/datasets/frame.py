@@ -139,7 +139,7 @@ class Source(Protocol):
         ...
 
     def files(self, index: int) -> tuple[Path, ...]:
-        """The files that a frame is read from, found without reading them."""
+        """The files that a frame is read from, found without reading them, and folders of files."""
         ...
 
     def __getitem__(self, index: int) -> Frame:

@@ -261,14 +261,15 @@ def _add_calibration(
 
 
 def _by_frame_or_camera(pattern: Pattern, frames: Set[str], cameras: Sequence[Pattern]) -> Sequence[Pattern]:
-    """The pattern where it has a file a frame, its files where they are of cameras, as cam0.yaml and cam1.yaml."""
+    """The pattern where its files are of frames, some of which may have none; else its files, as cam0.yaml, cam1.yaml."""
     if len(pattern.files) > MOST_CAMERAS:
         return [pattern] if frames & pattern.files.keys() else []
     files = [Pattern(pattern.text.replace(FRAME, name), {name: path}) for name, path in pattern.files.items()]
     owners = {_owner(file, cameras) for file in files} - {_owner(pattern, cameras), None}
     # a camera named 2 may have the name of a frame
     are_of_cameras = any(not _place(owner).name.isdigit() for owner in owners if owner is not None)
-    return [pattern] if frames <= pattern.files.keys() and not are_of_cameras else files
+    of_frames = len(frames & pattern.files.keys())
+    return [pattern] if not are_of_cameras and (of_frames == len(frames) or of_frames > len(cameras)) else files
 
 
 def _camera_of(pattern: Pattern, sweeps: Pattern, name: str) -> FoundCamera | None:
