@@ -18,7 +18,6 @@ from ldls.cli.frame_files import (
     ExtrinsicOption,
     FisheyeOption,
     RectifiedOption,
-    camera_name,
     camera_of,
 )
 from ldls.cli.messages import console, speaks_plainly
@@ -122,10 +121,9 @@ def explain(
     else:
         if points is None or calib is None or masks is None:
             raise InputError("RESULT: missing; give an .npz file of ldls, or --points, --calib and --masks, all three")
-        seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
+        seen_by, called = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
         instances = masks_of(None, masks=masks, segmenter=None, image_id=image_id, image_size=seen_by.image_size)
-        seen = View(instances, seen_by, camera_name(calib, camera))
-        segmentation, view = segment(read_points(points, columns=columns), [seen]), None
+        segmentation, view = segment(read_points(points, columns=columns), [View(instances, seen_by, called)]), None
     chosen = chosen_point(point, segmentation, view, on)
     explanation = explain_point(segmentation, chosen.row)
     if as_json:

@@ -68,21 +68,23 @@ def camera_of(
     extrinsic: Path | None,
     fisheye: bool | None,
     rectified: bool | None,
-) -> Camera:
-    """The camera of a calibration file, by the words of a command line."""
+) -> tuple[Camera, str]:
+    """The camera of a calibration file, by the words of a command line, and its name."""
     from ldls.io import read_camera
 
-    return read_camera(calib, camera=_which(camera), T_camera_lidar=extrinsic, fisheye=fisheye, rectified=rectified)
+    seen_by = read_camera(calib, camera=_which(camera), T_camera_lidar=extrinsic, fisheye=fisheye, rectified=rectified)
+    return seen_by, camera_name(calib, camera)
 
 
 def camera_name(calib: Path, camera: str | None) -> str:
     """Name of the camera that `camera_of` reads: of KITTI's the folder of its images, empty where nothing names it."""
+    from ldls.io.cameras.kitti import camera_numbers
     from ldls.io.cameras.read import is_kitti
 
     which = _which(camera)
     if is_kitti(calib):
-        number = 2 if which is None else which
-        return f"image_{number:02}" if calib.is_dir() else f"image_{number}"
+        [name] = camera_numbers(which if isinstance(which, int) else 2, digits=2 if calib.is_dir() else 1)
+        return name
     return f"camera {which}" if isinstance(which, int) else which or ""
 
 

@@ -18,7 +18,6 @@ from ldls.cli.frame_files import (
     ExtrinsicOption,
     FisheyeOption,
     RectifiedOption,
-    camera_name,
     camera_of,
 )
 from ldls.cli.mask_options import (
@@ -127,7 +126,7 @@ def segment(
     }
     check_outputs(outputs, [points, calib, extrinsic, masks, segmenter_file(segmenter), image], made=out)
     pixels = None if image is None else read_image(image)
-    seen_by = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
+    seen_by, called = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
     chosen = masks_of(
         pixels,
         masks=masks,
@@ -139,7 +138,7 @@ def segment(
     )
     if save_masks is not None:
         save(chosen, save_masks)
-    view = View(chosen, seen_by, camera_name(calib, camera))
+    view = View(chosen, seen_by, called)
     result = label_points(read_points(points, columns=columns), [view], params=replace(params, threads=cores))
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, name, wanted, [pixels])

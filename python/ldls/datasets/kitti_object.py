@@ -13,9 +13,9 @@ from pathlib import Path
 from ldls.checks import checked
 from ldls.datasets.file_source import FileSource, choose, find_files, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
-from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import ParameterError
 from ldls.io import read_camera, read_masks
+from ldls.io.cameras.kitti import camera_numbers
 from ldls.io.images import read_image_size
 
 SPLITS = ("training", "testing")
@@ -66,7 +66,7 @@ class KittiObjectSource(FileSource):
             ParameterError: There is no such camera or truth, or there are masks and several cameras.
         """
         path = _training(Path(path), split)
-        self._numbers = {f"image_{n}": n for n in camera_numbers(camera)}
+        self._numbers = camera_numbers(camera)
         self._masks = masks
         self.stored_masks = {} if masks is None else dict.fromkeys(self._numbers, masks)
         parts = {

@@ -18,8 +18,8 @@ from ldls.checks import checked
 from ldls.checks.values import as_seconds, number_of
 from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
 from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
-from ldls.datasets.kitti_common import camera_numbers
 from ldls.io import read_camera, read_poses
+from ldls.io.cameras.kitti import camera_numbers
 from ldls.io.files import read_lines
 from ldls.io.images import read_image_size
 from ldls.io.kitti_stamps import read_stamps
@@ -71,7 +71,7 @@ class KittiOdometrySource(FileSource):
             ParameterError: There is no such camera.
         """
         path = _sequence(Path(path), sequence)
-        cameras = {f"image_{n}": n for n in camera_numbers(camera)}
+        cameras = camera_numbers(camera)
         points = find_points(path / "velodyne")
         images = {name: find_images(path / name) for name in cameras}
         super().__init__(path, {"velodyne": points, **images}, cameras, truth=truth)

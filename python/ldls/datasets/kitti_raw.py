@@ -27,10 +27,9 @@ from ldls.datasets.file_source import (
     image_from_file,
 )
 from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
-from ldls.datasets.kitti_common import camera_numbers
 from ldls.errors import CorruptFileError, SourceError
 from ldls.io import read_camera, read_poses
-from ldls.io.cameras.kitti import RAW_FILES
+from ldls.io.cameras.kitti import RAW_FILES, camera_numbers
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
 from ldls.io.poses.kitti_raw import CALIBRATION, STAMPS
 from ldls.sequences import Trajectory
@@ -94,7 +93,7 @@ class KittiRawSource(FileSource):
             ParameterError: There is no such camera.
         """
         path = _drive(Path(path), drive)
-        cameras = {f"image_{n:02d}": n for n in camera_numbers(camera)}
+        cameras = camera_numbers(camera, digits=2)
         check_folders(path, [LIDAR, *cameras])
         self._cameras = {name: read_camera(path.parent, camera=n) for name, n in cameras.items()}
         points = find_points(path / LIDAR / "data")

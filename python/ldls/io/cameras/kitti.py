@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
+from ldls.camera.rigid import from_parts
 from ldls.checks.values import number_of
 from ldls.errors import CalibrationError, ParameterError, within
 from ldls.io.files import read_lines
@@ -26,6 +27,22 @@ SPELLINGS = {"R_rect": "R0_rect", "R_rect_00": "R0_rect", "Tr_velo_cam": "Tr_vel
 TRANSFORM_SIZES = {"R": 9, "T": 3}
 
 Matrices = dict[str, NDArray[np.float64]]
+
+
+def camera_numbers(camera: int | Sequence[int], *, digits: int = 1) -> dict[str, int]:
+    """The numbers of one camera or several, by the folder of its images: 0 and 1 are grey, 2 and 3 in colour.
+
+    Args:
+        camera: The numbers.
+        digits: How many a folder's name has: 1 as image_2, in KITTI's raw data 2, as image_02.
+
+    Raises:
+        ParameterError: There is none, one stands there twice, or one is not 0 to 3.
+    """
+    numbers = (camera,) if isinstance(camera, int) else tuple(camera)
+    if not numbers or len(set(numbers)) != len(numbers) or not set(numbers) <= set(range(4)):
+        raise ParameterError(f"camera: got {camera!r}, expected a number from 0 to 3, or several different ones")
+    return {f"image_{number:0{digits}}": number for number in numbers}
 
 
 def read(path: str | PathLike[str], *, camera: int = 2, image_size: tuple[int, int] | None = None) -> Camera:
@@ -47,24 +64,19 @@ def read(path: str | PathLike[str], *, camera: int = 2, image_size: tuple[int, i
     if f"P{camera}" not in matrices and path.name in RAW_FILES:
         raise CalibrationError(f"{path}: half a calibration of KITTI raw; pass the folder of the day, {path.parent}")
     projection = _get_matrix(path, matrices, f"P{camera}", OBJECT_ARCHIVE).reshape(3, 4)
-    if "Tr" in matrices and "Tr_velo_to_cam" not in matrices:
-        T_camera_lidar = _homogeneous(matrices["Tr"].reshape(3, 4))
-    else:
-        T_camera_lidar = _rectified(path, matrices)
+    key = "Tr" if "Tr" in matrices and "Tr_velo_to_cam" not in matrices else "Tr_velo_to_cam"
+    to_camera = _get_matrix(path, matrices, key, OBJECT_ARCHIVE).reshape(3, 4)
+    T_camera_lidar = from_parts(to_camera[:, :3], to_camera[:, 3])
+    if key != "Tr":
+        T_camera_lidar = _turned(_get_matrix(path, matrices, "R0_rect", OBJECT_ARCHIVE), T_camera_lidar)
     with within(path):
         return Camera(projection=projection, T_camera_lidar=T_camera_lidar, image_size=image_size)
-
-
-def _rectified(path: Path, matrices: Matrices) -> NDArray[np.float64]:
-    """(4, 4) from lidar to rectified camera coordinates."""
-    velo_to_cam = _homogeneous(_get_matrix(path, matrices, "Tr_velo_to_cam", OBJECT_ARCHIVE).reshape(3, 4))
-    return _turned(_get_matrix(path, matrices, "R0_rect", OBJECT_ARCHIVE), velo_to_cam)
 
 
 def _turned(rotation: NDArray[np.float64], transform: NDArray[np.float64]) -> NDArray[np.float64]:
     """(4, 4) a transform followed by a rotation, of nine numbers."""
     with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is then not finite
-        return _homogeneous(rotation.reshape(3, 3)) @ transform
+        return from_parts(rotation.reshape(3, 3)) @ transform
 
 
 def read_raw(folder: str | PathLike[str], *, camera: int = 2) -> Camera:
@@ -103,7 +115,7 @@ def read_raw_transform(path: Path) -> NDArray[np.float64]:
     """
     matrices = _read_matrices(path, TRANSFORM_SIZES, {})
     rotation, translation = (_get_matrix(path, matrices, key, RAW_ARCHIVE) for key in TRANSFORM_SIZES)
-    return _homogeneous(np.column_stack([rotation.reshape(3, 3), translation]))
+    return from_parts(rotation.reshape(3, 3), translation)
 
 
 def _check_number(camera: int) -> None:
@@ -153,13 +165,6 @@ def _get_matrix(path: Path, matrices: Matrices, key: str, archive: str) -> NDArr
         found = " ".join(matrices) or "none"
         raise CalibrationError(f"{path}: key '{key}' missing; found {found}; did you unpack {archive}?")
     return matrices[key]
-
-
-def _homogeneous(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(4, 4) from a (3, 3) rotation or a (3, 4) transform."""
-    full = np.eye(4)
-    full[:3, : matrix.shape[1]] = matrix
-    return full
 
 
 def _numbers(place: str, words: list[str], expected: int) -> NDArray[np.float64]:
