@@ -2,6 +2,7 @@
 
 import functools
 import json
+import re
 
 import numpy as np
 import pytest
@@ -147,6 +148,23 @@ def test_polygons_of_cityscapes_and_mapillary(tmp_path, size, thing, surface, na
     assert [mask.name for mask in masks] == [name]
     (tmp_path / "a.json").write_text(json.dumps(size | {"objects": [{"label": thing, "polygon": corners[:2]}]}))
     with pytest.raises(ldls.MaskError, match=r"a\.json: object 0: polygon of 2 points"):
+        ldls.read_masks(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("polygon", "found"),
+    [
+        pytest.param(5, "expected shape (n, 2), got ()", id="a number"),
+        pytest.param("abc", "expected numbers, got 'abc'", id="text"),
+        pytest.param([[1, 2], [3]], "expected an array of numbers, got [[1, 2], [3]]", id="half a point"),
+        pytest.param([[1, 2], [3, None]], "expected numbers, got [[1, 2], [3, None]]", id="half a point of two"),
+    ],
+)
+@pytest.mark.parametrize("label", ["car", "road"])
+def test_what_is_no_polygon_is_named_with_its_object(tmp_path, label, polygon, found):
+    content = {"imgHeight": 60, "imgWidth": 80, "objects": [{"label": label, "polygon": polygon}]}
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.raises(ldls.MaskError, match=re.escape(f"a.json: object 0: polygon: {found}")):
         ldls.read_masks(tmp_path / "a.json")
 
 

@@ -115,14 +115,12 @@ def join(rles: Sequence[_ldls.Rle], image_size: tuple[int, int]) -> NDArray[np.u
 def _spans(rle: _ldls.Rle) -> NDArray[np.int64]:
     """(S, 2) first pixel and end of each run of ones, counted column by column."""
     edges = np.cumsum(rle.runs(), dtype=np.int64)
-    spans = edges[: len(edges) // 2 * 2].reshape(-1, 2)
-    return spans[spans[:, 0] < spans[:, 1]]
+    return edges[: len(edges) // 2 * 2].reshape(-1, 2)
 
 
 def _from_spans(spans: NDArray[np.int64], height: int, width: int) -> _ldls.Rle:
     edges = np.concatenate([[0], spans.ravel(), [height * width]])
-    runs = np.diff(edges).astype(np.uint32)
-    return _ldls.Rle.from_runs(height, width, runs if runs[-1] else runs[:-1])
+    return _ldls.Rle.from_runs(height, width, np.diff(edges).astype(np.uint32))
 
 
 def _refuse_overlaps(spans: NDArray[np.int64], owners: NDArray[np.int64], height: int) -> None:

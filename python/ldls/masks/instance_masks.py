@@ -14,7 +14,7 @@ from ldls.checks import as_array, as_python, checked, numbers, shown, whole_numb
 from ldls.errors import InputError, LimitError, MaskError, ParameterError, within
 from ldls.masks import adapters, coco, instance_image
 from ldls.masks.instance_mask import InstanceMask
-from ldls.masks.pixels import checked_size, encode, rectangles
+from ldls.masks.pixels import checked_size, encode, rectangles, uncovered
 
 MAX_INSTANCES = 65_535
 """Most masks of an image: labels of pixels have 16 bits."""
@@ -309,13 +309,7 @@ class InstanceMasks:
             "area": np.array(self.core.areas()),
             "order": np.arange(len(self)),
         }
-        rles = [mask.rle for mask in self]
-        taken = None
-        for i in np.argsort(keys[by], kind="stable"):
-            own = rles[i]
-            rles[i] = own if taken is None else own.difference(taken)
-            taken = own if taken is None else own.union(taken)
-        return self._with(rles)
+        return self._with(uncovered([mask.rle for mask in self], np.argsort(keys[by], kind="stable")))
 
     @checked
     def grow(self, radius: int) -> Self:

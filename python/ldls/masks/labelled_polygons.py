@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, category_ids, class_id, folded, is_object
-from ldls.errors import CorruptFileError, MaskError, within
+from ldls.checks import numbers
+from ldls.errors import MaskError, within
 from ldls.masks.coco import records
-from ldls.masks.pixels import checked_size
+from ldls.masks.pixels import checked_size, uncovered
 
 CIRCLE_CORNERS = 64
 RECTANGLES = ("rectangle", "oriented_rectangle")
@@ -42,7 +43,7 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
         names: Name of each category id, for labels that COCO does not know.
 
     Raises:
-        MaskError: A shape that covers nothing, such as a line.
+        MaskError: A shape that covers nothing, such as a line, or whose points are none.
         CorruptFileError: It is not labelme's.
     """
     size = checked_size((content.get("imageHeight"), content.get("imageWidth")))
@@ -53,7 +54,8 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
             continue
         with within(f"shape {i}"):
             own = (folded(label), ("alone", i) if group is None else group)
-            parts.setdefault(own, (label, []))[1].append(_polygon(shape))
+            corners = _corners(shape.get("shape_type") or "polygon", _points("points", shape))
+            parts.setdefault(own, (label, []))[1].append(corners)
     rles = [_ldls.Rle.from_polygons(*size, part) for _, part in parts.values()]
     return _arguments(size, [label for label, _ in parts.values()], rles, names)
 
@@ -69,7 +71,7 @@ def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None 
         names: Name of each category id, for labels that COCO does not know.
 
     Raises:
-        MaskError: A polygon of fewer than three points.
+        MaskError: A polygon that is none, or has fewer than three points.
         CorruptFileError: It is of neither.
     """
     height, width = (content.get(f"img{side}", content.get(side.lower())) for side in ("Height", "Width"))
@@ -79,12 +81,13 @@ def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None 
     for i, each in enumerate(records("objects", content["objects"])):
         parts = str(each.get("label")).split("--")
         is_thing = parts[0] in THINGS if len(parts) == 1 else parts[0] in MAPILLARY_THINGS
-        polygon = each.get("polygon") or ()
-        covers = drawn_in_order and parts[0] != NOT_DRAWN and len(polygon) > 2
+        covers = drawn_in_order and parts[0] != NOT_DRAWN
         if each.get("deleted") or not (is_thing or covers):
             continue
         with within(f"object {i}"):
-            rles.append(_ldls.Rle.from_polygons(*size, [_polygon({"points": polygon})]))
+            polygon = _points("polygon", each)
+            if is_thing or len(polygon) > 2:
+                rles.append(_ldls.Rle.from_polygons(*size, [_corners("polygon", polygon)]))
         if not is_thing:
             continue
         plain = [part.replace("-", " ") for part in parts]
@@ -92,18 +95,8 @@ def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None 
         labels.append(next(known, plain[-1]))
         things.append(len(rles) - 1)
     if drawn_in_order:
-        rles = _uncovered(rles)
+        rles = uncovered(rles, reversed(range(len(rles))))
     return _arguments(size, labels, [rles[i] for i in things], names)
-
-
-def _uncovered(rles: Sequence[_ldls.Rle]) -> list[_ldls.Rle]:
-    """Each mask without the pixels of those after it."""
-    left: list[_ldls.Rle] = []
-    covered: _ldls.Rle | None = None
-    for rle in reversed(rles):
-        left.append(rle if covered is None else rle.difference(covered))
-        covered = rle if covered is None else covered.union(rle)
-    return left[::-1]
 
 
 def _arguments(
@@ -126,11 +119,16 @@ def _arguments(
     }
 
 
-def _polygon(shape: Mapping[str, Any]) -> list[float]:
-    kind = shape.get("shape_type") or "polygon"
-    points = np.array(shape.get("points", ()), np.float64)
-    if points.ndim != 2 or points.shape[1:] != (2,) or not np.isfinite(points).all():
-        raise CorruptFileError("points: expected a list of x y")
+def _points(name: str, record: Mapping[str, Any]) -> NDArray[np.float64]:
+    """(n, 2) x, y of the points that a record has by that name.
+
+    Raises:
+        MaskError: They are no list of x y.
+    """
+    return numbers(name, record.get(name) or np.empty((0, 2)), np.float64, ("n", 2), error=MaskError)
+
+
+def _corners(kind: str, points: NDArray[np.float64]) -> list[float]:
     if kind == "rectangle" and len(points) == 2:
         (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
         points = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])

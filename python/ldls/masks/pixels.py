@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -130,3 +131,13 @@ def check_same_size(own: tuple[int, int], size: tuple[int, int]) -> None:
     if own != size:
         mend = "swapped?" if own == size[::-1] else "take masks of this image, or resize them with it"
         raise MaskError(f"masks of {own} (height, width), the image is {size}; {mend}")
+
+
+def uncovered(rles: Sequence[_ldls.Rle], order: Iterable[int]) -> list[_ldls.Rle]:
+    """Each mask without the pixels of those whose numbers come before its own in `order`, which has all of them."""
+    left = list(rles)
+    taken = None
+    for i in order:
+        left[i] = rles[i] if taken is None else rles[i].difference(taken)
+        taken = rles[i] if taken is None else rles[i].union(taken)
+    return left
