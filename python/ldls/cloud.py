@@ -17,11 +17,18 @@ WIDEST_CLOUD_M = 10_000.0
 """Extent beyond which the unit is probably not the metre."""
 
 Points = NDArray[np.float32] | NDArray[np.float64]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def is_finite(points: Points) -> NDArray[np.bool_]:
+    """(N,) True for the points (N, >= 3) whose coordinates are all finite."""
+    return np.asarray(np.isfinite(points[:, :3]).all(axis=1))
 
 
 def finite_rows(points: Points) -> NDArray[np.int64]:
     """Rows of the points (N, >= 3) whose coordinates are all finite, ascending."""
-    return np.flatnonzero(np.isfinite(points[:, :3]).all(axis=1))
+    return np.flatnonzero(is_finite(points))
 
 
 def doubt_of_scale(low: ArrayLike, high: ArrayLike) -> str | None:

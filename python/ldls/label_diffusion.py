@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 import ldls._ldls as _ldls
 from ldls.camera import Camera
 from ldls.checks import checked
-from ldls.cloud import Points, as_points
+from ldls.cloud import Points, as_points, is_finite
 from ldls.doubts import warn_of
 from ldls.errors import InputError, NonFiniteError, ParameterError
 from ldls.masks import InstanceMasks
@@ -198,7 +198,7 @@ def check_finite(cloud: Points) -> None:
     Raises:
         NonFiniteError: There are some.
     """
-    finite: NDArray[np.bool_] = np.asarray(np.isfinite(cloud[:, :3]).all(axis=1))
+    finite = is_finite(cloud)
     if not finite.all():
         raise NonFiniteError(
             f"points: {finite.sum()} of {len(finite)} rows are finite, row {finite.argmin()} is the first "

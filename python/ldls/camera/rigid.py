@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import ldls._ldls as _ldls
 from ldls.checks import numbers
-from ldls.cloud import Points, as_points
+from ldls.cloud import Floats, Points, as_points
 from ldls.errors import CalibrationError, LdlsError
-
-Matrix = NDArray[np.float64]
 
 ROTATION_LIMIT = 1e-3
 """Largest deviation of a rotation from orthonormal; calibration files round to 7 digits."""
@@ -21,7 +19,7 @@ FARTHEST_CAMERA_M = 20.0
 """A camera farther from its lidar is hardly on the same rig: most translations that are in millimetres lead there."""
 
 
-def as_transform(name: str, values: ArrayLike) -> Matrix:
+def as_transform(name: str, values: ArrayLike) -> Floats:
     """`values` as a (4, 4) matrix.
 
     Raises:
@@ -32,7 +30,7 @@ def as_transform(name: str, values: ArrayLike) -> Matrix:
     return as_matrix(name, values, ((4, 4),))
 
 
-def as_matrix(name: str, values: ArrayLike, shapes: tuple[tuple[int, ...], ...]) -> Matrix:
+def as_matrix(name: str, values: ArrayLike, shapes: tuple[tuple[int, ...], ...]) -> Floats:
     """`values` as a matrix of one of the shapes.
 
     Raises:
@@ -42,7 +40,7 @@ def as_matrix(name: str, values: ArrayLike, shapes: tuple[tuple[int, ...], ...])
     return numbers(name, values, np.float64, *shapes, error=CalibrationError).copy()
 
 
-def rigid(place: str, matrix: Matrix, error: type[LdlsError] = CalibrationError) -> Matrix:
+def rigid(place: str, matrix: Floats, error: type[LdlsError] = CalibrationError) -> Floats:
     """`matrix` (4, 4), which turns and shifts and does nothing else.
 
     Raises:
@@ -64,7 +62,7 @@ def rigid(place: str, matrix: Matrix, error: type[LdlsError] = CalibrationError)
     return matrix
 
 
-def from_parts(rotation: Matrix, translation: Matrix | None = None) -> Matrix:
+def from_parts(rotation: Floats, translation: Floats | None = None) -> Floats:
     """The transform that turns by `rotation` (3, 3), then shifts by `translation` (3,) in metres."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation
@@ -72,7 +70,7 @@ def from_parts(rotation: Matrix, translation: Matrix | None = None) -> Matrix:
     return matrix
 
 
-def doubt_of_distance(T_camera_lidar: Matrix) -> str | None:
+def doubt_of_distance(T_camera_lidar: Floats) -> str | None:
     """What is odd about the distance from lidar to camera; None where nothing is."""
     distance_m = float(np.linalg.norm(T_camera_lidar[:3, 3]))
     if not distance_m > FARTHEST_CAMERA_M:
@@ -83,17 +81,17 @@ def doubt_of_distance(T_camera_lidar: Matrix) -> str | None:
     )
 
 
-def inverse(matrix: Matrix) -> Matrix:
+def inverse(matrix: Floats) -> Floats:
     """The transform back."""
     return from_parts(matrix[:3, :3].T, -matrix[:3, :3].T @ matrix[:3, 3])
 
 
-def transformed(points: Points, matrix: Matrix) -> Matrix:
+def transformed(points: Points, matrix: Floats) -> Floats:
     """(N, 3) float64: x, y and z of `points` (N, >= 3), float32 or float64, after a transform (4, 4); metres."""
     return brought_together([points], [matrix], keep_origin=True)
 
 
-def brought_together(clouds: Sequence[Points], matrices: Sequence[Matrix], *, keep_origin: bool) -> Matrix:
+def brought_together(clouds: Sequence[Points], matrices: Sequence[Floats], *, keep_origin: bool) -> Floats:
     """(N, 3) float64: the points of all clouds, one cloud after the other, each after its transform.
 
     Clouds are (n, >= 3) float32 or float64, matrices (4, 4); all in metres. Points at exactly (0, 0, 0) are missing
@@ -104,7 +102,7 @@ def brought_together(clouds: Sequence[Points], matrices: Sequence[Matrix], *, ke
     return _ldls.brought_together(each, [matrix.tolist() for matrix in matrices], keep_origin)
 
 
-def from_quaternion(place: str, quaternion: Matrix, order: Literal["wxyz", "xyzw"] = "wxyz") -> Matrix:
+def from_quaternion(place: str, quaternion: Floats, order: Literal["wxyz", "xyzw"] = "wxyz") -> Floats:
     """(3, 3) rotation of a quaternion in that order.
 
     Raises:
@@ -126,7 +124,7 @@ def from_quaternion(place: str, quaternion: Matrix, order: Literal["wxyz", "xyzw
     )
 
 
-def to_quaternion(rotation: Matrix) -> Matrix:
+def to_quaternion(rotation: Floats) -> Floats:
     """(4,) unit quaternion w x y z, w >= 0, of the rotation (3, 3): that of the nearest one, where digits are missing.
 
     It is the eigenvector of the largest eigenvalue of a symmetric matrix (Bar-Itzhack 2000), so half turns are no
@@ -141,5 +139,5 @@ def to_quaternion(rotation: Matrix) -> Matrix:
             [yx - xy, xz + zx, yz + zy, zz - xx - yy],
         ]
     )
-    wxyz: Matrix = np.linalg.eigh(quadratic).eigenvectors[:, -1]
+    wxyz: Floats = np.linalg.eigh(quadratic).eigenvectors[:, -1]
     return -wxyz if wxyz[0] < 0 else wxyz

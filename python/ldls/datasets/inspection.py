@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.camera.rigid import doubt_of_distance
-from ldls.cloud import doubt_of_scale
+from ldls.cloud import doubt_of_scale, is_finite
 from ldls.datasets.frame import CameraImage, Frame, Source
 from ldls.errors import LdlsError
 from ldls.stages import project
@@ -150,7 +150,7 @@ def _angle_deg(camera: Camera, axis: int) -> float:
 def _of_cloud(frame: Frame) -> list[Finding]:
     if not len(frame.points):
         return [Finding(frame.name, "its cloud is empty", broken=True)]
-    finite: NDArray[np.bool_] = np.asarray(np.isfinite(frame.points[:, :3]).all(axis=1))
+    finite = is_finite(frame.points)
     if not finite.any():
         return [Finding(frame.name, f"none of its {len(finite):,} points is finite", broken=True)]
     findings = []

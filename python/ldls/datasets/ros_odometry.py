@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ldls.camera.rigid import Matrix
+from ldls.cloud import Floats
 from ldls.datasets.ros_transforms import matrix_of, plain
 from ldls.errors import CalibrationError, PoseError, within
 from ldls.io.ros.bags import Bag
@@ -34,7 +34,7 @@ class Odometry:
     robot: str
     way: Trajectory
 
-    def way_of(self, T_robot_lidar: Matrix, start: float, end: float) -> Trajectory:
+    def way_of(self, T_robot_lidar: Floats, start: float, end: float) -> Trajectory:
         """The way of the lidar from one moment, in seconds, to another, and the poses beside."""
         first = max(int(np.searchsorted(self.way.stamps, start, side="right")) - 2, 0)
         last = int(np.searchsorted(self.way.stamps, end)) + 2
@@ -108,7 +108,7 @@ def _way(topic: str, messages: Iterable[Message]) -> Odometry:
     return Odometry(topic, robot, Trajectory(stamps_ns / NANOSECONDS, np.array(poses)[first]))
 
 
-def _pose(message: Message) -> Matrix:
+def _pose(message: Message) -> Floats:
     """(4, 4) from coordinates of the robot to those of the world."""
     pose = message.pose.pose
     try:

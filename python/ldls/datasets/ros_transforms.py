@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.camera.rigid import Matrix, from_parts, from_quaternion, inverse
+from ldls.camera.rigid import from_parts, from_quaternion, inverse
+from ldls.cloud import Floats
 from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
 from ldls.io.ros.messages import NANOSECONDS, Message, nanoseconds
@@ -32,13 +33,13 @@ class _Edge:
     parent: str
     name: str
     stamps_ns: list[int] = field(default_factory=list)
-    transforms: list[Matrix] = field(default_factory=list)
+    transforms: list[Floats] = field(default_factory=list)
 
-    def at(self, stamp_ns: int) -> Matrix:
+    def at(self, stamp_ns: int) -> Floats:
         """The transform of the nearest time."""
         return self.transforms[int(np.abs(np.array(self.stamps_ns, np.int64) - stamp_ns).argmin())]
 
-    def between(self, stamp_ns: int) -> Matrix:
+    def between(self, stamp_ns: int) -> Floats:
         """The transform between the times before and after; one that never changes holds always.
 
         Raises:
@@ -91,7 +92,7 @@ class TransformTree:
                 name, transform = f"transforms: from {parent} to {child}", one.transform
                 edge.transforms.append(matrix_of(name, transform.rotation, transform.translation))
 
-    def lookup(self, target: str, source: str, stamp_ns: int) -> Matrix:
+    def lookup(self, target: str, source: str, stamp_ns: int) -> Floats:
         """(4, 4) from coordinates in the frame `source` to coordinates in `target`, at the nearest times there are.
 
         Raises:
@@ -106,7 +107,7 @@ class TransformTree:
         up_source, up_target = (self._to_root(frame, lambda edge: edge.at(stamp_ns)) for frame in (source, target))
         return np.linalg.inv(up_target) @ up_source
 
-    def pose(self, world: str, source: str, stamp_ns: int) -> Matrix:
+    def pose(self, world: str, source: str, stamp_ns: int) -> Floats:
         """(4, 4) from coordinates in the frame `source` to coordinates in `world`, between the times there are.
 
         Raises:
@@ -162,7 +163,7 @@ class TransformTree:
     def _connected(self, one: str, other: str) -> bool:
         return one == other or self._ancestors(one)[-1] == self._ancestors(other)[-1]
 
-    def _to_root(self, frame: str, at: Callable[[_Edge], Matrix]) -> Matrix:
+    def _to_root(self, frame: str, at: Callable[[_Edge], Floats]) -> Floats:
         transform = np.eye(4)
         for name in self._ancestors(frame)[:-1]:
             transform = at(self._edges[name]) @ transform
@@ -193,7 +194,7 @@ def plain(frame_id: str) -> str:
     return frame_id.removeprefix("/")
 
 
-def matrix_of(name: str, q: Message, t: Message) -> Matrix:
+def matrix_of(name: str, q: Message, t: Message) -> Floats:
     """(4, 4) of a unit quaternion and a translation in metres; errors as of `from_quaternion`."""
     rotation = from_quaternion(name, np.array([q.w, q.x, q.y, q.z], np.float64))
     return from_parts(rotation, np.array([t.x, t.y, t.z], np.float64))
@@ -201,7 +202,7 @@ def matrix_of(name: str, q: Message, t: Message) -> Matrix:
 
 def given_transforms(
     given: Extrinsic | Mapping[str, Extrinsic] | None, image_topics: Sequence[str]
-) -> dict[str, Matrix]:
+) -> dict[str, Floats]:
     """(4, 4) from lidar to camera coordinates by image topic, for those that are given.
 
     Args:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.sequences.step import Floats
+from ldls.cloud import Floats
 from ldls.sequences.track import Footprint, Sighting, Track, brought, gap, squared_distances
 
 NEAR_M = 2.0

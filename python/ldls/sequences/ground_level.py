@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion, transformed
+from ldls.cloud import Floats
 from ldls.sequences.grid import cell_keys
-from ldls.sequences.step import Floats
 
 CELL_M = 1.0
 STANDING_M = 0.3

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -24,11 +25,10 @@ from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, transformed
 from ldls.checks import checked
+from ldls.cloud import Floats, Ints, is_finite
 from ldls.errors import InputError, LimitError, ParameterError
 from ldls.segmentation import Segmentation
 from ldls.sequences.grid import cell_keys
-from ldls.sequences.moment import Ints
-from ldls.sequences.step import Floats
 from ldls.sequences.sweeps import Sweep, check_points
 
 MOVED_M = 0.4
@@ -65,8 +65,7 @@ class _Rows(NamedTuple):
 
     def selected(self, keep: NDArray[np.bool_]) -> _Rows:
         """The rows that are to be kept."""
-        voxels, objects, counts = self.voxels[keep], self.objects[keep], self.counts[keep]
-        return _Rows(voxels, objects, counts, self.sums[keep], self.confidence[keep])
+        return _Rows(*map(itemgetter(keep), self))
 
 
 class _Voxels(NamedTuple):
@@ -156,7 +155,7 @@ class LabelledMap:
                 stays as it was.
         """
         check_points(sweep, result)
-        rows = np.flatnonzero((result.labels >= 0) & np.isfinite(sweep.points[:, :3]).all(axis=1))
+        rows = np.flatnonzero((result.labels >= 0) & is_finite(sweep.points))
         labels = result.labels[rows]
         _check_tracked(result, labels)
         origin = _origin(sweep.pose, self.voxel_m) if self._origin is None else self._origin

@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera.rigid import transformed
+from ldls.cloud import Floats, Ints
 from ldls.segmentation import Segmentation
-from ldls.sequences.step import Floats
 from ldls.sequences.sweeps import Sweep
-
-Ints = NDArray[np.int64]
 
 
 class Boxes(NamedTuple):

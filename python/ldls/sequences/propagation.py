@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls._optional import require
-from ldls.sequences.moment import Boxes, Ints, Moment
-from ldls.sequences.step import Floats
+from ldls.cloud import Floats, Ints
+from ldls.sequences.moment import Boxes, Moment
 from ldls.sequences.track import MEMORY_S, Track
 from ldls.sequences.trajectory import SAME_S
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ldls.camera.rigid import from_parts, from_quaternion, to_quaternion, transformed
-
-Floats = NDArray[np.float64]
+from ldls.cloud import Floats
 
 
 @dataclass(frozen=True, eq=False)

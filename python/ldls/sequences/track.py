@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ldls._optional import require
+from ldls.cloud import Floats
 from ldls.segmentation import Instance
-from ldls.sequences.step import Floats
 from ldls.sequences.trajectory import SAME_S
 
 MEMORY_S = 2.0
@@ -119,8 +119,8 @@ class Track:
         """Note that it was seen again."""
         self.instance = instance
         # two labels of a sweep may be of it
-        shown = {each.stamp for each in self.sightings if each.shown}
-        self.n_images += sighting.shown and sighting.stamp not in shown
+        known = any(each.shown and each.stamp == sighting.stamp for each in self.sightings)
+        self.n_images += sighting.shown and not known
         first = sighting.stamp - MEMORY_S - SAME_S
         self.sightings = [*(each for each in self.sightings if each.stamp >= first), sighting]
         # found anew when they are asked for, which is not after every sweep

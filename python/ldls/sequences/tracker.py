@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from ldls._optional import require
 from ldls.checks import checked
+from ldls.cloud import Floats, Ints
 from ldls.errors import InputError
 from ldls.segmentation import Instance, Segmentation
 from ldls.segmentation.segmentation import by_name
 from ldls.sequences.comparison import compared
-from ldls.sequences.moment import Ints, Moment
+from ldls.sequences.moment import Moment
 from ldls.sequences.propagation import CONFIDENCE, mistaken, overlooked
-from ldls.sequences.step import Floats
 from ldls.sequences.sweeps import Sweep, check_order, check_points
 from ldls.sequences.track import MEMORY_S, Footprint, Sighting, Track
 from ldls.sequences.trajectory import SAME_S

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ldls.simulation.raycasting import F64, MISS, RayCaster
+from ldls.cloud import Floats, Ints
+from ldls.simulation.raycasting import MISS, RayCaster
 from ldls.simulation.scenes import Scene
-
-I64 = NDArray[np.int64]
 
 
 class MovingCaster:
@@ -23,7 +21,7 @@ class MovingCaster:
         normals: (F, 3) unit normals of the triangles of the scene.
     """
 
-    def __init__(self, scene: Scene, ways_m: F64) -> None:
+    def __init__(self, scene: Scene, ways_m: Floats) -> None:
         """A caster for `scene`, whose M objects have gone `ways_m` (M, n, 3) metres at each of n moments.
 
         Raises:
@@ -33,7 +31,7 @@ class MovingCaster:
         still = np.zeros(ways_m.shape[1:])
         chosen = [(~np.isin(scene.face_objects, moving), still)]
         chosen += [(scene.face_objects == number, ways_m[number - 1]) for number in moving]
-        self.normals: F64 = np.zeros((len(scene.face_objects), 3))
+        self.normals: Floats = np.zeros((len(scene.face_objects), 3))
         self._parts: list[_Part] = []
         for there, way_m in chosen:
             faces = np.flatnonzero(there)
@@ -42,7 +40,7 @@ class MovingCaster:
                 self.normals[faces] = part.caster.normals
                 self._parts.append(part)
 
-    def first_hits(self, origins_m: F64, directions: F64, moments: I64) -> tuple[F64, I64]:
+    def first_hits(self, origins_m: Floats, directions: Floats, moments: Ints) -> tuple[Floats, Ints]:
         """(R,) range in metres (infinity for a miss) and (R,) triangle (-1) of each ray of unit length.
 
         Args:
@@ -66,12 +64,12 @@ class _Part:
     """What moves as one: its triangles, their numbers in the scene, the sphere around them, and its way (n, 3)."""
 
     caster: RayCaster
-    faces: I64
-    centre_m: F64
+    faces: Ints
+    centre_m: Floats
     radius_m: float
-    way_m: F64
+    way_m: Floats
 
-    def near(self, origins_m: F64, directions: F64) -> I64:
+    def near(self, origins_m: Floats, directions: Floats) -> Ints:
         """Numbers of the rays that meet the sphere, for few of them meet a small object."""
         towards = self.centre_m - origins_m
         along = np.einsum("ij,ij->i", towards, directions)
@@ -79,7 +77,7 @@ class _Part:
         return np.flatnonzero((aside <= self.radius_m**2) & (along >= -self.radius_m))
 
 
-def _make_part(scene: Scene, faces: I64, way_m: F64) -> _Part:
+def _make_part(scene: Scene, faces: Ints, way_m: Floats) -> _Part:
     shape = scene.shape.part(faces)
     low, high = shape.vertices_m.min(axis=0), shape.vertices_m.max(axis=0)
     centre = (low + high) / 2

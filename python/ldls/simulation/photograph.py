@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.simulation.raycasting import F64, MISS, RayCaster
+from ldls.cloud import Floats
+from ldls.simulation.raycasting import MISS, RayCaster
 from ldls.simulation.rigs import MountedCamera
 from ldls.simulation.scenes import Scene
 from ldls.simulation.shapes.shape import Material, Shape
@@ -33,7 +34,7 @@ class PixelTruth:
 
     instances: NDArray[np.int32]
     categories: NDArray[np.int32]
-    expected_px: F64
+    expected_px: Floats
 
 
 def photograph(
@@ -55,8 +56,8 @@ def photograph(
 
 
 def _shaded(
-    scene: Scene, caster: RayCaster, origin: F64, directions: F64, ranges: F64, faces: NDArray[np.int64]
-) -> F64:
+    scene: Scene, caster: RayCaster, origin: Floats, directions: Floats, ranges: Floats, faces: NDArray[np.int64]
+) -> Floats:
     colours = _sky(directions)
     hit = np.flatnonzero(faces != MISS)
     rays, normals = directions[hit], caster.normals[faces[hit]]
@@ -74,13 +75,13 @@ def _shaded(
     return colours
 
 
-def _sky(directions: F64) -> F64:
+def _sky(directions: Floats) -> Floats:
     up = np.clip(directions[:, 2:] * 2, 0, 1)
-    sky: F64 = (1 - up) * HAZE + up * ZENITH
+    sky: Floats = (1 - up) * HAZE + up * ZENITH
     return sky
 
 
-def _expected_px(scene: Scene, camera: MountedCamera, height_m: float) -> F64:
+def _expected_px(scene: Scene, camera: MountedCamera, height_m: float) -> Floats:
     """(M,) pixels of each object's silhouette with nothing before it: about 0.55 of the rectangle around its box."""
     transform, model = camera.T_camera_lidar(), camera.model
     areas = np.zeros(len(scene.objects))
@@ -92,7 +93,7 @@ def _expected_px(scene: Scene, camera: MountedCamera, height_m: float) -> F64:
     return areas
 
 
-def _textured(shape: Shape, faces: NDArray[np.int64], places_m: F64, normals: F64, rays: F64) -> F64:
+def _textured(shape: Shape, faces: NDArray[np.int64], places_m: Floats, normals: Floats, rays: Floats) -> Floats:
     """(R, 3) colour in [0, 1] of the triangles `faces` (R,) at `places_m` (R, 3).
 
     Asphalt and grass have a grain, paving has joints, houses have windows, and glass reflects the sky.
@@ -115,21 +116,21 @@ def _textured(shape: Shape, faces: NDArray[np.int64], places_m: F64, normals: F6
     return colours
 
 
-def _grain(places_m: F64, cell_m: float) -> F64:
+def _grain(places_m: Floats, cell_m: float) -> Floats:
     """A number in [0, 1) for each cell of space, the same every time."""
     cells = np.floor(places_m / cell_m).astype(np.int64)
     mixed = cells @ np.array([73856093, 19349663, 83492791])
     mixed = (mixed ^ (mixed >> 13)) * 1274126177
-    grain: F64 = ((mixed >> 8) & 0xFFFF) / 65536.0
+    grain: Floats = ((mixed >> 8) & 0xFFFF) / 65536.0
     return grain
 
 
-def _joints(colours: F64, there: NDArray[np.bool_], places_m: F64) -> None:
+def _joints(colours: Floats, there: NDArray[np.bool_], places_m: Floats) -> None:
     phase = np.mod(places_m[there, :2], 0.6)
     colours[there] *= np.where((phase < 0.02).any(axis=1), 0.75, 1.0)[:, None]
 
 
-def _windows(colours: F64, there: NDArray[np.bool_], places_m: F64, normals: F64) -> None:
+def _windows(colours: Floats, there: NDArray[np.bool_], places_m: Floats, normals: Floats) -> None:
     """Paint panes 1.1 m wide and 1.5 m tall, 3.2 m from floor to floor."""
     rows = np.flatnonzero(there)
     places, upright = places_m[rows], np.abs(normals[rows, 2]) < 0.5

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls._optional import require
+from ldls.cloud import Floats
 from ldls.simulation.shapes.shape import Shape
 
-F64 = NDArray[np.float64]
 MISS = -1
 
 
@@ -36,15 +36,15 @@ class RayCaster:
         self._intersector: Any = embree.RayMeshIntersector(mesh, scale_to_box=False)
         a, b, c = (shape.vertices_m[shape.faces[:, k]] for k in range(3))
         normals = np.cross(b - a, c - a)
-        self.normals: F64 = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        self._offsets: F64 = np.einsum("ij,ij->i", self.normals, a)
+        self.normals: Floats = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        self._offsets: Floats = np.einsum("ij,ij->i", self.normals, a)
 
-    def faces(self, origins_m: F64, directions: F64) -> NDArray[np.int64]:
+    def faces(self, origins_m: Floats, directions: Floats) -> NDArray[np.int64]:
         """(R,) first triangle of each ray, -1 where it meets none; `origins_m` is (3,) or (R, 3)."""
         origins = np.broadcast_to(origins_m, directions.shape)
         return np.asarray(self._intersector.intersects_first(origins, directions), np.int64)
 
-    def first_hits(self, origins_m: F64, directions: F64) -> tuple[F64, NDArray[np.int64]]:
+    def first_hits(self, origins_m: Floats, directions: Floats) -> tuple[Floats, NDArray[np.int64]]:
         """(R,) range in metres (infinity for a miss) and (R,) triangle (-1) of each ray of unit length."""
         faces = self.faces(origins_m, directions)
         ranges = np.full(len(faces), np.inf)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ldls.camera import Camera, Distortion
+from ldls.cloud import Floats
 from ldls.errors import CalibrationError, ParameterError
 from ldls.simulation.lidars import LIDARS, Lidar
 
-F64 = NDArray[np.float64]
 STEPS = 30
 """Fixed-point steps that undistort; lenses that robots carry need ten for a millionth of a pixel."""
 
@@ -36,12 +35,12 @@ class CameraModel:
     center_px: tuple[float, float]
     distortion: Distortion = field(default_factory=Distortion)
 
-    def projection(self) -> F64:
+    def projection(self) -> Floats:
         """(3, 4) from homogeneous points in the camera frame to homogeneous pixels."""
         (u, v), f = self.center_px, self.focal_px
         return np.array([[f, 0, u, 0], [0, f, v, 0], [0, 0, 1, 0]], np.float64)
 
-    def directions(self) -> F64:
+    def directions(self) -> Floats:
         """(height * width, 3) unit vectors of the pixels in the camera frame (x right, y down, z forward), by rows.
 
         Raises:
@@ -53,7 +52,7 @@ class CameraModel:
         if not self.distortion.is_none:
             across = undistorted(across, self.distortion)
         rays = np.column_stack([across, np.ones(len(across))])
-        unit: F64 = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        unit: Floats = rays / np.linalg.norm(rays, axis=1, keepdims=True)
         return unit
 
 
@@ -71,7 +70,7 @@ class MountedCamera:
     position_m: tuple[float, float, float]
     yaw_deg: float = 0.0
 
-    def T_camera_lidar(self) -> F64:
+    def T_camera_lidar(self) -> Floats:
         """(4, 4) from lidar to camera coordinates."""
         c, s = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
         transform = np.eye(4)
@@ -105,13 +104,13 @@ class Rig:
     cameras: tuple[MountedCamera, ...]
 
 
-def distorted(points: F64, distortion: Distortion) -> F64:
+def distorted(points: Floats, distortion: Distortion) -> Floats:
     """(n, 2) x / z and y / z as the lens shows them, by the model of ROS and OpenCV."""
     radial, tangential = _parts(points, distortion)
     return points * radial + tangential
 
 
-def undistorted(points: F64, distortion: Distortion) -> F64:
+def undistorted(points: Floats, distortion: Distortion) -> Floats:
     """(n, 2) x / z and y / z that the lens shows at `points` (n, 2).
 
     Raises:
@@ -128,7 +127,7 @@ def undistorted(points: F64, distortion: Distortion) -> F64:
     return before
 
 
-def _parts(points: F64, distortion: Distortion) -> tuple[F64, F64]:
+def _parts(points: Floats, distortion: Distortion) -> tuple[Floats, Floats]:
     """(n, 1) factor along the radius and (n, 2) shift of tangential distortion.
 
     Raises:

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.cloud import Floats, Ints
 from ldls.simulation.lidars import Lidar
-from ldls.simulation.moving_caster import I64, MovingCaster
-from ldls.simulation.raycasting import F64, MISS, RayCaster
+from ldls.simulation.moving_caster import MovingCaster
+from ldls.simulation.raycasting import MISS, RayCaster
 from ldls.simulation.scenes import Scene
 from ldls.simulation.shapes.shape import Material
 
 GLASS_PASSES = 0.9
 """Share of laser pulses that a window lets through."""
 MAX_WINDOWS = 6
-Cast = Callable[[I64, F64], tuple[F64, I64]]
+Cast = Callable[[Ints, Floats], tuple[Floats, Ints]]
 """Range and triangle that pulses (r,) meet next, each after so many metres (r,) of its way; ranges count from there."""
 
 
@@ -35,7 +36,7 @@ class Sweep:
     points: NDArray[np.float32]
     instances: NDArray[np.int32]
     rings: NDArray[np.int32]
-    times: F64 | None = None
+    times: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +49,9 @@ class Motion:
         ways_m: (M, n, 3) way of each object since the stamp, in metres.
     """
 
-    times: F64
-    rig: F64
-    ways_m: F64
+    times: Floats
+    rig: Floats
+    ways_m: Floats
 
 
 def scan(scene: Scene, caster: RayCaster, lidar: Lidar, height_m: float, rng: np.random.Generator) -> Sweep:
@@ -58,7 +59,7 @@ def scan(scene: Scene, caster: RayCaster, lidar: Lidar, height_m: float, rng: np
     directions = lidar.directions()
     origin = np.array([0.0, 0.0, height_m])
 
-    def cast(pulses: I64, after_m: F64) -> tuple[F64, I64]:
+    def cast(pulses: Ints, after_m: Floats) -> tuple[Floats, Ints]:
         return caster.first_hits(origin + directions[pulses] * after_m[:, None], directions[pulses])
 
     ranges, faces = _through_windows(scene, cast, len(directions), rng)
@@ -85,7 +86,7 @@ def scan_moving(scene: Scene, lidar: Lidar, height_m: float, motion: Motion, rng
     origins = (motion.rig @ [0.0, 0.0, height_m, 1.0])[:, :3]
     caster = MovingCaster(scene, motion.ways_m)
 
-    def cast(pulses: I64, after_m: F64) -> tuple[F64, I64]:
+    def cast(pulses: Ints, after_m: Floats) -> tuple[Floats, Ints]:
         begin = origins[firings[pulses]] + towards[pulses] * after_m[:, None]
         return caster.first_hits(begin, towards[pulses], firings[pulses])
 
@@ -94,7 +95,7 @@ def scan_moving(scene: Scene, lidar: Lidar, height_m: float, motion: Motion, rng
     return _measured(scene, lidar, directions, motion.times[firings], ranges, faces, cosine, rng)
 
 
-def _through_windows(scene: Scene, cast: Cast, count: int, rng: np.random.Generator) -> tuple[F64, I64]:
+def _through_windows(scene: Scene, cast: Cast, count: int, rng: np.random.Generator) -> tuple[Floats, Ints]:
     """Range and triangle where each of `count` pulses ends: most pass a window and go on to what is behind it."""
     ranges, faces = cast(np.arange(count), np.zeros(count))
     glass = scene.shape.materials == Material.GLASS
@@ -113,11 +114,11 @@ def _through_windows(scene: Scene, cast: Cast, count: int, rng: np.random.Genera
 def _measured(
     scene: Scene,
     lidar: Lidar,
-    directions: F64,
-    times: F64 | None,
-    ranges: F64,
-    faces: I64,
-    cosine: F64,
+    directions: Floats,
+    times: Floats | None,
+    ranges: Floats,
+    faces: Ints,
+    cosine: Floats,
     rng: np.random.Generator,
 ) -> Sweep:
     """What a lidar reports of the triangles that its pulses meet, each at an angle of such a cosine."""
@@ -134,16 +135,18 @@ def _measured(
     )
 
 
-def _reflectance(scene: Scene) -> F64:
+def _reflectance(scene: Scene) -> Floats:
     """(F,) share of infrared light that each triangle sends back; leaves and grass are bright there."""
-    value: F64 = 0.1 + 0.6 * scene.shape.colours.mean(axis=1).astype(np.float64)
+    value: Floats = 0.1 + 0.6 * scene.shape.colours.mean(axis=1).astype(np.float64)
     value[np.isin(scene.shape.materials, (Material.LEAF, Material.GRASS))] += 0.15
     value[scene.shape.materials == Material.REFLECTOR] = 1.0
     value[scene.shape.materials == Material.GLASS] = 0.08
     return value
 
 
-def _returned(lidar: Lidar, ranges: F64, cosine: F64, reflectance: F64, rng: np.random.Generator) -> NDArray[np.bool_]:
+def _returned(
+    lidar: Lidar, ranges: Floats, cosine: Floats, reflectance: Floats, rng: np.random.Generator
+) -> NDArray[np.bool_]:
     finite = np.where(np.isfinite(ranges), np.maximum(ranges, 0.1), 1e9)
     signal = lidar.sensitivity * reflectance * cosine * (lidar.max_range_m / finite) ** 2
     chance = (1 - lidar.dropout) * -np.expm1(-signal)
@@ -152,9 +155,9 @@ def _returned(lidar: Lidar, ranges: F64, cosine: F64, reflectance: F64, rng: np.
     return seen
 
 
-def _noisy(lidar: Lidar, ranges: F64, rng: np.random.Generator) -> F64:
+def _noisy(lidar: Lidar, ranges: Floats, rng: np.random.Generator) -> Floats:
     noisy = ranges + rng.normal(0, 1, len(ranges)) * lidar.range_noise_m
     if lidar.range_step_m == 0:
         return noisy
-    stepped: F64 = np.round(noisy / lidar.range_step_m) * lidar.range_step_m
+    stepped: Floats = np.round(noisy / lidar.range_step_m) * lidar.range_step_m
     return stepped

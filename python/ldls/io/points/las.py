@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
 from ldls._optional import require
-from ldls.cloud import Points
+from ldls.cloud import Points, is_finite
 from ldls.errors import (
     CorruptFileError,
     LimitError,
@@ -207,7 +207,7 @@ def _fill(las: Any, xyz: NDArray[np.float64], result: Labelled) -> None:  # noqa
 
 
 def _check_writable(path: Path, xyz: NDArray[np.float64], categories: NDArray[np.int32]) -> None:
-    finite = np.isfinite(xyz).all(axis=1)
+    finite = is_finite(xyz)
     if not finite.all():
         raise NonFiniteError(
             f"{path}: {(~finite).sum()} of {len(xyz)} points are not finite, the first in row {np.argmin(finite)}; "

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ldls.cloud import Floats
 from ldls.simulation.shapes import paints
 from ldls.simulation.shapes.primitives import ball, box, tube
 from ldls.simulation.shapes.shape import Colour, Shape, join
 
-F64 = NDArray[np.float64]
 HIPS_M = (-0.2, 0.0, 1.04)
 """Where the hips of a rider are, on a bicycle that is `BICYCLE_HEIGHT_M` high."""
 BICYCLE_HEIGHT_M = 1.056
@@ -64,7 +63,7 @@ def _pedalling(side: int, crank: float, trousers: Colour) -> list[Shape]:
     ]
 
 
-def _reaching(shoulder: F64, hand: F64, shirt: Colour, skin: Colour) -> list[Shape]:
+def _reaching(shoulder: Floats, hand: Floats, shirt: Colour, skin: Colour) -> list[Shape]:
     elbow = _joint(hand, shoulder, 0.3)
     return [
         tube(shoulder, elbow, 0.048, shirt, sides=8),
@@ -73,12 +72,12 @@ def _reaching(shoulder: F64, hand: F64, shirt: Colour, skin: Colour) -> list[Sha
     ]
 
 
-def _joint(upper: F64, lower: F64, bone_m: float) -> F64:
+def _joint(upper: Floats, lower: Floats, bone_m: float) -> Floats:
     """Where two bones of `bone_m` meet between two ends, bent forward (x) as seen from `upper` down to `lower`."""
     along = lower - upper
     length = float(np.linalg.norm(along))
     forward = np.cross(along, (0.0, 1.0, 0.0)) / length
-    bend: F64 = (upper + lower) / 2 + forward * np.sqrt(max(bone_m**2 - length**2 / 4, 0.0))
+    bend: Floats = (upper + lower) / 2 + forward * np.sqrt(max(bone_m**2 - length**2 / 4, 0.0))
     return bend
 
 
