@@ -33,6 +33,8 @@ UNFINISHED = ".ldls-part"
 MAX_BYTES = 4 << 30
 """Largest file that is read where its reader states no limit of its own."""
 MAX_TEXT_BYTES = 1 << 30
+MAX_POINT_BYTES = 1 << 16
+"""Most bytes of a point in a file that says itself how many there are."""
 LARGE_BYTES = 1 << 28
 """Of files that are to be smaller than this, a larger one is none."""
 DIGEST_BLOCK_BYTES = 1 << 16

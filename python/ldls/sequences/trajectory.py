@@ -18,7 +18,7 @@ LONGEST_GAP_S = 1.0
 """Between poses farther apart in time, nothing is interpolated."""
 SAME_S = 1e-5
 """Times that differ by less are equal: files round stamps to microseconds, and stamps since 1970 to 0.24 of one."""
-FASTEST_M_S = 100.0
+JUMP_M_S = 100.0
 """Poses that need more than this speed jump."""
 TURN_S = 0.1
 """Time in which a lidar turns once; so much farther out than `at`, and a period at least, a motion goes on."""
@@ -246,11 +246,11 @@ def _check_speeds(stamps: NDArray[np.float64], poses: NDArray[np.float64]) -> No
     with np.errstate(over="ignore"):  # of coordinates that are none
         metres = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     seconds = np.diff(stamps)
-    slow = metres <= FASTEST_M_S * seconds
+    slow = metres <= JUMP_M_S * seconds
     if not slow.all():
         at = int(np.argmin(slow))
         raise PoseError(
             f"poses: from {stamps[at]:.6f} to {stamps[at + 1]:.6f} s the lidar moves {metres[at]:.6g} m in "
-            f"{seconds[at]:.6g} s, expected at most {FASTEST_M_S:g} m/s; leave out the pose that jumps, and give "
+            f"{seconds[at]:.6g} s, expected at most {JUMP_M_S:g} m/s; leave out the pose that jumps, and give "
             "metres and seconds"
         )

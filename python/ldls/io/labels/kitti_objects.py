@@ -23,6 +23,7 @@ from ldls.checks.values import number_of
 from ldls.cloud import as_points
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
 from ldls.io.files import read_lines, whole_file
+from ldls.io.objects import DECIMALS
 from ldls.labeling import BACKGROUND, Labeling
 from ldls.segmentation import Segmentation, fit_upright_box
 from ldls.segmentation.object_rows import first_seen
@@ -34,7 +35,6 @@ KITTI: tuple[str, ...] = (
 """Classes of KITTI's object labels."""
 _SPELLINGS = {folded(name): name for name in KITTI}
 N_FIELDS = 15
-DECIMALS = 4
 UNKNOWN_TRUNCATION = -1
 UNKNOWN_OCCLUSION = 3
 NO_BOX = (-1.0, -1.0, -1.0, -1.0)

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import PureWindowsPath
 from typing import NamedTuple
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm")
+ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm")
 EXPORTED = re.compile(r"_(png|jpe?g|bmp|tiff?|webp)\.rf\.\w+$", re.IGNORECASE)
 """End that Roboflow gives the names of images: 000571_png.rf.0a1b2c.jpg."""
 
@@ -23,7 +23,7 @@ class ImageName(NamedTuple):
         """The name of a path with slashes of any system."""
         *folders, file = PureWindowsPath(path).parts or ("",)
         suffix = PureWindowsPath(file).suffix
-        stem = file.removesuffix(suffix) if suffix.lower() in IMAGE_SUFFIXES else file
+        stem = file.removesuffix(suffix) if suffix.lower() in ENDINGS else file
         return cls(tuple(folders), EXPORTED.sub("", stem))
 
     def agreement(self, other: ImageName) -> tuple[int, int]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ldls._optional import require
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
-from ldls.io.files import open_file, whole_file
+from ldls.io.files import MAX_POINT_BYTES, open_file, whole_file
 from ldls.io.labelled_points import Labelled, instances, packed_colors, positions
 from ldls.io.points.named_columns import NamedColumns
 from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
@@ -26,7 +26,6 @@ TYPES = {
     ("I", 1): "i1", ("I", 2): "<i2", ("I", 4): "<i4", ("I", 8): "<i8",
 }  # fmt: skip
 COUNTS = ("POINTS", "WIDTH", "HEIGHT")
-MAX_POINT_BYTES = 1 << 16
 PAGE_BYTES = 4096
 MOST_LOST_M = 5e-4
 """What coordinates in text may lose in single precision; UTM's lose more, and are kept in doubles."""

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ldls.cloud import Points
 from ldls.errors import CorruptFileError, FileFormatError, InputError, UnsupportedFormatError
+from ldls.io.files import MAX_POINT_BYTES
 from ldls.io.ros.messages import NANOSECONDS, POINTS, Header, Message, Types, make, make_header, nanoseconds
 
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """sensor_msgs/PointField: the number of each type."""
 POSITION = ("x", "y", "z")
-MAX_POINT_BYTES = 1 << 16
 READ_FIELDS = (*POSITION, "intensity")
 """Columns of `PointCloud.points`, in this order."""
 RELATIVE_TIMES = ("time", "t", "offset_time", "time_offset")
