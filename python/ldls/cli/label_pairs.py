@@ -21,8 +21,9 @@ from ldls.io import read_camera, read_points, read_result
 from ldls.io.images import read_image_size
 from ldls.io.labels.kitti_objects import IMAGE_SIZE
 from ldls.io.labels.label_formats import FORMATS, LabelFile, LabelFiles, read_labeling
-from ldls.io.labels.labeling_npz import holds_result, read_confidence_npz
+from ldls.io.labels.labeling_npz import read_confidence_npz
 from ldls.io.labels.squeezeseg import read_squeezeseg_ranges
+from ldls.io.result_npz import holds_result
 from ldls.labeling import Labeling
 from ldls.stages import project
 

@@ -21,6 +21,8 @@ from ldls.segmentation import Instance, Report, Segmentation, SegmentedObject
 from ldls.view import SeenView, View
 
 Arrays = Mapping[str, NDArray[Any]]
+ARRAYS = frozenset(("labels", "diffused_labels", "object_name"))
+"""Arrays by which a result is known."""
 MASKS = "masks_"
 """Prefix of the arrays that hold the masks of a view."""
 
@@ -69,7 +71,7 @@ def read(path: str | PathLike[str]) -> Segmentation:
         FileNotFoundError: There is no such file.
     """
     with open_npz(path, "result") as arrays:
-        if not {"labels", "diffused_labels", "object_name"} <= arrays.keys():
+        if not arrays.keys() >= ARRAYS:
             raise UnsupportedFormatError(f"found arrays {arrays.listed()}, expected those of ldls.save")
         if "points" not in arrays:
             raise UnsupportedFormatError("holds no points, as earlier versions wrote it; segment the frame again")
@@ -79,6 +81,17 @@ def read(path: str | PathLike[str]) -> Segmentation:
         except InputError as error:
             raise CorruptFileError(f"not a whole result ({error})") from None
         return result
+
+
+def holds_result(path: str | PathLike[str]) -> bool:
+    """True for an `.npz` file that `read` reads, by the names of its arrays.
+
+    Raises:
+        CorruptFileError: It is not a whole `.npz` file.
+        FileNotFoundError: There is no such file.
+    """
+    with open_npz(path) as arrays:
+        return ARRAYS | {"points"} <= arrays.keys()
 
 
 def _tracks(result: Segmentation) -> dict[str, NDArray[Any]]:

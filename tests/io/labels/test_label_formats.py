@@ -73,8 +73,8 @@ def changed(value):
         pytest.param(np.zeros((64, 512, 5)), "expected 64 x 512 x 6.*got \\(64, 512, 5\\)", id="five channels"),
         pytest.param(np.zeros((512, 64, 6)), "got \\(512, 64, 6\\)", id="turned"),
         pytest.param(changed(4), "point 1 has class 4.0, expected one of 0, 1, 2, 3", id="unknown label"),
-        pytest.param(changed(1.5), "labels are not whole numbers", id="fraction"),
-        pytest.param(changed(np.nan), "labels are not whole numbers", id="nan"),
+        pytest.param(changed(1.5), "point 1 has class 1.5, expected one of", id="fraction"),
+        pytest.param(changed(np.nan), "point 1 has class nan", id="nan"),
         pytest.param(np.full((64, 512), "x"), "expected numbers", id="text"),
     ],
 )

@@ -40,17 +40,6 @@ def read_labeling_npz(path: str | PathLike[str]) -> Labeling:
         )
 
 
-def holds_result(path: str | PathLike[str]) -> bool:
-    """True for an `.npz` file that `ldls.read_result` reads, by the names of its arrays.
-
-    Raises:
-        CorruptFileError: It is not a whole `.npz` file.
-        FileNotFoundError: There is no such file.
-    """
-    with open_npz(path) as arrays:
-        return {"labels", "diffused_labels", "object_name", "points"} <= arrays.keys()
-
-
 def read_confidence_npz(path: str | PathLike[str]) -> NDArray[np.floating] | None:
     """(N,) `confidence` of an `.npz` file, 0 to 1; None where it holds none.
 

@@ -34,11 +34,8 @@ def read_squeezeseg(path: str | PathLike[str]) -> Labeling:
     labels = image.reshape(-1) if image.ndim == 2 else image[:, :, LABEL].reshape(-1)
     counts = np.ones(labels.shape, bool) if image.ndim == 2 else image[:, :, RANGE].reshape(-1) > 0
     # what a pixel without a return holds means nothing
-    codes = np.where(counts, labels, 0)
-    if not (codes == np.floor(codes)).all():
-        raise CorruptFileError(f"{path}: labels are not whole numbers; expected 0 to 3 in channel 5")
     try:
-        return Labeling.from_codes(codes, SQUEEZESEG).restricted(counts)
+        return Labeling.from_codes(np.where(counts, labels, 0), SQUEEZESEG).restricted(counts)
     except InputError as error:
         raise CorruptFileError(f"{path}: {error}") from None
 
