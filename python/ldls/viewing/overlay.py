@@ -14,7 +14,7 @@ from ldls.palette import Colour, as_tuples, instance_colours
 from ldls.segmentation import Segmentation
 from ldls.view import SeenView, camera_names
 from ldls.viewing.drawing import MARK, Canvas, disc, grid, half, places_in_grid
-from ldls.viewing.shown import AnImage, Images, Shown, Stage, image_like, images_of
+from ldls.viewing.shown import AnImage, Images, Shown, Stage, image_like, images_of, numbered
 from ldls.viewing.tags import Tag, draw_tags
 
 WIDTH_PX = 1800
@@ -91,7 +91,7 @@ def masks_overlay(masks: InstanceMasks, image: AnImage | None = None) -> Image.I
         InputError: The image has not the size of the masks.
     """
     colours = as_tuples(instance_colours(masks.categories.tolist()))
-    names = [f"{mask.name} {label}" for label, mask in enumerate(masks, start=1)]
+    names = [numbered(mask.name, label) for label, mask in enumerate(masks, start=1)]
     pixels = image_like(image, masks.image_size)
     scale = WIDTH_PX / pixels.shape[1]
     picture, covered = _with_masks(pixels, masks, colours, scale)

@@ -68,7 +68,12 @@ class Shown:
 def names_of(result: Segmentation) -> list[str]:
     """Name of each instance, with its label, or where the result is tracked its track: "car 3"."""
     numbers = result.instance_ids[1:].tolist()
-    return [f"{each.name} {n}" if n else each.name for each, n in zip(result.instances, numbers, strict=True)]
+    return [numbered(each.name, number) for each, number in zip(result.instances, numbers, strict=True)]
+
+
+def numbered(name: str, number: int) -> str:
+    """A name with a number, if it has one above 0: "car 3"."""
+    return f"{name} {number}" if number else name
 
 
 def images_of(result: Segmentation, images: Images) -> list[NDArray[np.uint8]]:

@@ -19,6 +19,7 @@ from ldls.palette import BACKGROUND, Colour, as_tuples, category_colour, label_c
 from ldls.segmentation import Segmentation
 from ldls.segmentation.segmentation import by_name
 from ldls.viewing.recording.stream import Entity, rerun
+from ldls.viewing.shown import numbered
 
 OUT_OF_VIEW_COLOUR: Colour = (64, 64, 64)
 """Darker than background: no camera says what these points are."""
@@ -85,7 +86,7 @@ class Names:
         instances: dict[int, dict[int, Any]] = {}
         for (category, label, colour), (_, name) in self._named.items():
             names.setdefault(category, name)
-            info = rr.AnnotationInfo(label, _numbered(name, label), colour)
+            info = rr.AnnotationInfo(label, numbered(name, label), colour)
             instances.setdefault(category, {}).setdefault(label, info)
         for category, own in instances.items():
             info = rr.AnnotationInfo(category, names[category], category_colour(category))
@@ -96,7 +97,7 @@ class Names:
         """The context of mask images: instances as classes; 0 is clear, so that the image shows."""
         rr = rerun()
         named = self._named.items()
-        infos = [rr.AnnotationInfo(n, _numbered(name, label), colour) for (_, label, colour), (n, name) in named]
+        infos = [rr.AnnotationInfo(n, numbered(name, label), colour) for (_, label, colour), (n, name) in named]
         return rr.AnnotationContext([rr.AnnotationInfo(0, "background", CLEAR), *infos])
 
 
@@ -129,7 +130,3 @@ def _keys(result: Segmentation) -> list[tuple[int, int, Colour]]:
     categories = [each.category for each in result.instances]
     colours = as_tuples(label_colours(result.instances)[1:])
     return list(zip(categories, result.instance_ids[1:].tolist(), colours, strict=True))
-
-
-def _numbered(name: str, number: int) -> str:
-    return f"{name} {number}" if number else name
