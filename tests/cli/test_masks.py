@@ -134,7 +134,7 @@ def test_show_prints_a_line_a_mask_and_draws_them(masks):
     assert outcome.exit_code == 0, outcome.output
     assert "3 masks of 40 x 60 pixels (height x width)" in outcome.output
     (car,) = (line for line in outcome.output.splitlines() if "car" in line)
-    assert [cell.strip() for cell in car.strip("│").split("│")] == ["1", "car", "3", "0.90", "600", "3, 2", "20 x 30"]
+    assert [cell.strip() for cell in car.strip("│").split("│")] == ["1", "car", "3", "0.90", "600", "2, 3", "20 x 30"]
     with Image.open(folder / "picture.png") as picture:
         assert picture.width >= 1800
 

@@ -221,7 +221,7 @@ def mask_table(masks: InstanceMasks) -> Table:
     table = Table(title=f"{len(masks)} masks of {masks.height} x {masks.width} pixels (height x width)")
     table.add_column("label", justify="right")
     table.add_column("object")
-    for heading in ("category", "score", "pixels", "left, top", "height x width"):
+    for heading in ("category", "score", "pixels", "top, left", "height x width"):
         table.add_column(heading, justify="right")
     for label, mask in enumerate(masks, start=1):
         top, left, height, width = mask.bounding_box
@@ -231,7 +231,7 @@ def mask_table(masks: InstanceMasks) -> Table:
             str(mask.category),
             f"{mask.score:.2f}",
             f"{mask.area:,}",
-            f"{left}, {top}" if mask.area else "-",
+            f"{top}, {left}" if mask.area else "-",
             f"{height} x {width}" if mask.area else "-",
         )
     return table

@@ -172,7 +172,7 @@ def tracking_table(scores: Mapping[str, TrackingScores]) -> Table:
         *("id switches", "a hundred frames", "MOTSA"),
     )
     note = (
-        "Scores in percent; '-': there is no true object. S_cls of a class is its IoU. "
+        "Scores in percent; '-': there is no true object, and for S_cls, of a class its IoU, no predicted one either. "
         "Object frames: true objects in each sweep, matched or not."
     )
     return Table("Objects over the drive", columns, tuple(rows), note)
