@@ -267,8 +267,7 @@ def shown(scores: Evaluation) -> str:
 def categories(found: Mapping[str, Evaluation], name: str) -> str:
     """IoU of a category by the paper's method, ours, masks on their objects and the bound, and its true points."""
     counts = [found[method].semantic[name] for method in (PAPER, FULL, ON_OBJECTS, BOUND)]
-    ious = " ".join("-" if each.iou is None else f"{100 * each.iou:.1f}" for each in counts)
-    return f"{ious} ({counts[0].tp + counts[0].fn})"
+    return f"{' '.join(percent(each.iou) for each in counts)} ({counts[0].tp + counts[0].fn})"
 
 
 def percent(share: float | None) -> str:

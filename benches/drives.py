@@ -47,11 +47,11 @@ def drives(lidar: str, count: int) -> Iterator[Window]:
         yield list(_sweeps(_written(_drive(lidar, seed, n_frames=20))))
 
 
-def long_drives(lidar: str, count: int) -> Iterator[tuple[Window, Window]]:
+def long_drives(count: int) -> Iterator[tuple[Window, Window]]:
     """The sweeps of `count` long drives and their truth, and the same with cars that stand as the only objects."""
     seeds = range(FIRST_LONG_SEED, FIRST_LONG_SEED + count)
-    for seed in track(seeds, description=f"long drives of {lidar}"):
-        drive = _drive(lidar, seed, n_frames=LONG)
+    for seed in track(seeds, description="long drives"):
+        drive = _drive("vlp-16", seed, n_frames=LONG)
         whole = list(_sweeps(_written(drive)))
         numbered = enumerate(drive_frame(drive, 0).objects, start=1)
         stands = [number for number, thing in numbered if not any(thing.velocity_m_s)]
@@ -205,7 +205,7 @@ def numbers(_measured: Frame, options: argparse.Namespace) -> Table:
         f"masks in random order, {MISSED:.0%} of them left out and all of {GAP} sweeps in a row; "
         "means of the drives, but switches of all object frames and of each drive",
     )
-    of_lidar = list(long_drives("vlp-16", options.drives))
+    of_lidar = list(long_drives(options.drives))
     for size in (1, 5):
         twice = itertools.product(of_lidar, range(2))
         found = [long_scores(*drive, size, seed, options.threads) for drive, seed in twice]

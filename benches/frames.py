@@ -129,12 +129,12 @@ def _seen_ahead(cloud: NDArray[np.float32], name: str) -> Frame:
     return Frame(f"{len(rows):,} {name}", np.ascontiguousarray(cloud[rows]), masks, camera)
 
 
-def overlapping_boxes(frame: Frame, count: int, seed: int) -> ldls.InstanceMasks:
-    """Boxes at random over what the points of a frame fill."""
+def overlapping_boxes(frame: Frame, seed: int) -> ldls.InstanceMasks:
+    """Twenty boxes at random over what the points of a frame fill."""
     _, pixels = ldls.stages.project(frame.points, frame.camera, image_size=frame.masks.image_size)
     low, high = pixels.min(axis=0), pixels.max(axis=0)
-    corners = np.sort(np.random.default_rng(seed).uniform(low, high, (count, 2, 2)), axis=1).astype(int)
-    masks = np.zeros((count, *frame.masks.image_size), bool)
+    corners = np.sort(np.random.default_rng(seed).uniform(low, high, (20, 2, 2)), axis=1).astype(int)
+    masks = np.zeros((len(corners), *frame.masks.image_size), bool)
     for mask, ((left, top), (right, bottom)) in zip(masks, corners, strict=True):
         mask[top : bottom + 1, left : right + 1] = True
     return ldls.InstanceMasks.from_array(masks)

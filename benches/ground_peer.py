@@ -115,8 +115,7 @@ class Patchwork:
 def our_ground(points: NDArray[np.float32], camera: ldls.Camera) -> Estimate:
     """What `stages.ground` says of points, on one thread."""
     heights = ldls.stages.ground(points, camera, threads=1)
-    low, high = ldls.stages.GROUND_M
-    return Estimate((heights > low) & (heights < high), points[:, 2] - heights)
+    return Estimate(ldls.stages.on_ground(heights), points[:, 2] - heights)
 
 
 def mistakes(scene: GroundScene, rows: NDArray[np.int64], said: Estimate) -> Mistakes:

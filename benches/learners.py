@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
-from sklearn.cluster import DBSCAN
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.semi_supervised import LabelSpreading
 
@@ -18,7 +17,7 @@ from benches.frames import Frame
 from benches.measuring import medians
 from benches.scipy_pipeline import project
 from benches.tables import add_ratio, new_table
-from ldls.evaluation.clusters import DBSCAN_MIN_POINTS, DBSCAN_RADIUS_M
+from ldls.evaluation.clusters import largest_clusters
 
 
 def project_and_cluster(frame: Frame, masks: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -27,11 +26,7 @@ def project_and_cluster(frame: Frame, masks: NDArray[np.bool_]) -> NDArray[np.in
     labels = np.zeros(len(xyz), np.int64)
     for m, mask in enumerate(masks, start=1):
         inside = np.flatnonzero(mask[pixels[:, 1], pixels[:, 0]])
-        if len(inside) == 0:
-            continue
-        clusters = DBSCAN(eps=DBSCAN_RADIUS_M, min_samples=DBSCAN_MIN_POINTS).fit_predict(xyz[inside])
-        if (clusters >= 0).any():
-            labels[inside[clusters == np.bincount(clusters[clusters >= 0]).argmax()]] = m
+        labels[inside[largest_clusters(xyz[inside], np.ones(len(inside), np.int32)) > 0]] = m
     return labels
 
 

@@ -70,14 +70,9 @@ def in_memory(measured: Frame, options: argparse.Namespace) -> Table:
         f"{frames} frames, {measured.name}", ["frames", "ms a frame", "ratio"], f"{options.threads} threads"
     )
 
-    def one_after_the_other() -> None:
-        stream = ldls.LabelDiffusion(measured.camera, ldls.Params(threads=options.threads))
-        for _ in range(frames):
-            stream.segment(measured.points, measured.masks)
-
     found = medians(
         {
-            "one after the other": one_after_the_other,
+            "one after the other": partial(loop, measured, frames, ldls.Params(threads=options.threads)),
             "one a thread": partial(one_a_thread, measured, frames, options.threads),
         },
         runs=min(options.runs, 7),

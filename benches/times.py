@@ -106,7 +106,7 @@ def overlaps(measured: Frame, options: argparse.Namespace) -> Table:
     frames = ((tiles, range(8)), (street_frame(n), range(3)), (random_frame(n), range(1)))
     for (name, params), (each, seeds) in product(parameters.items(), frames):
         for seed in seeds:
-            boxes = overlapping_boxes(each, 20, seed)
+            boxes = overlapping_boxes(each, seed)
             sides = {
                 side: partial(ldls.segment, each.points, masks, each.camera, params=params)
                 for side, masks in (("over", boxes), ("alone", boxes.resolve_overlaps("area")))

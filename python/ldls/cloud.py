@@ -1,4 +1,4 @@
-"""Point arrays from users, checked once."""
+"""Point arrays from users, checked once, and what arrays of numbers are called."""
 
 from __future__ import annotations
 
