@@ -20,6 +20,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from campaigns.file_parsers import PARSERS, Inputs
+from memory import address_space, resident_bytes
 
 SLOW_S = 5.0
 HANGS_S = 30.0
@@ -159,19 +160,6 @@ def be_strict():
 def peak_bytes():
     """The most memory that this process ever had."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-
-
-def resident_bytes():
-    return pages()[1] * resource.getpagesize()
-
-
-def address_space():
-    return pages()[0] * resource.getpagesize()
-
-
-def pages():
-    """Pages of this process: of its address space, those in memory, and more."""
-    return [int(word) for word in Path("/proc/self/statm").read_text().split()]
 
 
 def campaign(name, options):

@@ -2,13 +2,15 @@
 
 import argparse
 import gc
-import os
 import sys
 from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 import ldls
+from memory import resident_bytes
 
 WARM_UP = 500
 """Frames after which memory is measured: allocators and pools have what they need by then."""
@@ -84,12 +86,6 @@ def growth(samples):
     """Bytes a frame, by the line that fits the measurements best."""
     frames, sizes = np.array(samples, float).T
     return float(np.polyfit(frames, sizes, 1)[0])
-
-
-def resident_bytes():
-    """Memory of this process that is not swapped out."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 if __name__ == "__main__":

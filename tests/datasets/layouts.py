@@ -44,6 +44,11 @@ def row(matrix):
     return " ".join(f"{value:.9e}" for value in np.ravel(matrix))
 
 
+def ascii_body(rows):
+    """These rows as the text of a file, with all digits."""
+    return "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist()).encode()
+
+
 def kitti_object(folder, frames=("000000", "000001", "000002")):
     for name in frames:
         write_points(folder / f"velodyne/{name}.bin")

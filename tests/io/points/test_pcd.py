@@ -3,6 +3,7 @@ import pytest
 from scipy.spatial import KDTree
 
 import ldls
+from datasets.layouts import ascii_body
 
 pypcd4 = pytest.importorskip("pypcd4", reason="the extra pcd is not installed")
 
@@ -27,10 +28,6 @@ def packed(rows=ROWS, **sizes):
     content = lzf.compress(columns)
     two = np.array([sizes.get("packed", len(content)), sizes.get("unpacked", len(columns))], "<u4")
     return header(DATA="binary_compressed") + two.tobytes() + content
-
-
-def ascii_body(rows):
-    return "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist()).encode()
 
 
 def write(tmp_path, content):

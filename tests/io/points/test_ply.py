@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import ldls
+from datasets.layouts import ascii_body
 
 ROWS = np.array([[1.5, -2, 3, 0.25], [4, 5, 6, 0.5], [np.nan, 8, 9, 1]], np.float32)
 NAMES = ("x", "y", "z", "intensity")
@@ -10,10 +11,6 @@ NAMES = ("x", "y", "z", "intensity")
 def header(encoding, count=3, properties=tuple(f"float {name}" for name in NAMES), before=(), after=()):
     lines = ["ply", f"format {encoding} 1.0", "comment by hand", *before, f"element vertex {count}"]
     return "\n".join([*lines, *(f"property {one}" for one in properties), *after, "end_header\n"]).encode()
-
-
-def ascii_body(rows):
-    return "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist()).encode()
 
 
 def write(tmp_path, content):
