@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
-from typer.testing import CliRunner
 
 import ldls
-from ldls.cli import app
+from command import command
+from ldls.simulation import sample_frame
 
 # the same examples in every run, and no clock: a loaded machine is no fault of the code
 settings.register_profile("tests", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
@@ -92,16 +92,30 @@ def frame_571(data_folder):
 
 
 @pytest.fixture(scope="session")
+def sample():
+    """The frame that comes with the package; nobody changes it."""
+    return sample_frame()
+
+
+@pytest.fixture(scope="session")
 def demo(tmp_path_factory):
     """The folder that `ldls demo` fills, and how that ended; nobody changes it."""
     folder = tmp_path_factory.mktemp("demo")
-    return folder, CliRunner().invoke(app, ["demo", "--out", str(folder)])
+    return folder, command("demo", "--out", folder)
 
 
 @pytest.fixture
 def own_demo(demo, tmp_path):
     """A copy of it, to be changed, in ldls-demo below the test's folder."""
     return shutil.copytree(demo[0], tmp_path / "ldls-demo")
+
+
+@pytest.fixture
+def no_display(monkeypatch):
+    """A server of Linux, where no viewer can open."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
 
 
 @pytest.fixture

@@ -2,8 +2,6 @@
 
 import inspect
 import os
-import subprocess
-import sys
 import threading
 import warnings
 
@@ -11,6 +9,7 @@ import numpy as np
 import pytest
 
 import ldls
+from command import python
 from conftest import pinhole
 from ldls import stages
 from ldls.errors import LdlsWarning
@@ -245,15 +244,8 @@ def test_points_without_edges_are_background_and_finite():
         assert stages.diffuse(A, b, iterations=iterations).tolist() == [[0, 1], [0, 0], [0, 0]]
 
 
-def in_a_process(code, **options):
-    """What a fresh interpreter prints and how it ends."""
-    return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False, **options
-    )
-
-
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no affinity")
-def test_one_pool_has_as_many_threads_as_the_process_may_use():
+def test_one_pool_has_as_many_threads_as_the_process_may_use(monkeypatch):
     code = """
 import os, threading
 os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
@@ -271,8 +263,8 @@ workers = [threading.Thread(target=label) for _ in range(8)]
 names = [open(f"/proc/self/task/{task}/comm").read() for task in os.listdir("/proc/self/task")]
 print(sorted(name.strip() for name in names if name.startswith("ldls")))
 """
-    environment = {name: value for name, value in os.environ.items() if name != "LDLS_NUM_THREADS"}
-    ended = in_a_process(code, env=environment)
+    monkeypatch.delenv("LDLS_NUM_THREADS", raising=False)
+    ended = python("-c", code)
     assert ended.stdout == "['ldls-0', 'ldls-1', 'ldls-2']\n", ended.stderr
 
 

@@ -1,9 +1,10 @@
 """An interpreter that ends, or begins anew, while the package is at work."""
 
-import subprocess
 import sys
 
 import pytest
+
+from command import python
 
 FRAME = """
 import sys, threading, numpy, ldls
@@ -21,20 +22,16 @@ def work():
 """
 
 
-def finished(script):
-    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=120)
-
-
 @pytest.mark.parametrize("ending", ["pass", "sys.exit(0)"], ids=["the end of the script", "sys.exit"])
 def test_the_interpreter_may_end_during_a_call(ending):
-    outcome = finished(f"{FRAME}\nthreading.Thread(target=work, daemon=True).start(); begun.wait(); {ending}")
+    outcome = python("-c", f"{FRAME}\nthreading.Thread(target=work, daemon=True).start(); begun.wait(); {ending}")
     assert (outcome.returncode, outcome.stderr) == (0, "")
 
 
 def test_the_modules_may_be_loaded_again_during_a_call():
     again = "import importlib; importlib.reload(ldls); importlib.reload(sys.modules['ldls.label_diffusion'])"
     use = "print(len(ldls.segment(points, masks, camera).labels))"
-    outcome = finished(f"{FRAME}\nthreading.Thread(target=work, daemon=True).start(); begun.wait(); {again}; {use}")
+    outcome = python("-c", f"{FRAME}\nthreading.Thread(target=work, daemon=True).start(); begun.wait(); {again}; {use}")
     assert (outcome.returncode, outcome.stdout) == (0, "200000\n"), outcome.stderr
 
 
@@ -44,7 +41,7 @@ def test_a_second_interpreter_is_refused_or_works():
     script += "print('alive')"
     if sys.version_info >= (3, 13):
         script = "import _interpreters as all; print(all.exec(all.create(), 'import ldls._ldls')); print('alive')"
-    outcome = finished(script)
+    outcome = python("-c", script)
     assert outcome.returncode == 0, outcome.stderr
     *said, alive = outcome.stdout.splitlines()
     assert alive == "alive"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import ldls
+from command import python
 from ldls import stages
 
 CLOUD = """
@@ -96,8 +97,7 @@ def test_a_signal_handler_that_raises_stops_a_call():
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="tells the memory in use by /proc")  # noqa: PTH110
 @pytest.mark.parametrize("megabytes", [70, 150, 300, 450, 600])
 def test_a_lack_of_memory_is_an_error_and_the_next_call_works(megabytes):
-    words = [sys.executable, "-c", IN_LITTLE_MEMORY, "2000000", str(megabytes)]
-    run = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
+    run = python("-c", IN_LITTLE_MEMORY, 2_000_000, megabytes)
     assert run.returncode == 0, run.stderr
     assert run.stdout in ("True\nTrue\n", "done\nTrue\n")
 

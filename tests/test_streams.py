@@ -1,7 +1,5 @@
 """Frames one after the other, and beside one another."""
 
-import os
-import subprocess
 import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -10,6 +8,7 @@ import numpy as np
 import pytest
 
 import ldls
+from command import python
 from ldls.errors import PrecisionWarning
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -53,9 +52,9 @@ def test_warnings_name_the_line_that_called(small_scene):
 
 
 def run(source, **variables):
-    environment = os.environ | variables
-    command = [sys.executable, "-c", source]
-    return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout.split()
+    done = python("-c", source, **variables)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
 
 
 @linux

@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from batch import drives, runs
+from command import process
 from datasets import layouts
 from ldls.simulation import Drive, drive_folder, write_drive
 
@@ -19,7 +20,7 @@ def source(tmp_path_factory):
 def undisturbed(source, tmp_path_factory):
     """The files that an undisturbed run of these frames leaves."""
     out = tmp_path_factory.mktemp("undisturbed")
-    outcome = runs.finished(runs.arguments(source, out))
+    outcome = process(*runs.arguments(source, out))
     assert outcome.returncode == 0, outcome.stderr
     return runs.contents(out)
 

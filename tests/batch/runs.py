@@ -8,10 +8,9 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from typer.testing import CliRunner
-
+from command import python
+from ldls.batch import RunSettings
 from ldls.batch.lock import LOCK_NAME
-from ldls.cli import app
 
 KILLED_AT = Path(__file__).with_name("killed_at.py")
 PATIENCE_S = 300
@@ -27,14 +26,19 @@ app()
 """A program that does what `ldls` does, at most ten frames a second a reader."""
 
 
+def stored(source, **settings):
+    """Settings of a run with the masks that lie in its source."""
+    return RunSettings(masks=str(source / "masks"), **settings)
+
+
 def arguments(source, out, *more):
-    return ["run", str(source), "--masks", str(source / "masks"), "--out", str(out), *map(str, more)]
+    return ["run", source, "--masks", source / "masks", "--out", out, *more]
 
 
 @contextmanager
-def process(arguments, program=("-m", "ldls")):
+def started(arguments, program=("-m", "ldls")):
     """A run that is at work, and no more when the block ends."""
-    command = [sys.executable, *program, *arguments]
+    command = [sys.executable, *program, *map(str, arguments)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(command, preexec_fn=hears_ctrl_c, **pipes) as running:
         try:
@@ -48,14 +52,9 @@ def hears_ctrl_c():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def finished(arguments, program=("-m", "ldls")):
-    """A run's process after its end."""
-    return subprocess.run([sys.executable, *program, *arguments], capture_output=True, text=True, check=False)
-
-
-def resumed(arguments):
-    """The outcome of a run in this process."""
-    return CliRunner().invoke(app, arguments)
+def killed(step, n, arguments):
+    """A run that was killed at the `n`th of these steps."""
+    return python(KILLED_AT, step, n, *arguments)
 
 
 def has_begun(running, out):
@@ -85,7 +84,7 @@ def wait_for(state):
 def killed_after(arguments, out, seconds):
     """Kill a run so long after it took hold of its folder; whether it was still at work."""
     (out / LOCK_NAME).unlink(missing_ok=True)
-    with process(arguments) as running:
+    with started(arguments) as running:
         if has_begun(running, out):
             time.sleep(seconds)
         at_work = running.poll() is None

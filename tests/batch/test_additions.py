@@ -6,6 +6,7 @@ import signal
 import pytest
 
 from batch import runs
+from command import command
 from datasets import layouts
 from ldls import batch
 from ldls.errors import BatchError, ChangedFileWarning, UnsafePathError
@@ -85,8 +86,8 @@ def test_a_frame_with_less_than_the_others_gets_what_it_lacks(few, tmp_path, who
 
 def test_the_command_adds_formats_and_frames(few, tmp_path):
     words = runs.arguments(few, tmp_path / "out")
-    assert "5 of 5 frames done" in runs.resumed([*words, "--frames", ":5", "--formats", "npz"]).output
-    outcome = runs.resumed([*words, "--formats", "npz,label"])
+    assert "5 of 5 frames done" in command(*words, "--frames", ":5", "--formats", "npz").output
+    outcome = command(*words, "--formats", "npz,label")
     assert outcome.exit_code == 0, outcome.output
     assert "12 of 12 frames done" in outcome.output
     assert len(list((tmp_path / "out").glob("*.label"))) == len(list((tmp_path / "out").glob("*.npz"))) == 12
@@ -158,12 +159,12 @@ def test_frames_of_which_the_source_has_no_more_stay_in_the_journal(few, tmp_pat
 )
 def test_killed_while_formats_are_added(source, tmp_path, step, n):
     words = runs.arguments(source, tmp_path / "out")
-    assert runs.resumed([*words, "--frames", ":40", "--formats", "npz"]).exit_code == 0
+    assert command(*words, "--frames", ":40", "--formats", "npz").exit_code == 0
     more = [*words, "--formats", "npz,label,ply"]
-    killed = runs.finished([step, str(n), *more], program=[str(runs.KILLED_AT)])
+    killed = runs.killed(step, n, more)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
-    outcome = runs.resumed(more)
+    outcome = command(*more)
     assert outcome.exit_code == 0, outcome.output
     assert "were changed" not in outcome.output
-    assert runs.resumed([*runs.arguments(source, tmp_path / "at once"), "--formats", "npz,label,ply"]).exit_code == 0
+    assert command(*runs.arguments(source, tmp_path / "at once"), "--formats", "npz,label,ply").exit_code == 0
     assert runs.contents(tmp_path / "out") == runs.contents(tmp_path / "at once")

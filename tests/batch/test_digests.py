@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from batch import runs
+from command import command
 from ldls import batch
 from ldls.batch import known_files
 from ldls.errors import BatchError, ChangedFileWarning
@@ -42,9 +43,9 @@ def test_a_result_overwritten_with_as_many_other_bytes_is_made_again(few, tmp_pa
 
 def test_the_command_says_that_a_result_was_changed(few, tmp_path):
     words = runs.arguments(few, tmp_path / "out")
-    assert runs.resumed(words).exit_code == 0
+    assert command(*words).exit_code == 0
     overwrite(tmp_path / "out/000003.label")
-    outcome = runs.resumed(words)
+    outcome = command(*words)
     assert outcome.exit_code == 0
     assert "warning: " in outcome.output
     assert "files of 1 frames were changed since they were written (000003)" in outcome.output

@@ -23,7 +23,7 @@ def line(**changed):
 @pytest.fixture
 def finished(few, tmp_path):
     """A finished run of twelve frames: its journal, and what begins it again."""
-    settings = batch.RunSettings(masks=str(few / "masks"))
+    settings = runs.stored(few)
     out = tmp_path / "out"
     batch.run(few, out, settings)
     return out / "journal.jsonl", lambda: batch.run(few, out, settings)
@@ -104,5 +104,5 @@ def test_a_foreign_file_without_line_breaks_is_kept(few, tmp_path, content):
     journal = tmp_path / "journal.jsonl"
     journal.write_bytes(content)
     with pytest.raises(CorruptFileError, match="line 1: not a journal of ldls"):
-        batch.run(few, tmp_path, batch.RunSettings(masks=str(few / "masks")))
+        batch.run(few, tmp_path, runs.stored(few))
     assert journal.read_bytes() == content

@@ -7,6 +7,7 @@ import signal
 import pytest
 
 from batch import killed_at, runs
+from command import command, process
 
 AT_STEPS = [
     pytest.param(step, n, id=f"{step}, {n}")
@@ -32,9 +33,9 @@ def test_every_step_of_a_write_is_killed_once():
 @pytest.mark.parametrize(("step", "n"), AT_STEPS)
 def test_killed_at_a_step(source, undisturbed, tmp_path, step, n):
     words = runs.arguments(source, tmp_path)
-    killed = runs.finished([step, str(n), *words], program=[str(runs.KILLED_AT)])
+    killed = runs.killed(step, n, words)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
-    outcome = runs.resumed(words)
+    outcome = command(*words)
     assert outcome.exit_code == 0, outcome.output
     assert runs.contents(tmp_path) == undisturbed
 
@@ -44,18 +45,16 @@ def test_killed_twice_at_random_moments(source, undisturbed, tmp_path, seed):
     words = runs.arguments(source, tmp_path)
     moments = random.Random(seed)
     # sixty frames are half a second's work for a slow core
-    killed = [
-        runs.finished([killed_at.WORK, str(moments.uniform(0, 0.03)), *words], [str(runs.KILLED_AT)]) for _ in "ab"
-    ]
+    killed = [runs.killed(killed_at.WORK, moments.uniform(0, 0.03), words) for _ in "ab"]
     assert -signal.SIGPROF in {run.returncode for run in killed}, killed
-    outcome = runs.resumed(words)
+    outcome = command(*words)
     assert outcome.exit_code == 0, outcome.output
     assert runs.contents(tmp_path) == undisturbed
 
 
 def test_interrupted_by_ctrl_c(source, undisturbed, tmp_path):
     words = runs.arguments(source, tmp_path)
-    with runs.process([*words, "--cores", "1"], program=("-c", runs.SLOWLY)) as running:
+    with runs.started([*words, "--cores", "1"], program=("-c", runs.SLOWLY)) as running:
         assert runs.has_done_some(running, tmp_path)
         running.send_signal(signal.SIGINT)
         _, complaint = running.communicate()
@@ -68,5 +67,5 @@ def test_interrupted_by_ctrl_c(source, undisturbed, tmp_path):
     assert 0 < len(left) < 61
     # some may have been written after the count
     assert 0 < int(count) <= len(left) - 1
-    assert "by earlier runs" in runs.finished(words).stdout
+    assert "by earlier runs" in process(*words).stdout
     assert runs.contents(tmp_path) == undisturbed

@@ -6,6 +6,7 @@ import os
 import pytest
 
 from batch import runs
+from command import command
 from ldls import batch
 from ldls.batch.journal import JOURNAL_NAME
 from ldls.batch.lock import HOLDER_NAME, LOCK_NAME
@@ -22,7 +23,7 @@ def folder(few, tmp_path):
     out, precious = tmp_path / "out", tmp_path / "precious"
     out.mkdir()
     precious.write_bytes(PRECIOUS)
-    yield out, precious, lambda: batch.run(few, out, batch.RunSettings(masks=str(few / "masks")))
+    yield out, precious, lambda: batch.run(few, out, runs.stored(few))
     assert precious.read_bytes() == PRECIOUS
 
 
@@ -104,8 +105,8 @@ def test_a_pipe_in_the_place_of_the_holder_does_not_hold_up_a_second_run(few, fo
     hold += "with lock.only_run(out):\n"
     hold += "    (out / lock.HOLDER_NAME).unlink(); os.mkfifo(out / lock.HOLDER_NAME)\n"
     hold += "    print('held', flush=True); time.sleep(60)"
-    with runs.process([str(out)], program=["-c", hold]) as holder:
+    with runs.started([out], program=["-c", hold]) as holder:
         assert holder.stdout.readline() == "held\n"
-        outcome = runs.resumed(runs.arguments(few, out))
+        outcome = command(*runs.arguments(few, out))
     assert outcome.exit_code == 1
     assert "another run is at work here (process unknown)" in outcome.output

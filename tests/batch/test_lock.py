@@ -2,12 +2,11 @@
 
 import os
 import signal
-import subprocess
-import sys
 
 import pytest
 
 from batch import runs
+from command import command, python
 from ldls.batch.lock import HOLDER_NAME, LOCK_NAME, only_run
 from ldls.errors import BatchError
 from ldls.io.files import UNFINISHED
@@ -35,7 +34,7 @@ for module in pkgutil.walk_packages(ldls.__path__, "ldls."):
 
 
 def held(folder):
-    return runs.process([str(folder)], program=["-c", HOLD])
+    return runs.started([folder], program=["-c", HOLD])
 
 
 def test_the_lock_of_a_killed_process_holds_nobody_up(tmp_path):
@@ -54,10 +53,10 @@ def test_a_second_run_leaves_the_parts_of_a_living_one(few, tmp_path):
     with held(tmp_path) as holder:
         assert holder.stdout.readline() == "held\n"
         part.write_bytes(b"half")
-        outcome = runs.resumed(runs.arguments(few, tmp_path))
+        outcome = command(*runs.arguments(few, tmp_path))
         assert f"process {holder.pid} on " in outcome.output
         assert part.exists()
-    assert runs.resumed(runs.arguments(few, tmp_path)).exit_code == 0
+    assert command(*runs.arguments(few, tmp_path)).exit_code == 0
     assert not part.exists()
 
 
@@ -71,5 +70,5 @@ def test_a_holder_that_tells_nothing_is_unknown(tmp_path, content):
 
 
 def test_no_module_needs_posix():
-    outcome = subprocess.run([sys.executable, "-c", WITHOUT_POSIX], capture_output=True, text=True, check=False)
+    outcome = python("-c", WITHOUT_POSIX)
     assert outcome.returncode == 0, outcome.stderr

@@ -6,13 +6,12 @@ import shutil
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
 from batch import runs
+from command import command
 from datasets import layouts
 from ldls import batch
-from ldls.cli import app
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io.masks import data_set as data_set_module
 
@@ -71,7 +70,7 @@ def test_a_frame_that_is_not_in_the_file_fails_and_one_without_annotations_does_
 
 def test_a_file_of_other_images_stops_the_run_at_once(few, tmp_path):
     path = gather(few, tmp_path / "instances.json", "frame {}.png")
-    outcome = runs.resumed(["run", str(few), "--masks", str(path), "--out", str(tmp_path / "out")])
+    outcome = command("run", few, "--masks", path, "--out", tmp_path / "out")
     assert outcome.exit_code == 1
     assert "it has 'frame 000000.png', 'frame 000001.png', 'frame 000002.png' and 9 more" in outcome.output
     assert "the frames are '000000', '000001', '000002' and 9 more" in outcome.output
@@ -97,11 +96,10 @@ def folder(tmp_path):
 
 
 def test_masks_that_the_source_names_are_used_and_said(folder, tmp_path):
-    outcome = runs.resumed(["run", str(folder), "--out", str(tmp_path / "own")])
+    outcome = command("run", folder, "--out", tmp_path / "own")
     assert outcome.exit_code == 0, outcome.output
     assert f"masks are those that {folder} names (front: masks/{{frame}}.json)" in outcome.output
-    words = ["run", str(folder), "--masks", f"{folder}/masks/{{frame}}.json", "--out", str(tmp_path / "given")]
-    outcome = runs.resumed(words)
+    outcome = command("run", folder, "--masks", f"{folder}/masks/{{frame}}.json", "--out", tmp_path / "given")
     assert outcome.exit_code == 0 and "masks are those" not in outcome.output
     assert labels(tmp_path / "own") == labels(tmp_path / "given") != {}
     assert any(set(content) != {0} for content in labels(tmp_path / "own").values())
@@ -199,7 +197,7 @@ def test_a_category_that_masks_cannot_have_is_refused_before_the_first_frame(few
         batch.run(source, tmp_path / "out", batch.RunSettings(categories=("car", "persn"), **settings))
     assert list((tmp_path / "out").iterdir()) == []
     words = [f"--{name}={value}" for name, value in settings.items()]
-    shown = CliRunner().invoke(app, ["view", str(source), *words, "--categories=persn", "--rerun", "a.rrd"])
+    shown = command("view", source, *words, "--categories=persn", "--rerun", "a.rrd")
     assert shown.exit_code == 1
     assert shown.stderr.endswith("error: --categories: 'persn' is unknown; did you mean 'person'?\n")
 

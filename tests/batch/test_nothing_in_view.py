@@ -8,6 +8,7 @@ import pytest
 
 import ldls
 from batch import runs
+from command import process
 from datasets import layouts
 from ldls import batch
 from ldls.doubts import nothing_in_view
@@ -114,7 +115,7 @@ def test_the_cause_of_a_sweep_of_nan_among_others_is_that():
 def test_a_run_names_the_frames_of_nan_whether_sweeps_are_joined_or_not(drive, tmp_path, sweeps):
     for number in (2, 4):
         layouts.write_points(drive / f"velodyne/{number:06d}.bin", np.full((200, 4), np.nan, "<f4"))
-    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=sweeps)
+    settings = runs.stored(drive, sweeps=sweeps)
     for _ in "ab":
         with pytest.warns(NothingInView) as caught:
             summary = batch.run(drive, tmp_path / "out", settings)
@@ -138,8 +139,8 @@ def astray(few):
 
 def test_segment_exits_well_and_prints_the_warning(astray, tmp_path):
     files = {"points": "velodyne/000004.bin", "calib": "calib/000004.txt", "masks": "masks/000004.json"}
-    words = [word for name, file in files.items() for word in (f"--{name}", str(astray / file))]
-    outcome = runs.finished(["segment", *words, "--out", str(tmp_path / "out")])
+    words = [word for name, file in files.items() for word in (f"--{name}", astray / file)]
+    outcome = process("segment", *words, "--out", tmp_path / "out")
     assert outcome.returncode == 0
     assert outcome.stderr.startswith("warning: --points: every point lies behind the camera; nothing is labelled; is ")
     assert outcome.stderr.count("\n") == 1
@@ -148,7 +149,7 @@ def test_segment_exits_well_and_prints_the_warning(astray, tmp_path):
 def test_a_run_counts_such_frames_and_warns_once_of_each_cause(astray, tmp_path):
     words = runs.arguments(astray, tmp_path / "out")
     for _ in "ab":
-        outcome = runs.finished(words)
+        outcome = process(*words)
         assert outcome.returncode == 0
         assert "12 of 12 frames done" in outcome.stdout
         assert ", 4 with nothing in view" in outcome.stdout
@@ -159,7 +160,7 @@ def test_a_run_counts_such_frames_and_warns_once_of_each_cause(astray, tmp_path)
 
 def test_the_journal_has_the_cause(astray, tmp_path):
     with pytest.warns(NothingInView):
-        summary = batch.run(astray, tmp_path / "out", batch.RunSettings(masks=str(astray / "masks")))
+        summary = batch.run(astray, tmp_path / "out", runs.stored(astray))
     assert summary.n_nothing_in_view == 4
     causes = {frame: record["nothing_in_view"] for frame, record in runs.records(tmp_path / "out").items()}
     assert [frame for frame, cause in causes.items() if cause] == ["000001", "000004", "000006", "000009"]

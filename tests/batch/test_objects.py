@@ -8,6 +8,7 @@ import pytest
 
 import ldls
 from batch import runs
+from command import command
 from ldls import batch
 from ldls.datasets import open_source
 from ldls.errors import UnsupportedFormatError
@@ -17,7 +18,7 @@ ENDINGS = ["csv", "json"]
 
 @pytest.fixture
 def settings(few):
-    return batch.RunSettings(masks=str(few / "masks"))
+    return runs.stored(few)
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def test_a_folder_that_is_not_there_is_named_before_anything_is_done(few, settin
 def test_the_command_writes_it_where_it_is_called(few, expected, tmp_path, monkeypatch):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    outcome = runs.resumed(runs.arguments(few, tmp_path / "out", "--objects", "objects.csv"))
+    outcome = command(*runs.arguments(few, tmp_path / "out", "--objects", "objects.csv"))
     assert outcome.exit_code == 0, outcome.output
     assert (tmp_path / "here/objects.csv").read_bytes() == expected["csv"]
     assert "objects in objects.csv" in outcome.output
@@ -103,7 +104,7 @@ def test_the_command_writes_it_where_it_is_called(few, expected, tmp_path, monke
 
 def test_boxes_of_kitti_are_a_format(few, tmp_path):
     shutil.rmtree(few / "label_2", ignore_errors=True)
-    outcome = runs.resumed(runs.arguments(few, tmp_path / "out", "--formats", "kitti-boxes,npz", "--frames", ":2"))
+    outcome = command(*runs.arguments(few, tmp_path / "out", "--formats", "kitti-boxes,npz", "--frames", ":2"))
     assert outcome.exit_code == 0, outcome.output
     ldls.save(ldls.read_result(tmp_path / "out/000001.npz"), tmp_path / "expected.txt")
     assert (tmp_path / "out/000001.txt").read_bytes() == (tmp_path / "expected.txt").read_bytes() != b""

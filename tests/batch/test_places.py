@@ -71,7 +71,7 @@ def test_what_a_run_could_not_record_is_its_own(few, tmp_path):
         (out / "journal.jsonl").write_bytes(b"".join([header, *kept]))
         assert run(few, out, "npz", "label").n_earlier == len(kept)
     (out / "journal.jsonl").write_bytes(header)
-    assert batch.run(few, out, batch.RunSettings(masks=str(few / "masks"), sweeps=0, min_score=0.5)).n_done == 12
+    assert batch.run(few, out, runs.stored(few, sweeps=0, min_score=0.5)).n_done == 12
 
 
 def test_formats_that_were_begun_are_in_the_journal_in_one_order(few, tmp_path):
@@ -97,7 +97,7 @@ def test_names_are_one_where_they_are_to_the_file_system(few, tmp_path):
 def test_what_a_run_writes_of_all_frames_takes_no_others_place(drive, tmp_path, file):
     out = tmp_path / "out"
     layouts.write_text(out / file, "mine")
-    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, track=True)
+    settings = runs.stored(drive, sweeps=1, track=True)
     with pytest.raises(BatchError, match=rf"out: holds {file.partition('/')[0]}, {REASON}"):
         batch.run(drive, out, settings)
     assert runs.contents(out) == {file: b"mine"}
@@ -106,7 +106,7 @@ def test_what_a_run_writes_of_all_frames_takes_no_others_place(drive, tmp_path, 
 def test_tracks_of_others_are_refused_when_a_run_is_to_be_tracked(drive, tmp_path):
     out = tmp_path / "out"
     layouts.write_text(out / "tracks.csv", "mine")
-    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1)
+    settings = runs.stored(drive, sweeps=1)
     assert batch.run(drive, out, settings).n_done == 8
     with pytest.raises(BatchError, match=rf"out: holds tracks\.csv, {REASON}"):
         batch.run(drive, out, replace(settings, track=True))
@@ -131,7 +131,7 @@ def test_poses_that_sweeps_tell_take_no_others_place(drive, tmp_path, monkeypatc
     layouts.write_text(poses, drives.tum_poses(8))
     monkeypatch.setattr(found_poses, "odometry_of", lambda _: read_poses(tmp_path / "told.txt"))
     layouts.write_text(tmp_path / "told.txt", drives.tum_poses(8))
-    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, poses="kiss-icp")
+    settings = runs.stored(drive, sweeps=1, poses="kiss-icp")
     with pytest.raises(BatchError, match=r"poses\.txt: is there, no run here wrote it, .* by --poses .*poses\.txt, or"):
         batch.run(drive, tmp_path / "out", settings)
     assert poses.read_text() == drives.tum_poses(8)
@@ -183,7 +183,7 @@ def test_files_of_masks_wherever_they_lie_are_inputs(tmp_path, how, cameras):
     ],
 )
 def test_files_of_all_frames_are_not_written_over_those_of_one(drive, tmp_path, options):
-    settings = batch.RunSettings(masks=str(drive / "masks"), formats=("npz", "ply"), track=True)
+    settings = runs.stored(drive, formats=("npz", "ply"), track=True)
     batch.run(drive, tmp_path / "out", settings)
     before = runs.contents(tmp_path / "out")
     ((name, file),) = options.items()

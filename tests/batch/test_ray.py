@@ -9,6 +9,7 @@ import pytest
 
 import ldls
 from batch import runs
+from command import process
 from ldls import batch
 from ldls.batch import ray_engine
 from ldls.batch.engines import EngineOptions
@@ -24,10 +25,6 @@ WORKERS = ("--engine", "ray", "--cores", 2)
 @pytest.fixture(scope="module")
 def ray():
     return pytest.importorskip("ray")
-
-
-def stored(source):
-    return batch.RunSettings(masks=str(source / "masks"))
 
 
 def worker_pids(ancestor):
@@ -59,7 +56,7 @@ def test_a_worker_killed_on_the_way_costs_nothing(ray, source, undisturbed, tmp_
             os.kill(pid, signal.SIGKILL)
             killed.append(pid)
 
-    summary = batch.run(source, tmp_path, stored(source), engine="ray", workers=2, on_progress=kill_one)
+    summary = batch.run(source, tmp_path, runs.stored(source), engine="ray", workers=2, on_progress=kill_one)
     assert len(killed) == 2
     assert (summary.n_done, summary.failures) == (60, ())
     assert runs.contents(tmp_path) == undisturbed
@@ -69,16 +66,16 @@ def test_a_worker_killed_on_the_way_costs_nothing(ray, source, undisturbed, tmp_
 def test_a_killed_run_goes_on_on_either_engine(ray, source, undisturbed, tmp_path):
     words = runs.arguments(source, tmp_path)
     for more in ((), WORKERS):
-        killed = runs.finished(["line written", "2", *words, *map(str, more)], [str(runs.KILLED_AT)])
+        killed = runs.killed("line written", 2, [*words, *more])
         assert killed.returncode == -signal.SIGKILL, killed.stderr
-    outcome = runs.finished([*words, *map(str, WORKERS)])
+    outcome = process(*words, *WORKERS)
     assert outcome.returncode == 0, outcome.stderr
     assert "by earlier runs" in outcome.stdout
     assert runs.contents(tmp_path) == undisturbed
 
 
 def test_a_full_disk(ray, source, small_disk):
-    outcome = runs.finished([*runs.arguments(source, small_disk), *map(str, WORKERS)])
+    outcome = process(*runs.arguments(source, small_disk, *WORKERS))
     assert outcome.returncode == 1
     assert "No space left on device while" in outcome.stderr
     assert "ing frame 000" in outcome.stderr
@@ -87,7 +84,7 @@ def test_a_full_disk(ray, source, small_disk):
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1", "127.0.0.1:port"])
 def test_an_address_where_no_cluster_is(ray, few, tmp_path, address):
     with pytest.raises(BatchError, match=f"cannot join '{address}'"):
-        batch.run(few, tmp_path / "out", stored(few), engine="ray", ray_address=address)
+        batch.run(few, tmp_path / "out", runs.stored(few), engine="ray", ray_address=address)
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +124,7 @@ def test_bad_frames_and_frames_that_kill_their_workers_are_passed_over(cluster, 
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
     try:
         deadly = Deadly(open_source(few), 4)
-        summary = batch.run(deadly, tmp_path / "out", stored(few), engine="ray", workers=2)
+        summary = batch.run(deadly, tmp_path / "out", runs.stored(few), engine="ray", workers=2)
     finally:
         cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
     assert [(failure.frame, failure.stage, failure.code) for failure in summary.failures] == [
@@ -137,18 +134,18 @@ def test_bad_frames_and_frames_that_kill_their_workers_are_passed_over(cluster, 
     assert summary.n_done == 10
     assert cluster.is_initialized()
     (few / "velodyne/000002.bin").write_bytes(sound)
-    assert batch.run(few, tmp_path / "out", stored(few)).n_done == 12
+    assert batch.run(few, tmp_path / "out", runs.stored(few)).n_done == 12
 
 
 def test_gpus_that_are_not_there(cluster, few, tmp_path):
     with pytest.raises(BatchError, match="the cluster has 0, a worker wants 64"):
-        batch.run(few, tmp_path / "out", stored(few), engine="ray", gpus=64)
+        batch.run(few, tmp_path / "out", runs.stored(few), engine="ray", gpus=64)
 
 
 def test_without_ray_the_extra_is_named(few, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(ImportError, match=r"pip install 'ldls\[ray\]'"):
-        batch.run(few, tmp_path / "out", stored(few), engine="ray")
+        batch.run(few, tmp_path / "out", runs.stored(few), engine="ray")
 
 
 @pytest.mark.parametrize(
@@ -162,7 +159,7 @@ def test_without_ray_the_extra_is_named(few, tmp_path, monkeypatch):
 def test_a_worker_that_cannot_take_part_says_so(few, tmp_path, seen, version, named):
     if seen is not None:
         (tmp_path / HOLDER_NAME).write_text(seen)
-    work = FrameWork(open_source(few), stored(few), tmp_path)
+    work = FrameWork(open_source(few), runs.stored(few), tmp_path)
     with pytest.raises(BatchError, match=named):
         RayWorker().open(work, version, "this run", "notes", wait_s=0)
 
@@ -174,7 +171,7 @@ def worker(few, tmp_path):
     notes = tmp_path / ".worker-0"
     notes.touch()
     worker = RayWorker()
-    worker.open(FrameWork(open_source(few), stored(few), tmp_path), ldls.__version__, "this run", notes.name)
+    worker.open(FrameWork(open_source(few), runs.stored(few), tmp_path), ldls.__version__, "this run", notes.name)
     return worker, notes
 
 
@@ -210,4 +207,4 @@ def test_gpus_out_of_range(gpus):
 
 def test_options_of_ray_are_refused_on_the_local_engine(few, tmp_path):
     with pytest.raises(ParameterError, match="are for engine 'ray'"):
-        batch.run(few, tmp_path / "out", stored(few), ray_address="auto")
+        batch.run(few, tmp_path / "out", runs.stored(few), ray_address="auto")

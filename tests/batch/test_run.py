@@ -13,17 +13,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
 from batch import drives, runs
+from command import command, python
 from datasets import layouts, ros_samples
 from ldls import batch
 from ldls.batch import lock
 from ldls.batch.journal import Journal
 from ldls.batch.plan import check_names, parse_frames
 from ldls.batch.poses import FOUND
-from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import (
     BatchError,
@@ -38,10 +37,6 @@ from ldls.io import files
 from ldls.viewing import overlay
 
 STORED = batch.RunSettings(masks="unused")
-
-
-def command(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 def run(source, out, **options):
@@ -214,7 +209,7 @@ def test_a_bag_with_stored_masks(tmp_path, n_cameras):
     for image in opened[0].images:
         for name in opened.names:
             layouts.write_text(tmp_path / f"masks/{image.name}/{name}.json", json.dumps(layouts.coco(20)))
-    settings = batch.RunSettings(masks=str(tmp_path / "masks"))
+    settings = runs.stored(tmp_path)
     for n_earlier in (0, 3):
         # the cloud of this bag lies beside its images
         with pytest.warns(NothingInView, match="3 of 3 frames") as caught:
@@ -410,7 +405,7 @@ def test_a_second_run_is_refused_while_the_first_lives(few, tmp_path):
     out.mkdir()
     hold = "import sys, time; from pathlib import Path; from ldls.batch.lock import only_run\n"
     hold += "with only_run(Path(sys.argv[1])): print('held', flush=True); time.sleep(60)"
-    with runs.process([str(out)], program=["-c", hold]) as holder:
+    with runs.started([out], program=["-c", hold]) as holder:
         assert holder.stdout.readline() == "held\n"
         outcome = command(*runs.arguments(few, out))
         assert outcome.exit_code == 1
@@ -619,9 +614,8 @@ batch.run(source, out, batch.RunSettings(masks=f"{source}/masks"), on_progress=m
 def test_memory_stays_flat(tmp_path):
     source = layouts.many_frames(tmp_path / "source", 4500)
     # in a process of its own: what other tests have left in this one moves its memory as well
-    done = subprocess.run(
-        [sys.executable, "-c", MEMORY, source, tmp_path / "out"], capture_output=True, text=True, check=True
-    )
+    done = python("-c", MEMORY, source, tmp_path / "out")
+    assert done.returncode == 0, done.stderr
     used = [int(line) for line in done.stdout.split()]
     # what is there at the least, for momentary peaks depend on what else the machine does; where it does much,
     # allocators go on for some thousand frames to gather what they keep, 4 MB
@@ -747,7 +741,7 @@ def test_options_of_the_source_choose_and_belong_to_the_run(tmp_path, by):
 
 def test_settings_of_numpy_are_those_of_python(few, tmp_path):
     params = {"neighbors": 10, "sigma": 0.5}
-    plain = batch.RunSettings(masks=str(few / "masks"), min_score=0.25, sweeps=0, categories=("car", 1),
+    plain = runs.stored(few, min_score=0.25, sweeps=0, categories=("car", 1),
                               params=ldls.Params(**params))  # fmt: skip
     of_numpy = batch.RunSettings(
         masks=str(few / "masks"),

@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 
 import ldls
 from batch import runs
+from command import command
 from datasets import layouts
 from datasets.ros_samples import START_NS, STEP_NS, Recording
 from ldls import batch
@@ -43,8 +44,8 @@ def recorded(folder, kind, sweeps=4, **contents):
     return bag
 
 
-def command(bag, out, *more):
-    return runs.resumed(["run", str(bag), "--masks", str(bag.parent / "masks"), "--out", str(out), *more])
+def run(bag, out, *more):
+    return command("run", bag, "--masks", bag.parent / "masks", "--out", out, *more)
 
 
 def messages(path, topic=None):
@@ -58,7 +59,7 @@ def messages(path, topic=None):
 @pytest.mark.parametrize("kind", KINDS)
 def test_labels_of_all_frames_come_back_with_stamps_and_frames(tmp_path, kind):
     bag, out = recorded(tmp_path, kind), tmp_path / "out"
-    outcome = command(bag, out, "--formats", "bag")
+    outcome = run(bag, out, "--formats", "bag")
     assert outcome.exit_code == 0, outcome.output
     path = out / KINDS[kind][1]
     clouds = messages(path, "/points_labelled")
@@ -87,40 +88,40 @@ def test_labels_of_all_frames_come_back_with_stamps_and_frames(tmp_path, kind):
 
 def test_a_bag_that_is_whole_stays_and_one_that_lacks_frames_is_written_anew(tmp_path):
     bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
-    assert command(bag, out, "--formats", "bag", "--frames", "1:3").exit_code == 0
+    assert run(bag, out, "--formats", "bag", "--frames", "1:3").exit_code == 0
     assert [at for _, at, _ in messages(out / "labelled", "/points_labelled")] == [
         START_NS + number * STEP_NS + 1_000_000 for number in (1, 2)
     ]
     inode = (out / "labelled/metadata.yaml").stat().st_ino
-    assert "2 of them by earlier runs" in command(bag, out, "--formats", "bag", "--frames", "1:3").output
+    assert "2 of them by earlier runs" in run(bag, out, "--formats", "bag", "--frames", "1:3").output
     assert (out / "labelled/metadata.yaml").stat().st_ino == inode
-    assert command(bag, out, "--formats", "bag,label").exit_code == 0
+    assert run(bag, out, "--formats", "bag,label").exit_code == 0
     assert len(messages(out / "labelled", "/points_labelled")) == 4
     # a run that was killed before the bag was written
     shutil.rmtree(out / "labelled")
     (out / ".labelled.abc.part").mkdir()
-    assert command(bag, out, "--formats", "bag").exit_code == 0
+    assert run(bag, out, "--formats", "bag").exit_code == 0
     assert len(messages(out / "labelled", "/points_labelled")) == 4
     assert not list(out.glob(".*.part"))
 
 
 def test_the_bag_of_a_finished_run_is_added(tmp_path):
     bag, out = recorded(tmp_path, "rosbag1"), tmp_path / "out"
-    assert command(bag, out, "--formats", "label").exit_code == 0
-    assert command(bag, out, "--formats", "bag").exit_code == 0
+    assert run(bag, out, "--formats", "label").exit_code == 0
+    assert run(bag, out, "--formats", "bag").exit_code == 0
     assert len(messages(out / "labelled.bag", "/points_labelled")) == 4
 
 
 def test_frames_that_fail_are_not_in_the_bag(tmp_path):
     bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
     (tmp_path / f"masks/{START_NS + STEP_NS}.json").unlink()
-    assert command(bag, out, "--formats", "bag").exit_code == 2
+    assert run(bag, out, "--formats", "bag").exit_code == 2
     assert len(messages(out / "labelled", "/points_labelled")) == 3
 
 
 def test_what_is_copied_lies_in_the_time_of_the_frames(tmp_path):
     bag, out = recorded(tmp_path, "mcap", sweeps=40), tmp_path / "out"
-    assert command(bag, out, "--formats", "bag", "--frames", "0:2").exit_code == 0
+    assert run(bag, out, "--formats", "bag", "--frames", "0:2").exit_code == 0
     images = [at for _, at, _ in messages(out / "labelled", "/camera/image_raw")]
     assert len(images) == 12  # to a second after the last sweep
 
@@ -135,11 +136,11 @@ def test_a_failure_leaves_no_bag(tmp_path, monkeypatch):
         write(self, result, header, **options)
 
     monkeypatch.setattr(LabelledBag, "write", full)
-    outcome = command(bag, out, "--formats", "bag")
+    outcome = run(bag, out, "--formats", "bag")
     assert outcome.exit_code == 1 and "No space left on device" in outcome.output
     assert not [path for path in out.iterdir() if "labelled" in path.name]
     monkeypatch.undo()
-    assert command(bag, out, "--formats", "bag").exit_code == 0
+    assert run(bag, out, "--formats", "bag").exit_code == 0
     assert len(messages(out / "labelled", "/points_labelled")) == 4
 
 
@@ -147,20 +148,20 @@ def test_a_failure_leaves_no_bag(tmp_path, monkeypatch):
 def test_a_full_disk_is_named_and_the_run_goes_on(tmp_path, small_disk, kind):
     bag, out = recorded(tmp_path, kind, sweeps=12), small_disk / "out"
     subprocess.run(["mount", "-o", "remount,size=280k", str(small_disk)], check=True)
-    outcome = command(bag, out, "--formats", "bag")
+    outcome = run(bag, out, "--formats", "bag")
     assert outcome.exit_code == 1
     said = " ".join(outcome.output.split())
     assert f"labelled{'.bag' if kind == 'rosbag1' else ''}: " in said
     assert "full while writing the bag" in said or "No space left on device while writing the bag" in said
     assert len(list(out.glob("*.npz"))) == 12 and not [path for path in out.iterdir() if "labelled" in path.name]
     subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
-    assert command(bag, out, "--formats", "bag").exit_code == 0
+    assert run(bag, out, "--formats", "bag").exit_code == 0
 
 
 def test_what_is_in_the_place_of_the_bag_and_none_of_ours_stays(tmp_path):
     bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
     layouts.write_text(out / "labelled/notes.txt", "the user's own")
-    settings = batch.RunSettings(masks=str(tmp_path / "masks"), formats=("bag",))
+    settings = runs.stored(tmp_path, formats=("bag",))
     with pytest.raises(BatchError, match=r"labelled: is there and is no bag of labelled clouds"):
         batch.run(bag, out, settings)
     assert (out / "labelled/notes.txt").exists()
@@ -168,7 +169,7 @@ def test_what_is_in_the_place_of_the_bag_and_none_of_ours_stays(tmp_path):
 
 
 def test_other_sources_are_refused(few, tmp_path):
-    settings = batch.RunSettings(masks=str(few / "masks"), formats=("npz", "bag"))
+    settings = runs.stored(few, formats=("npz", "bag"))
     with pytest.raises(ParameterError, match=r"bag is a ROS bag with labels, .* is of kind kitti-object; leave it"):
         batch.run(few, tmp_path / "out", settings)
     assert not (tmp_path / "out").exists()
@@ -186,10 +187,10 @@ def test_with_tracks_instances_are_those_of_the_drive(tmp_path):
     turned = tmp_path / f"masks/{START_NS + STEP_NS}.json"
     masks = json.loads(turned.read_text())
     turned.write_text(json.dumps(masks | {"annotations": masks["annotations"][::-1]}))
-    assert command(bag, out, "--option", "world=odom", "--formats", "bag").exit_code == 0
+    assert run(bag, out, "--option", "world=odom", "--formats", "bag").exit_code == 0
     before = instance_ids(out / "labelled")
     track = ("--option", "world=odom", "--formats", "bag", "--track")
-    outcome = command(bag, out, *track)
+    outcome = run(bag, out, *track)
     assert outcome.exit_code == 0, outcome.output
     tracked = [ldls.read_result(path) for path in sorted((out / "tracks").glob("*.npz"))]
     expected = [each.instance_ids[np.maximum(each.labels, 0)] for each in tracked]
@@ -197,7 +198,7 @@ def test_with_tracks_instances_are_those_of_the_drive(tmp_path):
         np.testing.assert_array_equal(found, wanted)
     assert [np.array_equal(*each) for each in zip(before, expected, strict=True)] == [True, False, True, True]
     inode = (out / "labelled/metadata.yaml").stat().st_ino
-    assert command(bag, out, *track).exit_code == 0
+    assert run(bag, out, *track).exit_code == 0
     assert (out / "labelled/metadata.yaml").stat().st_ino == inode, "what is whole stays"
 
 
@@ -226,7 +227,7 @@ def test_a_bag_has_the_labels_that_there_are_now(tmp_path, steps):
     masks = json.loads(turned.read_text())
     turned.write_text(json.dumps(masks | {"annotations": masks["annotations"][::-1]}))
     for step in steps:
-        outcome = command(bag, out, "--option", "world=odom", *step.split())
+        outcome = run(bag, out, "--option", "world=odom", *step.split())
         assert outcome.exit_code == 0, outcome.output
     of = out / "tracks" if "--track" in steps[-1] else out
     results = [ldls.read_result(path) for path in sorted(of.glob("*.npz"))]
@@ -237,9 +238,9 @@ def test_a_bag_has_the_labels_that_there_are_now(tmp_path, steps):
 def test_a_bag_of_labels_that_a_run_of_other_formats_replaces_is_removed(tmp_path):
     bag, out = recorded(tmp_path, "rosbag1", moving=(("odom", "base"),)), tmp_path / "out"
     of_run = ("--option", "world=odom", "--sweeps", "1")
-    command(bag, out, *of_run, "--formats", "bag")
-    assert "warning" not in command(bag, out, *of_run, "--formats", "npz").output
-    outcome = command(bag, out, *of_run, "--formats", "npz", "--frames", "1:")
+    run(bag, out, *of_run, "--formats", "bag")
+    assert "warning" not in run(bag, out, *of_run, "--formats", "npz").output
+    outcome = run(bag, out, *of_run, "--formats", "npz", "--frames", "1:")
     assert "labelled.bag: labels or tracks are others than before; removed" in " ".join(outcome.output.split())
     assert not (out / "labelled.bag").exists()
 
@@ -247,11 +248,11 @@ def test_a_bag_of_labels_that_a_run_of_other_formats_replaces_is_removed(tmp_pat
 def test_a_bag_of_other_tracks_is_removed_before_there_are_new_ones(tmp_path, monkeypatch):
     bag, out = recorded(tmp_path, "mcap", moving=(("odom", "base"),)), tmp_path / "out"
     track = ("--option", "world=odom", "--track")
-    command(bag, out, *track, "--formats", "npz,bag", "--frames", "1:")
-    outcome = command(bag, out, *track, "--formats", "npz")
+    run(bag, out, *track, "--formats", "npz,bag", "--frames", "1:")
+    outcome = run(bag, out, *track, "--formats", "npz")
     assert "labels or tracks are others than before; removed" in " ".join(outcome.output.split())
     assert not (out / "labelled").exists()
-    command(bag, out, *track, "--formats", "npz,bag")
+    run(bag, out, *track, "--formats", "npz,bag")
     assert (out / "labelled").exists()
     (out / "tracks.csv").unlink()
 
@@ -259,7 +260,7 @@ def test_a_bag_of_other_tracks_is_removed_before_there_are_new_ones(tmp_path, mo
         raise KeyboardInterrupt
 
     monkeypatch.setattr("ldls.batch.run_bag.RunBag.write", killed)
-    command(bag, out, *track, "--formats", "npz,bag")
+    run(bag, out, *track, "--formats", "npz,bag")
     assert (out / "tracks.csv").exists()
     assert not (out / "labelled").exists()
 
@@ -269,9 +270,9 @@ def elsewhere(tmp_path):
     """A bag of results, which was moved out of the folder of its run, and a command that labels otherwise."""
     bag, out = recorded(tmp_path, "mcap", moving=(("odom", "base"),)), tmp_path / "out"
     of_run = ("--option", "world=odom", "--sweeps", "1", "--formats")
-    command(bag, out, *of_run, "bag")
+    run(bag, out, *of_run, "bag")
     (out / "labelled").rename(tmp_path / "elsewhere")
-    return tmp_path / "elsewhere", out / "labelled", lambda: command(bag, out, *of_run, "npz", "--frames", "1:")
+    return tmp_path / "elsewhere", out / "labelled", lambda: run(bag, out, *of_run, "npz", "--frames", "1:")
 
 
 def test_what_took_the_place_of_a_bag_stays(elsewhere):

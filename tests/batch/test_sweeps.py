@@ -10,6 +10,7 @@ import pytest
 
 import ldls
 from batch import drives, runs
+from command import command
 from datasets import layouts
 from ldls import batch
 from ldls.batch import frame_work
@@ -30,7 +31,7 @@ def run(drive, out, *, frames=slice(None), workers=None, engine="local", **setti
 
 
 def words(drive, out, *more):
-    return [*runs.arguments(drive, out, "--sweeps", 1), *map(str, more)]
+    return runs.arguments(drive, out, "--sweeps", 1, *more)
 
 
 def by_hand(source, masks, frames):
@@ -107,7 +108,7 @@ def test_a_worker_of_a_cluster_does_windows_and_notes_them(drive, whole, tmp_pat
     notes.touch()
     (out / HOLDER_NAME).write_text("this run")
     worker = RayWorker()
-    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1)
+    settings = runs.stored(drive, sweeps=1)
     worker.open(FrameWork(open_source(drive), settings, out), ldls.__version__, "this run", notes.name)
     outcome = worker.do(((3, "000003"), (4, "000004"), (5, "000005")))
     assert [record["window"] for record in outcome.records] == [["000003", "000004", "000005"]] * 3
@@ -120,9 +121,9 @@ def test_a_run_that_was_killed_goes_on(tmp_path, step, n):
     drive = drives.small_drive(tmp_path / "drive", 24)
     run(drive, tmp_path / "whole")
     out = tmp_path / "out"
-    killed = runs.finished([step, str(n), *words(drive, out)], program=[str(runs.KILLED_AT)])
+    killed = runs.killed(step, n, words(drive, out))
     assert killed.returncode == -signal.SIGKILL, killed.stderr
-    outcome = runs.resumed(words(drive, out))
+    outcome = command(*words(drive, out))
     assert outcome.exit_code == 0, outcome.output
     assert runs.contents(out) == runs.contents(tmp_path / "whole")
 
@@ -291,7 +292,7 @@ def test_poses_of_the_source_are_read_only_where_none_are_given(gap, simulated, 
     assert not run(gap, tmp_path / "given", masks=masks, poses=str(path)).failures
     read = runs.records(tmp_path / "given").values()
     assert not any("oxts" in path for record in read for path in record["inputs"])
-    outcome = runs.resumed([*runs.arguments(gap, tmp_path / "said", "--sweeps", 1, "--poses", path), "--masks", masks])
+    outcome = command(*runs.arguments(gap, tmp_path / "said", "--sweeps", 1, "--poses", path), "--masks", masks)
     assert outcome.exit_code == 0, outcome.output
 
 
@@ -340,13 +341,13 @@ def test_measurements_of_raw_drives_are_inputs_of_the_frames_beside_them(simulat
 def test_a_file_of_poses_stands_for_those_of_the_source(drive, whole, tmp_path, write):
     shutil.move(drive / "poses.txt", tmp_path / "unused.txt")
     (tmp_path / "given.txt").write_text(write(N_FRAMES))
-    outcome = runs.resumed(words(drive, tmp_path / "out", "--poses", tmp_path / "given.txt"))
+    outcome = command(*words(drive, tmp_path / "out", "--poses", tmp_path / "given.txt"))
     assert outcome.exit_code == 0, outcome.output
     assert windows(tmp_path / "out") == ["012"] * 3 + ["345"] * 3 + ["67"] * 2
     for name in ("000003.label", "000006.label"):
         assert (tmp_path / "out" / name).read_bytes() == whole[name]
     (tmp_path / "given.txt").write_text(write(N_FRAMES, step=1.1))
-    outcome = runs.resumed(words(drive, tmp_path / "out", "--poses", tmp_path / "given.txt"))
+    outcome = command(*words(drive, tmp_path / "out", "--poses", tmp_path / "given.txt"))
     assert outcome.exit_code == 1
     assert "settings.poses_sha256 was" in outcome.output
 
@@ -473,10 +474,10 @@ def test_a_file_of_poses_of_another_drive_is_refused(drive, tmp_path):
 
 
 def test_the_command_takes_sweeps_of_two(drive, tmp_path):
-    outcome = runs.resumed([*runs.arguments(drive, tmp_path / "out"), "--sweeps", "2"])
+    outcome = command(*runs.arguments(drive, tmp_path / "out"), "--sweeps", "2")
     assert outcome.exit_code == 0, outcome.output
     assert windows(tmp_path / "out") == ["01234"] * 5 + ["567"] * 3
-    outcome = runs.resumed([*runs.arguments(drive, tmp_path / "out"), "--sweeps", "-1"])
+    outcome = command(*runs.arguments(drive, tmp_path / "out"), "--sweeps", "-1")
     assert outcome.exit_code == 2
 
 

@@ -10,15 +10,14 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import ldls
 from batch import drives, runs
+from command import command
 from datasets import layouts
 from ldls import batch
 from ldls.batch import run_tracks
 from ldls.batch.poses import Poses
-from ldls.cli import app
 from ldls.datasets import open_source
 from ldls.errors import (
     LdlsWarning,
@@ -49,7 +48,7 @@ def tracks(out):
 
 
 def run_with_map(drive, out, path, **settings):
-    settings = batch.RunSettings(masks=str(drive / "masks"), sweeps=1, formats=("npz",), **settings)
+    settings = runs.stored(drive, sweeps=1, formats=("npz",), **settings)
     return batch.run(drive, out, settings, map_file=path)
 
 
@@ -155,9 +154,7 @@ def test_files_of_every_format_score_the_same(simulated, tmp_path):
         tmp_path / "truth",
         *(f"--beside={word}={word}:{tracked}" for word in ("label", "panoptic")),
     ]
-    outcome = CliRunner().invoke(
-        app, ["evaluate", *map(str, words), "--name", "npz", "--track", "--out", str(tmp_path / "t")]
-    )
+    outcome = command("evaluate", *words, "--name", "npz", "--track", "--out", tmp_path / "t")
     assert outcome.exit_code == 0, outcome.output
     found = {word: {} for word in ("npz", "label", "panoptic")}
     for row in json.loads((tmp_path / "t/tracking.json").read_text())["rows"]:
@@ -312,10 +309,10 @@ def test_a_frame_without_a_pose_is_left_out_where_each_is_alone(drive, tmp_path)
 def test_killed_while_tracks_are_written(drive, tracked, tmp_path, step, n):
     out = tmp_path / "killed"
     words = runs.arguments(drive, out, "--sweeps", 1, "--track", "--formats", "npz")
-    killed = runs.finished([step, str(n), *words], program=[str(runs.KILLED_AT)])
+    killed = runs.killed(step, n, words)
     assert killed.returncode == -signal.SIGKILL, killed.stderr
     assert not (out / "tracks/tracks.json").exists()
-    outcome = runs.resumed(words)
+    outcome = command(*words)
     assert outcome.exit_code == 0, outcome.output
     assert f"tracks in {out / 'tracks'}" in outcome.output
     assert re.search(r"category +\S objects +\S tracks", outcome.output)

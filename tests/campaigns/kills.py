@@ -14,6 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from batch import drives, killed_at, runs
+from command import process
 from datasets import layouts
 
 N_FRAMES = 300
@@ -70,7 +71,7 @@ class Campaign:
         self.n_equal += runs.contents(out) == self.expected
 
     def finish(self, out):
-        done = runs.finished(self.arguments(out))
+        done = process(*self.arguments(out))
         assert done.returncode == 0, done.stderr
 
     def arguments(self, out):
@@ -82,8 +83,7 @@ class Campaign:
     def kill_at_step(self, out):
         step = self.random.choice(list(killed_at.STEPS))
         n = 1 if step.startswith("journal") else self.random.choice((1, 2, 3, 30, 100, 200))
-        words = [step, str(n), *self.arguments(out)]
-        killed = runs.finished(words, program=[str(runs.KILLED_AT)]).returncode == -signal.SIGKILL
+        killed = runs.killed(step, n, self.arguments(out)).returncode == -signal.SIGKILL
         self.n_at_steps += killed
         return killed
 

@@ -24,6 +24,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from batch import runs
+from command import process
 from datasets import layouts
 
 PYTHON = Path(sys.executable)
@@ -106,7 +107,7 @@ class Campaign:
 
     def holds(self):
         words = runs.arguments(self.source, self.folder / "local")
-        assert runs.finished(words).returncode == 0
+        assert process(*words).returncode == 0
         with Hosts(self.folder, self.environment()) as hosts:
             for host in ("head", "first"):
                 hosts.start(host)
@@ -208,9 +209,9 @@ class Hosts:
         return self
 
     def __exit__(self, *_):
-        for process in self.running.values():
-            process.kill()
-            process.wait()
+        for each in self.running.values():
+            each.kill()
+            each.wait()
         for name in self.names.values():
             # with it go its addresses and cables
             subprocess.run(["ip", "netns", "delete", name], capture_output=True, check=False)

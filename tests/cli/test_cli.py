@@ -3,22 +3,17 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from PIL import Image
 from rich.table import Table
-from typer.testing import CliRunner
 
 import ldls
-from ldls.cli import app
+from command import command, python
 from ldls.cli.frame_files import camera_name
 from ldls.cli.messages import console
 from ldls.viewing.formats import ENDINGS
-
-run = CliRunner().invoke
 
 
 def arguments(folder, out, **changes):
@@ -29,7 +24,7 @@ def arguments(folder, out, **changes):
         "image": folder / "input/image.png",
         "out": out,
     } | changes
-    return ["segment", *(str(word) for key, value in files.items() for word in (f"--{key}", value))]
+    return ["segment", *(word for key, value in files.items() for word in (f"--{key}", value))]
 
 
 def test_demo_writes_results_and_beats_direct_projection(demo):
@@ -51,7 +46,7 @@ def test_demo_writes_results_and_beats_direct_projection(demo):
 
 def test_segment_on_the_files_of_the_demo_gives_the_same(demo, tmp_path):
     folder, _ = demo
-    outcome = run(app, arguments(folder, tmp_path, picture=tmp_path / "seen.png"))
+    outcome = command(*arguments(folder, tmp_path, picture=tmp_path / "seen.png"))
     assert outcome.exit_code == 0, outcome.output
     assert "objects found" in outcome.output
     assert "diffusion" in outcome.output
@@ -70,13 +65,13 @@ def test_names_and_paths_are_printed_as_they_are(demo, tmp_path, name):
     ldls.save(named, tmp_path / "masks.npz")
     out = tmp_path / name
     out.mkdir(parents=True)
-    outcome = run(app, arguments(demo[0], out, masks=tmp_path / "masks.npz", formats="npz"))
+    outcome = command(*arguments(demo[0], out, masks=tmp_path / "masks.npz", formats="npz"))
     assert outcome.exit_code == 0, outcome.output
     assert f" {name} " in outcome.output and f"wrote {out / 'points.npz'}" in outcome.output
     point = np.flatnonzero(ldls.read_result(out / "points.npz").labels > 0)[0]
-    explained = run(app, ["explain", str(point), str(out / "points.npz")])
+    explained = command("explain", point, out / "points.npz")
     assert explained.exit_code == 0 and f" {name} " in explained.output and "\\[" not in explained.output
-    shown = run(app, ["masks", "show", str(tmp_path / "masks.npz")])
+    shown = command("masks", "show", tmp_path / "masks.npz")
     assert shown.exit_code == 0 and f" {name} " in shown.output
 
 
@@ -85,23 +80,23 @@ def test_segment_and_explain_take_the_number_of_columns(demo, tmp_path):
     points = ldls.read_points(folder / "input/points.bin")
     wide = tmp_path / "wide.bin"
     np.column_stack([points, np.zeros((len(points), 4), "<f4")]).astype("<f4").tofile(wide)
-    words = [*arguments(folder, tmp_path / "out"), "--points", str(wide), "--columns", "8", "--formats", "npz"]
-    outcome = run(app, words)
+    words = [*arguments(folder, tmp_path / "out"), "--points", wide, "--columns", 8]
+    outcome = command(*words, "--formats", "npz")
     assert outcome.exit_code == 0, outcome.output
     with np.load(folder / "demo.npz") as expected, np.load(tmp_path / "out/wide.npz") as stored:
         np.testing.assert_array_equal(stored["labels"], expected["labels"])
     files = [
-        str(word)
+        word
         for name, ending in (("calib", "txt"), ("masks", "npz"))
         for word in (f"--{name}", folder / f"input/{name}.{ending}")
     ]
-    outcome = run(app, ["explain", "4477", "--points", str(wide), "--columns", "8", *files])
+    outcome = command("explain", "4477", "--points", wide, "--columns", "8", *files)
     assert outcome.exit_code == 0, outcome.output
 
 
 @pytest.mark.parametrize("ending", ["csv", "json"])
 def test_segment_writes_a_table_of_the_objects(demo, tmp_path, ending):
-    outcome = run(app, arguments(demo[0], tmp_path / "out", objects=tmp_path / f"out/objects.{ending}"))
+    outcome = command(*arguments(demo[0], tmp_path / "out", objects=tmp_path / f"out/objects.{ending}"))
     assert outcome.exit_code == 0, outcome.output
     ldls.save_objects({"points": ldls.read_result(tmp_path / "out/points.npz")}, tmp_path / f"expected.{ending}")
     written = (tmp_path / f"out/objects.{ending}").read_bytes()
@@ -111,14 +106,14 @@ def test_segment_writes_a_table_of_the_objects(demo, tmp_path, ending):
 
 
 def test_an_unknown_ending_of_the_table_is_refused_before_anything_is_done(demo, tmp_path):
-    outcome = run(app, arguments(demo[0], tmp_path / "out", objects=tmp_path / "objects.xlsx"))
+    outcome = command(*arguments(demo[0], tmp_path / "out", objects=tmp_path / "objects.xlsx"))
     assert outcome.exit_code == 1
     assert "cannot write objects as '.xlsx', expected .csv, .json" in outcome.stderr
     assert not (tmp_path / "out").exists()
 
 
 def test_a_picture_of_another_format_is_refused_before_anything_is_done(demo, tmp_path):
-    outcome = run(app, arguments(demo[0], tmp_path / "out", picture=tmp_path / "seen.jpg"))
+    outcome = command(*arguments(demo[0], tmp_path / "out", picture=tmp_path / "seen.jpg"))
     assert outcome.exit_code == 1
     assert "cannot write '.jpg' pictures, expected .png" in outcome.stderr
     assert not (tmp_path / "out").exists()
@@ -128,18 +123,16 @@ def test_formats_can_be_chosen_and_an_image_is_not_needed(demo, tmp_path):
     words = arguments(demo[0], tmp_path)
     at = words.index("--image")
     del words[at : at + 2]
-    outcome = run(app, [*words, "--formats", "label,png,label"])
+    outcome = command(*words, "--formats", "label,png,label")
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.count("points.label") == 1
     assert {path.name for path in tmp_path.iterdir()} == {"points.label", "points.png"}
 
 
 def test_real_frame(frame_571, tmp_path):
-    outcome = run(
-        app,
-        ["segment", "--points", str(frame_571.points_path), "--calib", str(frame_571.calib_path),
-         "--masks", str(frame_571.masks_path), "--image", str(frame_571.image_path),
-         "--out", str(tmp_path / "new/folder"), "--paper"],
+    outcome = command(
+        "segment", "--points", frame_571.points_path, "--calib", frame_571.calib_path, "--masks", frame_571.masks_path,
+        "--image", frame_571.image_path, "--out", tmp_path / "new/folder", "--paper",
     )  # fmt: skip
     assert outcome.exit_code == 0, outcome.output
     assert "17 of 19 objects found" in outcome.output
@@ -165,7 +158,7 @@ def test_bad_files_are_one_line_and_nothing_is_written(demo, tmp_path, option, f
     shutil.copy(original, broken)
     fault(broken)
     out = tmp_path / "out"
-    outcome = run(app, arguments(demo[0], out, **{option: broken}))
+    outcome = command(*arguments(demo[0], out, **{option: broken}))
     assert outcome.exit_code == 1
     assert outcome.stderr.startswith("error: ")
     assert message in outcome.stderr
@@ -173,7 +166,7 @@ def test_bad_files_are_one_line_and_nothing_is_written(demo, tmp_path, option, f
 
 
 def test_parameters_out_of_range_are_refused(demo, tmp_path):
-    outcome = run(app, [*arguments(demo[0], tmp_path / "out"), "--neighbors", "0"])
+    outcome = command(*arguments(demo[0], tmp_path / "out"), "--neighbors", "0")
     assert outcome.exit_code == 1
     assert "neighbors: got 0, expected 1 to 255" in outcome.stderr
     assert not (tmp_path / "out").exists()
@@ -181,16 +174,16 @@ def test_parameters_out_of_range_are_refused(demo, tmp_path):
 
 def test_a_missing_file_is_named(demo, tmp_path):
     missing = arguments(demo[0], tmp_path / "out", points=tmp_path / "none.bin")
-    outcome = run(app, missing, env={"COLUMNS": "500"})  # so that no long path is broken
+    outcome = command(*missing, COLUMNS="500")  # so that no long path is broken
     assert outcome.exit_code == 2
     assert "none.bin" in outcome.stderr
 
 
 def test_help_teaches_and_comes_at_once():
-    command = [sys.executable, "-c", "from ldls.cli import app; app()", "--help"]
     before = os.times()
-    outcome = subprocess.run(command, check=True, capture_output=True, text=True)
+    outcome = python("-c", "from ldls.cli import app; app()", "--help")
     after = os.times()
+    assert outcome.returncode == 0, outcome.stderr
     computed_s = after.children_user + after.children_system - before.children_user - before.children_system
     assert computed_s < 2, "half a second is promised on an idle machine"
     assert "segment" in outcome.stdout
@@ -198,12 +191,12 @@ def test_help_teaches_and_comes_at_once():
 
 
 def test_version():
-    assert run(app, ["--version"]).output == f"ldls {ldls.__version__}\n"
+    assert command("--version").output == f"ldls {ldls.__version__}\n"
 
 
 def test_every_format_can_be_asked_for(demo, tmp_path):
     words = ["--formats", ",".join(ENDINGS)]
-    outcome = run(app, [*arguments(demo[0], tmp_path), *words])
+    outcome = command(*arguments(demo[0], tmp_path), *words)
     assert outcome.exit_code == 0, outcome.output
     endings = ENDINGS.values()
     assert {path.name for path in tmp_path.iterdir()} == {f"points{ending}" for ending in endings}
@@ -211,7 +204,7 @@ def test_every_format_can_be_asked_for(demo, tmp_path):
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_help_fits_the_terminal(width):
-    text = run(app, ["run", "--help"], env={"COLUMNS": str(width)}).output
+    text = command("run", "--help", COLUMNS=str(width)).output
     lines = [line.strip() for line in text.splitlines()]
     start = next(at for at, line in enumerate(lines) if line.startswith("Files appear"))
     paragraph = lines[start : lines.index("", start)]
@@ -253,8 +246,8 @@ def test_a_camera_has_the_name_that_it_was_chosen_by(tmp_path, calibration, came
     assert camera_name(tmp_path, camera) == name
 
 
-@pytest.mark.parametrize("command", ["segment", "explain"])
-def test_a_camera_of_opencv_and_the_lidar_beside_it_give_the_same(demo, tmp_path, command):
+@pytest.mark.parametrize("name", ["segment", "explain"])
+def test_a_camera_of_opencv_and_the_lidar_beside_it_give_the_same(demo, tmp_path, name):
     folder, _ = demo
     camera = ldls.read_camera(folder / "input/calib.txt")
     fx, fy, u, v = camera.projection[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
@@ -268,13 +261,13 @@ def test_a_camera_of_opencv_and_the_lidar_beside_it_give_the_same(demo, tmp_path
         json.dumps({"pose_of": "camera", "translation": back[:3, 3].tolist(), "rotation": back[:3, :3].tolist()})
     )
     words = arguments(folder, tmp_path, calib=tmp_path / "camera.xml", extrinsic=tmp_path / "lidar.json")
-    if command == "explain":
+    if name == "explain":
         chosen = ["--points", "--masks", "--calib", "--extrinsic"]
         pairs = [words[at : at + 2] for at in range(1, len(words), 2) if words[at] in chosen]
         words = ["explain", "1000", *itertools.chain(*pairs), "--json"]
-    outcome = run(app, words)
+    outcome = command(*words)
     assert outcome.exit_code == 0, outcome.output
-    if command == "segment":
+    if name == "segment":
         with np.load(folder / "demo.npz") as expected, np.load(tmp_path / "points.npz") as stored:
             np.testing.assert_array_equal(stored["labels"], expected["labels"])
 
@@ -294,7 +287,7 @@ def test_a_camera_of_opencv_and_the_lidar_beside_it_give_the_same(demo, tmp_path
 )
 def test_files_in_the_wrong_place_are_named(demo, tmp_path, words, message):
     files = {option: demo[0] / "input" / name for option, name in words.items()}
-    outcome = run(app, arguments(demo[0], tmp_path / "out", **files))
+    outcome = command(*arguments(demo[0], tmp_path / "out", **files))
     assert outcome.exit_code == 1
     assert message in outcome.stderr
     assert not (tmp_path / "out").exists()
@@ -313,15 +306,15 @@ def test_options_that_would_change_nothing_are_refused(demo, tmp_path, words, me
     if "--image-id" in words:
         at = files.index("--masks")
         files[at : at + 2] = ["--segmenter", "boxes:boxes.txt"]
-    outcome = run(app, [*files, *words])
+    outcome = command(*files, *words)
     assert outcome.exit_code == 1
     assert message in outcome.stderr
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("command", [["view"], ["explain", "5"]], ids=["view", "explain"])
-def test_labels_without_points_are_refused_with_what_is_needed(demo, command):
-    outcome = run(app, [*command, str(demo[0] / "demo.label")])
+@pytest.mark.parametrize("words", [["view"], ["explain", "5"]], ids=["view", "explain"])
+def test_labels_without_points_are_refused_with_what_is_needed(demo, words):
+    outcome = command(*words, demo[0] / "demo.label")
     assert outcome.exit_code == 1
     assert "demo.label: expected the .npz of a result" in outcome.stderr
 
@@ -334,23 +327,19 @@ def test_polygons_take_the_size_of_the_image_from_the_calibration(demo, tmp_path
     (tmp_path / "T.txt").write_text("0 -1 0 0.06 0 0 -1 -0.08 1 0 0 -0.27")
     words = arguments(demo[0], tmp_path / "out", masks=tmp_path / "a.txt", calib=tmp_path / "camera.json")
     at = words.index("--image")
-    outcome = run(app, [*words[:at], *words[at + 2 :], "--extrinsic", str(tmp_path / "T.txt"), "--formats", "npz"])
+    outcome = command(*words[:at], *words[at + 2 :], "--extrinsic", tmp_path / "T.txt", "--formats", "npz")
     assert outcome.exit_code == 0, outcome.output
     assert "1 of 1 objects found" in outcome.output
     at = words.index("--calib") + 1
-    words[at] = str(demo[0] / "input/calib.txt")
+    words[at] = demo[0] / "input/calib.txt"
     at = words.index("--image")
-    outcome = run(app, [*words[:at], *words[at + 2 :]])
+    outcome = command(*words[:at], *words[at + 2 :])
     assert "a.txt: says nothing of the image's size; give its --image" in outcome.stderr
 
 
 def test_errors_of_the_system_are_said_without_their_number(tmp_path):
-    outcome = run(
-        app, ["masks", "make", str(tmp_path / "a.png"), str(tmp_path / "b.json"), "--segmenter", "boxes:no.txt"]
-    )
+    outcome = command("masks", "make", tmp_path / "a.png", tmp_path / "b.json", "--segmenter", "boxes:no.txt")
     assert outcome.exit_code == 2  # the image does not exist
     Image.new("RGB", (40, 30)).save(tmp_path / "a.png")
-    outcome = run(
-        app, ["masks", "make", str(tmp_path / "a.png"), str(tmp_path / "b.json"), "--segmenter", "boxes:no.txt"]
-    )
+    outcome = command("masks", "make", tmp_path / "a.png", tmp_path / "b.json", "--segmenter", "boxes:no.txt")
     assert outcome.stderr == "error: no.txt: No such file or directory\n"

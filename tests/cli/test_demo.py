@@ -3,33 +3,28 @@
 import sys
 
 import pytest
-from typer.testing import CliRunner
 
-from ldls.cli import app
-
-
-def run(*arguments):
-    return CliRunner().invoke(app, ["demo", *map(str, arguments)])
+from command import command
 
 
 def test_the_sample_needs_no_extra(tmp_path, monkeypatch):
     for library in ("trimesh", "embreex", "scipy"):
         monkeypatch.setitem(sys.modules, library, None)
-    outcome = run("--out", tmp_path)
+    outcome = command("demo", "--out", tmp_path)
     assert outcome.exit_code == 0, outcome.output
 
 
 @pytest.mark.parametrize("library", ["trimesh", "embreex"])
 def test_a_seed_names_the_extra_that_it_lacks(library, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)
-    outcome = run("--out", tmp_path / "out", "--seed", 3)
+    outcome = command("demo", "--out", tmp_path / "out", "--seed", 3)
     assert outcome.exit_code == 1 and "pip install 'ldls[sim]'" in outcome.stderr
     assert not (tmp_path / "out").exists()
 
 
 def test_a_seed_is_another_street(demo, tmp_path):
     pytest.importorskip("embreex")
-    outcome = run("--out", tmp_path, "--seed", 8)
+    outcome = command("demo", "--out", tmp_path, "--seed", 8)
     assert outcome.exit_code == 0, outcome.output
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in demo[0].iterdir()}
     (mean,) = (line for line in outcome.output.splitlines() if "mean" in line)

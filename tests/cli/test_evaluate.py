@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
-from ldls.cli import app
+from command import command
 from ldls.io.labels import write_annotations, write_labeling
 from ldls.labeling import Labeling
 
-run = CliRunner().invoke
 NAMES = ("background", "Car", "Pedestrian", "Van")
 
 
@@ -34,8 +32,7 @@ def frames(tmp_path):
 
 
 def evaluate(folder, *options):
-    words = [str(folder / "mine"), str(folder / "truth"), *map(str, options)]
-    return run(app, ["evaluate", *words])
+    return command("evaluate", folder / "mine", folder / "truth", *options)
 
 
 def scores(folder):
@@ -75,7 +72,7 @@ def test_tables_are_written_over_no_input(frames, monkeypatch, words, read, out)
     (frames / "link").symlink_to("mine")
     shutil.copy("mine/1.npz", "mine/reliability.npz")
     (frames / read).write_bytes(b"mine")
-    outcome = run(app, ["evaluate", *words.split(), "--out", out], env={"COLUMNS": "500"})
+    outcome = command("evaluate", *words.split(), "--out", out, COLUMNS="500")
     assert outcome.exit_code == 1
     assert outcome.stderr.startswith(f"error: --out: would write over {out}/"), outcome.stderr
     assert (frames / read).read_bytes() == b"mine"
@@ -210,8 +207,8 @@ def scores_by_method(folder):
 
 
 def test_equal_labels_of_different_formats_have_equal_scores(seen):
-    words = [str(seen / "theirs"), str(seen / "truth"), "--beside", f"mine={seen / 'ours'}", "--out", str(seen / "t")]
-    outcome = run(app, ["evaluate", *words])
+    words = [seen / "theirs", seen / "truth", "--beside", f"mine={seen / 'ours'}", "--out", seen / "t"]
+    outcome = command("evaluate", *words)
     assert outcome.exit_code == 0, outcome.output
     found = scores_by_method(seen / "t")
     for name in ("Car", "Pedestrian", "mean"):
@@ -227,8 +224,8 @@ def test_equal_labels_of_different_formats_have_equal_scores(seen):
 
 
 def test_labels_alone_count_everywhere_unless_a_calibration_tells(seen):
-    words = ["evaluate", str(seen / "theirs"), str(seen / "truth"), "--out", str(seen / "t")]
-    outcome = run(app, words)
+    words = ["evaluate", seen / "theirs", seen / "truth", "--out", seen / "t"]
+    outcome = command(*words)
     assert outcome.exit_code == 0, outcome.output
     assert scores_by_method(seen / "t")["theirs", "Car"]["true points"] == 240
     assert "1,000 of 1,000 points counted; no file tells which points a camera sees" in outcome.output
@@ -236,27 +233,24 @@ def test_labels_alone_count_everywhere_unless_a_calibration_tells(seen):
         "P2: 100 0 40 0 0 100 30 0 0 0 1 0\nR0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0\n"
     )
     Image.new("RGB", (80, 60)).save(seen / "7.png")
-    outcome = run(app, [*words, "--calib", str(seen), "--points", str(seen), "--image", str(seen)])
+    outcome = command(*words, "--calib", seen, "--points", seen, "--image", seen)
     assert outcome.exit_code == 0, outcome.output
     assert scores_by_method(seen / "t")["theirs", "Car"]["true points"] == 120
     assert "500 of 1,000 points counted; no method is scored on those out of view by the calibration" in outcome.output
-    outcome = run(app, [*words, "--calib", str(seen)])
+    outcome = command(*words, "--calib", seen)
     assert outcome.exit_code == 1
     assert "frame 7: needs its points; name their folder (--points)" in outcome.stderr
 
 
 def test_each_method_has_the_format_that_its_files_tell(seen):
     result = ldls.read_result(seen / "ours/7.npz")
-    for folder in ("nuscenes", "text"):
+    folders = ("ours", "nuscenes", "text")
+    for folder in folders[1:]:
         (seen / folder).mkdir()
     ldls.save(result, seen / "nuscenes/7_panoptic.npz")
     write_annotations(seen / "text/7.txt", Labeling.from_segmentation(result))
-    others = [("a", "ours"), ("b", "nuscenes"), ("c", "text")]
-    outcome = run(
-        app,
-        ["evaluate", str(seen / "theirs"), str(seen / "truth"), "--out", str(seen / "t"),
-         *(word for name, folder in others for word in ("--beside", f"{name}={seen / folder}"))],
-    )  # fmt: skip
+    others = (f"--beside={name}={seen / folder}" for name, folder in zip("abc", folders, strict=True))
+    outcome = command("evaluate", seen / "theirs", seen / "truth", "--out", seen / "t", *others)
     assert outcome.exit_code == 0, outcome.output
     found = scores_by_method(seen / "t")
     for name in "abc":
@@ -267,11 +261,8 @@ def test_a_format_can_be_said_of_each_side(seen):
     result = ldls.read_result(seen / "ours/7.npz")
     ldls.save(result, seen / "ours/7.label")
     (seen / "truth/7.label").rename(seen / "truth/7.data")
-    outcome = run(
-        app,
-        ["evaluate", f"label:{seen / 'ours/7.label'}", f"label:{seen / 'truth/7.data'}",
-         "--beside", f"whole=npz:{seen / 'ours/7.npz'}", "--out", str(seen / "t"), "--missing", "skip"],
-    )  # fmt: skip
+    words = [f"label:{seen / 'ours/7.label'}", f"label:{seen / 'truth/7.data'}", "--out", seen / "t"]
+    outcome = command("evaluate", *words, "--beside", f"whole=npz:{seen / 'ours/7.npz'}", "--missing", "skip")
     assert outcome.exit_code == 0, outcome.output
     found = scores_by_method(seen / "t")
     assert found["7", "mean"] == found["whole", "mean"]
@@ -281,12 +272,12 @@ def test_a_method_of_another_number_of_points_is_refused(seen):
     (seen / "other").mkdir()
     nothing = np.zeros(999, np.uint32)
     nothing.tofile(seen / "other/7.label")
-    words = ["evaluate", str(seen / "theirs"), str(seen / "truth"), "--beside"]
-    outcome = run(app, [*words, f"other={seen / 'other'}"])
+    words = ["evaluate", seen / "theirs", seen / "truth", "--beside"]
+    outcome = command(*words, f"other={seen / 'other'}")
     assert outcome.exit_code == 1
     assert f"{seen / 'other/7.label'}: frame 7: prediction has 999 points, truth 1,000" in outcome.stderr
     write_labeling(seen / "other/7.npz", Labeling(nothing, nothing, nothing > 0, NAMES))
-    outcome = run(app, [*words, f"other={seen / 'other'}"])
+    outcome = command(*words, f"other={seen / 'other'}")
     assert outcome.exit_code == 1
     assert "frame 7: other has 999 points, the truth 1,000; all must be of the whole cloud" in outcome.stderr
 
@@ -373,7 +364,7 @@ def test_formats_are_asked_for_where_no_file_tells(frames):
     outcome = evaluate(frames)
     assert outcome.exit_code == 1
     assert "may be annotations or kitti-boxes; say which by FORMAT:PATH" in outcome.stderr
-    outcome = run(app, ["evaluate", str(frames / "mine"), f"kitti-boxes:{frames / 'truth'}"])
+    outcome = command("evaluate", frames / "mine", f"kitti-boxes:{frames / 'truth'}")
     assert outcome.exit_code == 1
     assert "frame 1: needs its points" in outcome.stderr
 
@@ -385,26 +376,18 @@ def test_real_frames_against_their_boxes(data_folder, tmp_path):
     labels.mkdir()
     for name in ("000000", "000003"):
         shutil.copy(training / f"label_2/{name}.txt", labels)
-        outcome = run(
-            app,
-            ["segment", "--points", str(training / f"velodyne/{name}.bin"),
-             "--calib", str(training / f"calib/{name}.txt"), "--masks", str(training / f"masks/{name}.json"),
-             "--out", str(out), "--formats", "npz"],
+        outcome = command(
+            "segment", "--points", training / f"velodyne/{name}.bin", "--calib", training / f"calib/{name}.txt",
+            "--masks", training / f"masks/{name}.json", "--out", out, "--formats", "npz",
         )  # fmt: skip
         assert outcome.exit_code == 0, outcome.output
-    outcome = run(
-        app,
-        ["evaluate", str(out), str(labels), "--points", str(training / "velodyne"),
-         "--calib", str(training / "calib"), "--image", str(training / "image_2"), "--out", str(tmp_path / "t")],
-    )  # fmt: skip
+    words = ["evaluate", out, labels, "--points", training / "velodyne", "--calib", training / "calib"]
+    outcome = command(*words, "--image", training / "image_2", "--out", tmp_path / "t")
     assert outcome.exit_code == 0, outcome.output
     row = scores(tmp_path / "t")
     assert row["Car IoU"] > 60
     assert row["Pedestrian IoU"] > 60
-    outcome = run(
-        app,
-        ["evaluate", str(out), str(labels), "--points", str(training / "velodyne"), "--calib", str(training / "calib")],
-    )
+    outcome = command(*words)
     assert outcome.exit_code == 0, outcome.output
     (warning,) = outcome.stderr.strip().splitlines()
     assert warning.endswith("name their folder (--image)")
@@ -464,8 +447,8 @@ def tracking(folder):
 
 def test_a_drive_is_scored_over_its_sweeps(drive):
     others = (f"--beside={name}={drive / name}" for name in ("switching", "anew"))
-    words = [str(drive / "steady"), str(drive / "truth"), *others, "--out", str(drive / "t")]
-    outcome = run(app, ["evaluate", *words, "--track"])
+    words = [drive / "steady", drive / "truth", *others, "--out", drive / "t"]
+    outcome = command("evaluate", *words, "--track")
     assert outcome.exit_code == 0, outcome.output
     assert "Objects over the drive" in outcome.output
     assert "panoptic, tracking and frames as .md, .csv and .json" in outcome.output
@@ -478,7 +461,7 @@ def test_a_drive_is_scored_over_its_sweeps(drive):
     assert found["a hundred frames"] == pytest.approx(100 / 12)
     assert rows["anew", "all"]["S_assoc"] == pytest.approx(25.0)
     assert rows["anew", "all"]["id switches"] == 9
-    assert "tracking" not in run(app, ["evaluate", *words]).output
+    assert "tracking" not in command("evaluate", *words).output
 
 
 def test_numbers_of_every_format_that_has_them_are_followed(drive):
@@ -491,8 +474,8 @@ def test_numbers_of_every_format_that_has_them_are_followed(drive):
         write_labeling(drive / f"arrays/{sweep:06}.npz", Labeling(classes, values >> 16, np.zeros(8, bool), NAMES))
         panoptic = np.array([17001] * 4 + [17002] * 2 + [2001, 0], np.uint16)
         np.savez(drive / f"nuscenes/{sweep:06}_panoptic.npz", data=panoptic)
-    words = [str(drive / "nuscenes"), str(drive / "arrays"), f"--beside=steady={drive / 'steady'}"]
-    outcome = run(app, ["evaluate", *words, "--track", "--out", str(drive / "t")])
+    words = [drive / "nuscenes", drive / "arrays", f"--beside=steady={drive / 'steady'}"]
+    outcome = command("evaluate", *words, "--track", "--out", drive / "t")
     assert outcome.exit_code == 0, outcome.output
     rows = tracking(drive / "t")
     for method in ("nuscenes", "steady"):
@@ -503,12 +486,12 @@ def test_labels_of_single_frames_are_no_drive_where_their_run_has_tracks(drive):
     for method in ("anew", "steady"):
         (drive / method / "tracks").mkdir()
     (drive / "anew/tracks/tracks.json").write_text("{}")
-    words = [str(drive / "steady"), str(drive / "truth"), f"--beside=anew={drive / 'anew'}"]
-    outcome = run(app, ["evaluate", *words, "--track"])
+    words = [drive / "steady", drive / "truth", f"--beside=anew={drive / 'anew'}"]
+    outcome = command("evaluate", *words, "--track")
     assert outcome.exit_code == 1
     assert f"--track: files in {drive / 'anew'} number the objects of each frame anew" in outcome.stderr
     assert outcome.stderr.rstrip().endswith(f"which are in {drive / 'anew/tracks'}")
-    assert run(app, ["evaluate", *words]).exit_code == 0
+    assert command("evaluate", *words).exit_code == 0
 
 
 def test_what_masks_allow_is_no_drive(results):
@@ -520,7 +503,7 @@ def test_what_masks_allow_is_no_drive(results):
 def test_boxes_are_no_truth_of_a_drive(seen):
     (seen / "boxes").mkdir()
     (seen / "boxes/7.txt").write_text("Car 0 0 0 0 0 9 9 1.5 1.6 4 0 1 20 0\n")
-    outcome = run(app, ["evaluate", str(seen / "theirs"), f"kitti-boxes:{seen / 'boxes'}", "--track"])
+    outcome = command("evaluate", seen / "theirs", f"kitti-boxes:{seen / 'boxes'}", "--track")
     assert outcome.exit_code == 1
     assert "--track: TRUTH is kitti-boxes, which numbers the objects of each frame anew" in outcome.stderr
 

@@ -4,20 +4,13 @@ import sys
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
-from ldls.cli import app
+from command import command
 from ldls.cli.chosen_point import chosen_point
 from ldls.simulation import sample_frame
 from ldls.viewing import overlay, save_picture
 from ring_samples import as_views, random_ring
-
-run = CliRunner().invoke
-
-
-def explain(*words):
-    return run(app, ["explain", *map(str, words)])
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +66,7 @@ def first(condition):
 def test_a_point_of_an_object(frame):
     result, path = frame
     point = first(result.labels == 1)
-    outcome = explain(point, path)
+    outcome = command("explain", point, path)
     assert outcome.exit_code == 0, outcome.output
     verdict, place, course, *rest = outcome.output.splitlines()
     assert verdict == ldls.explain(result, point).verdict
@@ -91,7 +84,7 @@ def test_a_point_of_an_object(frame):
 def test_a_point_that_outlier_removal_took_away(frame):
     result, path = frame
     point = first(result.labels < result.diffused_labels)
-    outcome = explain(point, path)
+    outcome = command("explain", point, path)
     assert outcome.output.splitlines()[0] == (
         f"Point {point} is background: diffusion gave it to person (label 1), but it lies in a component of 14 points, "
         "the largest has 120: removed."
@@ -103,7 +96,7 @@ def test_a_point_that_outlier_removal_took_away(frame):
 def test_a_point_near_the_ground_says_how_near(street):
     path, explanations = street
     found = next(each for each in explanations if each.cleared)
-    verdict, place, course, *_ = explain(found.point, path).output.splitlines()
+    verdict, place, course, *_ = command("explain", found.point, path).output.splitlines()
     assert verdict.startswith(f"Point {found.point} is background: it is ")
     assert verdict.endswith(" the ground, lower than 2 cm above it.")
     assert f"{abs(found.height_m):.2f} m {'above' if found.height_m >= 0 else 'below'} the ground." in place
@@ -115,7 +108,7 @@ def test_a_point_near_the_ground_says_how_near(street):
 def test_a_mask_that_does_not_count_says_how_far_its_object_is(street):
     path, explanations = street
     found = next(each for each in explanations if "outside the depth group" in each.verdict)
-    verdict, *lines = explain(found.point, path).output.splitlines()
+    verdict, *lines = command("explain", found.point, path).output.splitlines()
     offset = verdict.partition("it is ")[2].rstrip(".")
     name = offset.removeprefix("outside the depth group of ").rpartition(", ")[0]
     assert f"It is {offset}: pixels of {name} do not count." in lines
@@ -127,7 +120,7 @@ def test_background_beside_a_mask_does_not_count(street):
     path, explanations = street
     found = next(each for each in explanations if each.sights[0].beside and each.sights[0].window[0].label == 0)
     objects = " and of ".join(f"{found.names[label]} (label {label})" for label in found.sights[0].beside)
-    output = explain(found.point, path).output
+    output = command("explain", found.point, path).output
     assert f"It is beside the edge of {objects}, as far away: background pixels do not count." in output
     assert "background, not counted" in output
 
@@ -135,14 +128,14 @@ def test_background_beside_a_mask_does_not_count(street):
 def test_parts_are_said_to_be_kept_and_others_why_not(street, tmp_path):
     path, _ = street
     # the truck behind a pole
-    course, *lines = explain(16999, path).output.splitlines()[2:]
+    course, *lines = command("explain", 16999, path).output.splitlines()[2:]
     assert course.endswith("After outlier removal: truck (label 6), a part kept beside the largest.")
     assert any("0.92 m" in line and "this point's, kept" in line for line in lines)
     sample = sample_frame()
     (image,) = sample.images
     alone = ldls.segment(sample.points, image.masks, image.camera, params=ldls.Params(part_gap=0.9))
     ldls.save(alone, tmp_path / "alone.npz")
-    verdict, *lines = explain(16999, tmp_path / "alone.npz").output.splitlines()
+    verdict, *lines = command("explain", 16999, tmp_path / "alone.npz").output.splitlines()
     assert verdict.endswith("it lies in a component of 71 points, 0.92 m from the largest, which has 85: removed.")
     assert any("0.92 m" in line and "this point's, removed" in line for line in lines)
 
@@ -150,12 +143,12 @@ def test_parts_are_said_to_be_kept_and_others_why_not(street, tmp_path):
 def test_edges_that_leave_the_ground_are_said_to_be_weakened(street):
     path, explanations = street
     found = next(each for each in explanations if any(near.leaves_ground for near in each.neighbors))
-    assert ", weakened: leaves the ground" in explain(found.point, path).output
+    assert ", weakened: leaves the ground" in command("explain", found.point, path).output
 
 
 def test_a_background_point_has_no_components(frame):
     result, path = frame
-    outcome = explain(first(result.diffused_labels == 0), path)
+    outcome = command("explain", first(result.diffused_labels == 0), path)
     assert " is background: " in outcome.output.splitlines()[0]
     assert "After diffusion: background.\n" in outcome.output
     assert "components" not in outcome.output
@@ -172,20 +165,20 @@ def test_a_background_point_has_no_components(frame):
 )
 def test_points_out_of_view_are_told_why(frame, back, words):
     result, path = frame
-    outcome = explain(len(result.points) - back, path)
+    outcome = command("explain", len(result.points) - back, path)
     assert outcome.exit_code == 0, outcome.output
     assert "is out of view: " in outcome.output.splitlines()[0]
     assert words in outcome.output.splitlines()[0]
     assert "likelihood" not in outcome.output
     if back == 2:
-        printed = json.loads(explain(len(result.points) - back, path, "--json").output)
+        printed = json.loads(command("explain", len(result.points) - back, path, "--json").output)
         assert printed["xyz"] == [None, 0.0, 4.0]
 
 
 def test_json_is_one_object_with_the_same(frame):
     result, path = frame
     point = first(result.labels == 1)
-    printed = json.loads(explain(point, path, "--json").output)
+    printed = json.loads(command("explain", point, path, "--json").output)
     assert printed == json.loads(json.dumps(ldls.explain(result, point).to_dict()))
 
 
@@ -194,15 +187,15 @@ def test_files_without_a_result_give_the_same(frame_571, tmp_path):
     view = ldls.View(frame_571.masks, frame_571.camera, "image_2")
     result = ldls.segment(frame_571.points, [view])
     point = first(result.labels > result.direct_labels)
-    outcome = explain(point, *files)
+    outcome = command("explain", point, *files)
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.splitlines()[0] == ldls.explain(result, point).verdict
     ldls.save(result, tmp_path / "571.npz")
-    assert outcome.output == explain(point, tmp_path / "571.npz").output
-    other = explain(point, *files, "--camera", 3)
+    assert outcome.output == command("explain", point, tmp_path / "571.npz").output
+    other = command("explain", point, *files, "--camera", 3)
     assert other.exit_code == 0
     assert "image_3" in other.output and "image_3" not in outcome.output
-    wrong = explain(point, *files, "--camera", 4)
+    wrong = command("explain", point, *files, "--camera", 4)
     assert "camera: got 4, expected 0 to 3" in wrong.stderr
 
 
@@ -212,7 +205,7 @@ def test_a_place_takes_the_nearest_point_also_with_a_minus_sign(frame):
     word = f"{-abs(x):.3f},{y:.3f},{z:.3f}"
     distances = np.linalg.norm(result.points - [-abs(x), y, z], axis=1)
     nearest = int(np.nanargmin(distances))
-    outcome = explain(word, path)
+    outcome = command("explain", word, path)
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.startswith(f"Point {nearest} is ")
     assert f"Point {nearest} is the one nearest to " in outcome.output.splitlines()[1]
@@ -221,7 +214,7 @@ def test_a_place_takes_the_nearest_point_also_with_a_minus_sign(frame):
 
 def test_a_pixel_takes_the_nearest_point_in_view(frame):
     result, path = frame
-    outcome = explain("40,30", path)
+    outcome = command("explain", "40,30", path)
     distances = np.linalg.norm(result.pixels - [40, 30], axis=1)
     row = int(result.in_view[distances.argmin()])
     expected = f"Point {row} is the one in view nearest to pixel 40,30: {distances.min():.1f} pixels away."
@@ -241,7 +234,7 @@ def test_a_pixel_of_a_ring_belongs_to_a_camera(ring, camera):
     seen = result.views[2]
     row = int(seen.in_view[7])
     u, v = seen.pixels[7]
-    outcome = explain(f"{u:.4f},{v:.4f}", path, "--camera", camera)
+    outcome = command("explain", f"{u:.4f},{v:.4f}", path, "--camera", camera)
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.startswith(f"Point {row} is ")
     assert "what the cameras see" in outcome.output
@@ -250,7 +243,7 @@ def test_a_pixel_of_a_ring_belongs_to_a_camera(ring, camera):
 def test_a_point_that_two_cameras_see_has_the_windows_of_both(ring):
     result, path = ring
     both = np.intersect1d(result.views[0].in_view, result.views[1].in_view)
-    outcome = explain(int(both[3]), path)
+    outcome = command("explain", int(both[3]), path)
     course = outcome.output.splitlines()[2]
     assert " by a, " in course
     assert " by b. After diffusion: " in course
@@ -275,7 +268,7 @@ def test_a_point_that_two_cameras_see_has_the_windows_of_both(ring):
     ],
 )
 def test_misuse_is_one_line(frame, words, message):
-    outcome = explain(words[0], frame[1], *words[1:])
+    outcome = command("explain", words[0], frame[1], *words[1:])
     assert outcome.exit_code == 1
     assert outcome.stderr.startswith("error: ")
     assert message in outcome.stderr
@@ -291,7 +284,7 @@ def test_misuse_is_one_line(frame, words, message):
     ],
 )
 def test_misuse_of_rings_is_one_line(ring, words, message):
-    outcome = explain(words[0], ring[1], *words[1:])
+    outcome = command("explain", words[0], ring[1], *words[1:])
     assert outcome.exit_code == 1
     assert message in outcome.stderr
 
@@ -299,18 +292,18 @@ def test_misuse_of_rings_is_one_line(ring, words, message):
 def test_files_of_another_kind_and_missing_ones_are_named(frame, tmp_path):
     masks = tmp_path / "masks.npz"
     ldls.save(frame[0].masks, masks)
-    outcome = explain(3, masks)
+    outcome = command("explain", 3, masks)
     assert outcome.exit_code == 1
     assert "masks.npz: " in outcome.stderr
     assert "expected those of ldls.save" in outcome.stderr
-    missing = run(app, ["explain", "3", str(tmp_path / "none.npz")], env={"COLUMNS": "500"})  # breaks no long path
+    missing = command("explain", "3", tmp_path / "none.npz", COLUMNS="500")  # breaks no long path
     assert missing.exit_code == 2 and "none.npz" in missing.stderr
-    assert "RESULT: missing; give an .npz file" in explain(3).stderr
-    assert "RESULT: missing; give an .npz file" in explain(3, "--masks", masks).stderr
+    assert "RESULT: missing; give an .npz file" in command("explain", 3).stderr
+    assert "RESULT: missing; give an .npz file" in command("explain", 3, "--masks", masks).stderr
 
 
 def test_an_unknown_option_is_named_and_no_point(frame):
-    outcome = explain("--jsn", 3, frame[1])
+    outcome = command("explain", "--jsn", 3, frame[1])
     assert outcome.exit_code == 2
     assert "no such option: --jsn" in outcome.stderr
 
@@ -332,13 +325,13 @@ def test_nothing_near_is_said_so():
 
 def test_the_extra_is_named_where_it_is_missing(frame, monkeypatch):
     monkeypatch.setitem(sys.modules, "scipy.sparse", None)
-    outcome = explain(first(frame[0].labels == 1), frame[1])
+    outcome = command("explain", first(frame[0].labels == 1), frame[1])
     assert outcome.exit_code == 1
     assert "pip install 'ldls[eval]'" in outcome.stderr
 
 
 def test_help_teaches():
-    text = explain("--help").output
+    text = command("explain", "--help").output
     assert "ldls explain 12345 results/000571.npz" in text
     assert "The first line is the verdict." in text
 
@@ -354,7 +347,7 @@ def test_a_pixel_of_a_picture_of_ldls(frame, ring, tmp_path, rings):
     # where overlay draws the point: below the captions, the third image in the second row
     scale = (897 if rings else 1800) / seen.view.masks.width
     x, y = (seen.pixels[11] + 0.5) * scale + ((0, 598 + 2 * 30) if rings else (0, 0))
-    outcome = explain(f"{x:.2f},{y:.2f}", path, "--on", tmp_path / "a.png")
+    outcome = command("explain", f"{x:.2f},{y:.2f}", path, "--on", tmp_path / "a.png")
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.startswith(f"Point {row} is ")
 
@@ -373,19 +366,19 @@ def test_misuse_of_pictures_is_one_line(ring, tmp_path, words, message):
     save_picture(tmp_path / "own.png", overlay(result))
     save_picture(tmp_path / "other.png", Image.new("RGB", (40, 30)))
     places = {"own": tmp_path / "own.png", "other": tmp_path / "other.png"}
-    outcome = explain(words[0], path, *(word.format(**places) for word in words[1:]))
+    outcome = command("explain", words[0], path, *(word.format(**places) for word in words[1:]))
     assert outcome.exit_code == 1
     assert message in outcome.stderr
 
 
 def test_a_point_far_from_the_pixel_or_place_is_not_taken(frame):
     path = frame[1]
-    corner = explain("79.4,0", path)
+    corner = command("explain", "79.4,0", path)
     assert corner.exit_code == 1
     assert "POINT: no point is near. Point " in corner.stderr
     assert "pixels away. Give " in corner.stderr
-    nowhere = explain("0,0,40", path)
+    nowhere = command("explain", "0,0,40", path)
     assert nowhere.exit_code == 1
     assert " m away. Give " in nowhere.stderr
     row = int(nowhere.stderr.split("Give ")[1].split()[0])
-    assert explain(row, path).exit_code == 0
+    assert command("explain", row, path).exit_code == 0

@@ -3,24 +3,19 @@
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
+from command import command
 from datasets import layouts, ros_samples
-from ldls.cli import app
 from ldls.datasets.inspection import check_stamps, field_of_view_deg, sample
 from ldls.io.ros.messages import TRANSFORMS, Topic
 from ldls.io.ros.writer import BagWriter
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, ["info", *map(str, arguments)])
-
-
 def test_a_sound_drive_is_described(tmp_path):
     drive = layouts.kitti_raw(tmp_path, n_frames=6)
     (drive / "velodyne_points/data/0000000002.bin").unlink()
-    result = run(drive, "--all", "--picture", tmp_path / "check.png", "--frame", "0000000001")
+    result = command("info", drive, "--all", "--picture", tmp_path / "check.png", "--frame", "0000000001")
     assert result.exit_code == 0, result.output
     for expected in (
         "kitti-raw",
@@ -40,7 +35,7 @@ def test_a_sound_drive_is_described(tmp_path):
 def test_images_of_several_sizes_are_told(tmp_path):
     drive = layouts.kitti_object(tmp_path)
     layouts.write_image(drive / "image_2/000001.png", (58, 81))
-    result = run(drive)
+    result = command("info", drive)
     assert result.exit_code == 0 and "58 to 60 x 80 to 81" in result.output, result.output
 
 
@@ -81,7 +76,7 @@ def _without_points(drive):
 def test_what_is_wrong_is_found(tmp_path, change, status, message):
     drive = layouts.kitti_raw(tmp_path)
     change(drive)
-    result = run(drive)
+    result = command("info", drive)
     assert message in " ".join(result.output.replace("│", " ").split()), result.output
     assert result.exit_code == status
 
@@ -104,7 +99,7 @@ def test_what_is_wrong_is_found(tmp_path, change, status, message):
 )
 def test_wrong_options_are_refused(tmp_path, monkeypatch, options, message):
     monkeypatch.chdir(tmp_path)
-    result = run(layouts.kitti_raw(tmp_path), *options)
+    result = command("info", layouts.kitti_raw(tmp_path), *options)
     assert result.exit_code == 1 and message in result.stderr
     assert result.stdout == "", "nothing is looked at"
 
@@ -157,7 +152,7 @@ def test_field_of_view_is_that_of_the_projection_and_its_distortion():
 
 def test_real_frames_look_sound(data_folder):
     for folder in ("kitti", "nuscenes"):
-        result = run(data_folder / folder)
+        result = command("info", data_folder / folder)
         assert result.exit_code == 0 and "found nothing wrong" in result.output
 
 
@@ -169,7 +164,7 @@ def _stamps(drive, sensor, seconds):
 def test_a_bag_of_clouds_alone_is_looked_at_and_told_what_it_lacks(tmp_path):
     pytest.importorskip("rosbags")
     bag = ros_samples.Recording(image_topics=(), info_topics=()).write(tmp_path / "clouds.bag")
-    done = CliRunner().invoke(app, ["info", str(bag)])
+    done = command("info", bag)
     assert done.exit_code == 0, done.output
     for topic, kind, count in (("/points", "PointCloud2", 3), ("/tf_static", "TFMessage", 1), ("/tf", "TFMessage", 0)):
         (line,) = [line for line in done.output.splitlines() if f" {topic} " in line]
@@ -181,7 +176,7 @@ def test_a_bag_of_clouds_alone_is_looked_at_and_told_what_it_lacks(tmp_path):
 def test_the_topics_of_a_bag_are_listed(tmp_path):
     pytest.importorskip("rosbags")
     bag = ros_samples.Recording().write(tmp_path / "small.bag")
-    done = CliRunner().invoke(app, ["info", str(bag)])
+    done = command("info", bag)
     assert "/camera/camera_info" in done.output and "sensor_msgs/msg/Image" in done.output
     assert "no images, so that" not in done.output
 
@@ -191,20 +186,21 @@ def test_a_bag_of_two_cameras_opens_with_their_topics(tmp_path):
     topics = ("/left/image_raw", "/right/image_raw")
     infos = ("/left/camera_info", "/right/camera_info")
     bag = ros_samples.Recording(image_topics=topics, info_topics=infos).write(tmp_path / "two.bag")
-    refused = run(bag)
+    refused = command("info", bag)
     assert refused.exit_code == 1 and "--option image_topics=/left/image_raw" in " ".join(refused.output.split())
-    one = run(bag, "--option", "image_topics=/left/image_raw").output
+    one = command("info", bag, "--option", "image_topics=/left/image_raw").output
     assert "left_image_raw: sees" in one and "right_image_raw: sees" not in one
-    both = run(bag, "--option", f"image_topics={','.join(topics)}", "--option", "max_offset_s=0.2").output
+    both = command("info", bag, "--option", f"image_topics={','.join(topics)}", "--option", "max_offset_s=0.2").output
     assert "left_image_raw: sees" in both and "right_image_raw: sees" in both
 
 
 def test_whether_there_are_poses_is_said_and_what_they_come_with(tmp_path):
-    assert "none; they come with oxts/ and the day's" in run(layouts.kitti_raw(tmp_path / "raw", n_frames=2)).output
+    said = command("info", layouts.kitti_raw(tmp_path / "raw", n_frames=2)).output
+    assert "none; they come with oxts/ and the day's" in said
     pytest.importorskip("rosbags")
     bag = ros_samples.Recording(moving=(("odom", "base"),)).write(tmp_path / "small.bag")
-    assert "none; they come with --option world=odom " in run(bag).output
-    assert "in 3 of 3 frames" in run(bag, "--option", "world=odom").output
+    assert "none; they come with --option world=odom " in command("info", bag).output
+    assert "in 3 of 3 frames" in command("info", bag, "--option", "world=odom").output
 
 
 def test_poses_that_an_option_leaves_out_are_not_said_to_be_missing(tmp_path):
@@ -212,7 +208,8 @@ def test_poses_that_an_option_leaves_out_are_not_said_to_be_missing(tmp_path):
     drives = [layouts.kitti_raw(tmp_path / "raw", n_frames=2), layouts.nuscenes(tmp_path / "nuscenes")]
     drives += [layouts.kitti_odometry(tmp_path / "odometry"), ros_samples.Recording().write(tmp_path / "small.bag")]
     for drive in drives:
-        assert "none; they are left out by --option poses=false" in run(drive, "--option", "poses=false").output
+        said = command("info", drive, "--option", "poses=false").output
+        assert "none; they are left out by --option poses=false" in said
 
 
 def test_a_bag_without_clouds_is_refused_with_its_topics(tmp_path):
@@ -220,6 +217,6 @@ def test_a_bag_without_clouds_is_refused_with_its_topics(tmp_path):
     with BagWriter(tmp_path / "other.bag", "rosbag1") as bag:
         bag.add_topic(Topic("/tf", TRANSFORMS, 0))
         bag.write_message("/tf", ros_samples.transforms(bag.types, (("base", "lidar"),), 5), 5)
-    done = CliRunner().invoke(app, ["info", str(tmp_path / "other.bag")])
+    done = command("info", tmp_path / "other.bag")
     assert done.exit_code == 1
     assert "no topics of PointCloud2, so none is guessed; the bag has /tf (tf2_msgs/msg/TFMessage, 1)" in done.output

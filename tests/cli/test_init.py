@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
 import ldls.errors
-from ldls.cli import app
+from command import command
 from ldls.datasets import open_source
 from ldls.simulation import sample_frame
 from ldls.simulation.kitti_layout import calibration_lines
@@ -21,21 +20,12 @@ from ldls.simulation.kitti_layout import calibration_lines
 NAMES = ("000007", "000008", "000011")
 
 
-def run(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
-@pytest.fixture(scope="module")
-def frame():
-    return sample_frame()
-
-
 @pytest.fixture
-def rig(tmp_path, frame):
+def rig(tmp_path, sample):
     """Sweeps, images and YOLO's masks of three frames, without calibration."""
-    (image,) = frame.images
+    (image,) = sample.images
     for name in NAMES:
-        write(tmp_path / f"lidar/{name}.bin", np.asarray(frame.points, np.float32).tobytes())
+        write(tmp_path / f"lidar/{name}.bin", np.asarray(sample.points, np.float32).tobytes())
         (tmp_path / "front").mkdir(exist_ok=True)
         Image.fromarray(image.read()).save(tmp_path / f"front/{name}.png")
         write(tmp_path / f"labels/{name}.txt", b"2 0.1 0.4 0.2 0.4 0.2 0.6 0.1 0.6\n")
@@ -119,10 +109,10 @@ def in_rows_of_numbers(folder, camera):
     ],
     ids=lambda each: each.__name__,
 )
-def test_the_camera_is_found_and_the_folder_is_a_source(rig, frame, calibrate):
-    camera = frame.images[0].camera
+def test_the_camera_is_found_and_the_folder_is_a_source(rig, sample, calibrate):
+    camera = sample.images[0].camera
     calibrate(rig, camera)
-    outcome = run("init", rig)
+    outcome = command("init", rig)
     assert outcome.exit_code == 0, outcome.output
     assert "missing" not in outcome.output
     assert "3 images of 375 x 1242 (height x width), 3 with a sweep" in " ".join(outcome.output.split())
@@ -133,25 +123,25 @@ def test_the_camera_is_found_and_the_folder_is_a_source(rig, frame, calibrate):
     read = source[0].images[0]
     np.testing.assert_allclose(read.camera.T_camera_lidar, camera.T_camera_lidar, atol=1e-6)
     np.testing.assert_allclose(read.camera.projection[:, :3], camera.projection[:, :3], atol=1e-6)
-    assert run("info", rig).exit_code == 0
-    done = run("run", rig, "--masks", rig / "labels", "--out", rig / "out")
+    assert command("info", rig).exit_code == 0
+    done = command("run", rig, "--masks", rig / "labels", "--out", rig / "out")
     assert done.exit_code == 0, done.output
 
 
-def test_what_was_guessed_is_a_question(rig, frame):
-    in_a_matrix_the_other_way_round(rig, frame.images[0].camera)
-    assert run("init", rig).exit_code == 0
+def test_what_was_guessed_is_a_question(rig, sample):
+    in_a_matrix_the_other_way_round(rig, sample.images[0].camera)
+    assert command("init", rig).exit_code == 0
     questions = [line for line in (rig / "ldls.toml").read_text().splitlines() if line.startswith("# ?")]
     assert any("tf of config.json, turned round, one of 2 ways to read it" in line for line in questions)
     assert any("points are in view of front" in line for line in questions)
 
 
-def test_other_ways_to_read_a_transform_are_listed(rig, frame):
-    camera = frame.images[0].camera
+def test_other_ways_to_read_a_transform_are_listed(rig, sample):
+    camera = sample.images[0].camera
     translation, (x, y, z, w) = pose(camera)
     write(rig / "camera.yaml", intrinsics(camera))
     write(rig / "mount.yaml", f"translation: {translation}\nrotation: [{w}, {x}, {y}, {z}]\n")
-    assert run("init", rig).exit_code == 0
+    assert command("init", rig).exit_code == 0
     text = (rig / "ldls.toml").read_text()
     listed = [line.removeprefix("# ") for line in text.splitlines() if "T_camera_lidar = " in line]
     assert len(listed) > 1
@@ -160,22 +150,22 @@ def test_other_ways_to_read_a_transform_are_listed(rig, frame):
     assert "quaternion_wxyz" in text
 
 
-def test_two_cameras_have_the_files_of_their_names(rig, frame):
-    camera = frame.images[0].camera
+def test_two_cameras_have_the_files_of_their_names(rig, sample):
+    camera = sample.images[0].camera
     shutil.copytree(rig / "front", rig / "left")
     for name, focal in (("left", 500.0), ("front", 721.0)):
         K = [[focal, 0, 609.6], [0, focal, 172.9], [0, 0, 1]]
         calibration = {"camera_matrix": K, "distortion_coefficients": [], "image_width": 1242, "image_height": 375}
         write(rig / f"calibration/{name}.yaml", json.dumps(calibration))
     write(rig / "calibration/extrinsic.txt", rows(camera.T_camera_lidar))
-    assert run("init", rig).exit_code == 0
+    assert command("init", rig).exit_code == 0
     focals = {image.name: image.camera.projection[0, 0] for image in open_source(rig)[0].images}
     assert focals == {"front": 721.0, "left": 500.0}
 
 
-def write_rig(rig, frame, names):
+def write_rig(rig, sample, names):
     """Images, a calibration and a transform of each camera, without masks; each has its own focal length."""
-    camera = frame.images[0].camera
+    camera = sample.images[0].camera
     for number, name in enumerate(names):
         shutil.copytree(rig / "front", rig / "images" / name)
         K = [[500 + number, 0, 609.6], [0, 500 + number, 172.9], [0, 0, 1]]
@@ -197,11 +187,11 @@ def write_rig(rig, frame, names):
         pytest.param(("cam7", "cam8", "cam9", "cam10", "cam11"), id="numbered like the frames"),
     ],
 )
-def test_cameras_in_a_folder_have_the_files_of_their_names(rig, frame, names):
-    write_rig(rig, frame, names)
+def test_cameras_in_a_folder_have_the_files_of_their_names(rig, sample, names):
+    write_rig(rig, sample, names)
     for path in rig.rglob("0000*"):
         path.rename(path.with_stem(str(int(path.stem))))
-    assert run("init", rig).exit_code == 0
+    assert command("init", rig).exit_code == 0
     assert "# ? is this" not in (rig / "ldls.toml").read_text()
     cameras = described(rig)["cameras"].values()
     named = {
@@ -212,79 +202,79 @@ def test_cameras_in_a_folder_have_the_files_of_their_names(rig, frame, names):
 
 @pytest.mark.parametrize("lacks_one", [False, True], ids=["each", "not each"])
 @pytest.mark.parametrize("camera", ["front", "7"])
-def test_calibrations_named_like_frames_are_of_frames(rig, frame, camera, lacks_one):
-    in_kitti_files(rig, frame.images[0].camera)
+def test_calibrations_named_like_frames_are_of_frames(rig, sample, camera, lacks_one):
+    in_kitti_files(rig, sample.images[0].camera)
     for path in rig.rglob("0000*"):
         path.rename(path.with_stem(str(int(path.stem))))
     (rig / "front").rename(rig / camera)
     if lacks_one:
         min((rig / "calib").iterdir()).unlink()
-    assert run("init", rig).exit_code == 0
+    assert command("init", rig).exit_code == 0
     assert described(rig)["cameras"][camera]["calibration"] == "calib/{frame}.txt"
 
 
-def test_one_calibration_with_a_number_is_a_file(rig, frame):
-    camera = frame.images[0].camera
+def test_one_calibration_with_a_number_is_a_file(rig, sample):
+    camera = sample.images[0].camera
     write(rig / "cam0.yaml", intrinsics(camera))
     write(rig / "T0.txt", rows(camera.T_camera_lidar))
-    assert run("init", rig).exit_code == 0
+    assert command("init", rig).exit_code == 0
     assert described(rig)["cameras"]["front"]["calibration"] == "cam0.yaml"
     assert len(open_source(rig)) == len(NAMES)
 
 
 @pytest.mark.parametrize("has_own", [True, False], ids=["of its own", "of the other"])
-def test_a_transform_of_the_camera_goes_before_one_that_shows_more_points(rig, frame, has_own):
-    write_rig(rig, frame, ("front", "rear"))
+def test_a_transform_of_the_camera_goes_before_one_that_shows_more_points(rig, sample, has_own):
+    write_rig(rig, sample, ("front", "rear"))
     turn = np.diag([-1.0, -1, 1, 1])
-    ahead = np.asarray(frame.points[::50, :3]) @ turn[:3, :3]
+    ahead = np.asarray(sample.points[::50, :3]) @ turn[:3, :3]
     for path in (rig / "lidar").iterdir():
-        points = np.zeros((len(frame.points) + len(ahead), 4), np.float32)
-        points[:, :3] = np.concatenate([frame.points[:, :3], ahead])
+        points = np.zeros((len(sample.points) + len(ahead), 4), np.float32)
+        points[:, :3] = np.concatenate([sample.points[:, :3], ahead])
         write(path, points.tobytes())
     own = rig / "rear_T.txt"
     if has_own:
-        write(own, rows(frame.images[0].camera.T_camera_lidar @ turn))
+        write(own, rows(sample.images[0].camera.T_camera_lidar @ turn))
     else:
         own.unlink()
-    assert run("init", rig).exit_code == 0
+    assert command("init", rig).exit_code == 0
     rear = described(rig)["cameras"]["images_rear"]
     assert rear["T_camera_lidar"] == ("rear_T.txt" if has_own else "front_T.txt")
     asked = (rig / "ldls.toml").read_text().count("is this the transform of this camera? Its file is not named like it")
     assert asked == (0 if has_own else 1)
 
 
-def test_names_that_are_times(tmp_path, frame):
-    camera = frame.images[0].camera
+def test_names_that_are_times(tmp_path, sample):
+    camera = sample.images[0].camera
     for stamp in ("1547131046.353", "1547131046.453", "1547131046.553", "1547131047.653"):
-        write(tmp_path / f"os1/{stamp}.bin", np.asarray(frame.points, np.float32).tobytes())
+        write(tmp_path / f"os1/{stamp}.bin", np.asarray(sample.points, np.float32).tobytes())
         (tmp_path / "cam").mkdir(exist_ok=True)
-        Image.fromarray(frame.images[0].read()).save(tmp_path / f"cam/{stamp}.jpg")
+        Image.fromarray(sample.images[0].read()).save(tmp_path / f"cam/{stamp}.jpg")
     in_rows_of_numbers(tmp_path, camera)
-    assert run("init", tmp_path).exit_code == 0
+    assert command("init", tmp_path).exit_code == 0
     assert len(open_source(tmp_path)) == 4
 
 
-def test_rows_of_six_floats(rig, frame):
-    wide = np.zeros((len(frame.points), 6), np.float32)
-    wide[:, :4] = frame.points
+def test_rows_of_six_floats(rig, sample):
+    wide = np.zeros((len(sample.points), 6), np.float32)
+    wide[:, :4] = sample.points
     wide[:, 4:] = 0.37
     for name in NAMES:
         write(rig / f"lidar/{name}.bin", wide.tobytes())
-    in_rows_of_numbers(rig, frame.images[0].camera)
-    assert run("init", rig).exit_code == 0
+    in_rows_of_numbers(rig, sample.images[0].camera)
+    assert command("init", rig).exit_code == 0
     assert described(rig)["columns"] == 6
-    np.testing.assert_array_equal(open_source(rig)[0].points[:, :3], frame.points[:, :3])
+    np.testing.assert_array_equal(open_source(rig)[0].points[:, :3], sample.points[:, :3])
 
 
 @pytest.mark.parametrize("name", ['left "one"', "back\\slash", "tab\tand\nline", "über", "\x7f"])
-def test_names_of_any_text_are_quoted(rig, frame, name):
+def test_names_of_any_text_are_quoted(rig, sample, name):
     (rig / "front").rename(rig / name)
     (rig / "lidar").rename(rig / f"lidar {name}")
     (rig / "labels").rename(rig / f"labels {name}")
-    (calibration,) = (image.camera for image in frame.images)
+    (calibration,) = (image.camera for image in sample.images)
     write(rig / f"{name}.yaml", intrinsics(calibration))
     write(rig / f"{name}.txt", rows(calibration.T_camera_lidar))
-    result = run("init", rig)
+    result = command("init", rig)
     assert result.exit_code == 0, result.output
     assert described(rig)["points"] == f"lidar {name}/{{frame}}.bin"
     (camera,) = next(iter(open_source(rig))).images
@@ -294,7 +284,7 @@ def test_names_of_any_text_are_quoted(rig, frame, name):
 @pytest.mark.skipif(os.name == "nt", reason="names are text there")
 def test_a_name_that_is_no_text_is_named(rig):
     (rig / "lidar").rename(rig / os.fsdecode(b"lidar\xff"))
-    result = run("init", rig)
+    result = command("init", rig)
     assert result.exit_code == 1
     assert "not in UTF-8 cannot stand in ldls.toml; rename it" in " ".join(result.output.split())
     assert not (rig / "ldls.toml").exists()
@@ -333,7 +323,7 @@ def _with_a_transform_in_millimetres(rig):
 )
 def test_what_is_missing_is_said_and_the_rest_is_written(rig, harm, missing):
     harm(rig)
-    outcome = run("init", rig)
+    outcome = command("init", rig)
     assert outcome.exit_code == 1
     assert f"missing  {missing}" in outcome.output
     assert described(rig)["points"] == "lidar/{frame}.bin"
@@ -348,26 +338,26 @@ def test_what_is_missing_is_said_and_the_rest_is_written(rig, harm, missing):
                      id="both"),
     ],
 )  # fmt: skip
-def test_millimetres_are_warned_of(rig, frame, points, translation, warnings):
-    xyz = np.asarray(frame.points, np.float32)[:, :3] * points
-    write(rig / f"lidar/{NAMES[0]}.bin", np.column_stack([xyz, np.asarray(frame.points)[:, 3]]).astype("<f4").tobytes())
-    camera = frame.images[0].camera
+def test_millimetres_are_warned_of(rig, sample, points, translation, warnings):
+    scaled = np.asarray(sample.points, np.float32) * np.float32([points, points, points, 1])
+    write(rig / f"lidar/{NAMES[0]}.bin", scaled.tobytes())
+    camera = sample.images[0].camera
     T = camera.T_camera_lidar * [[1, 1, 1, translation]]
     T[3, 3] = 1
     write(rig / "front.yaml", intrinsics(camera))
     write(rig / "T.txt", rows(T))
-    outcome = run("init", rig)
+    outcome = command("init", rig)
     assert outcome.exit_code == 0, outcome.output
     said = [line for line in outcome.stderr.splitlines() if line.startswith("warning: ")]
     assert all(line.startswith(f"warning: {each}") for line, each in zip(said, warnings, strict=True)), said
     assert all("in metres? Divide millimetres by 1000" in line for line in said)
     distant = "T_camera_lidar: the lidar is 288 m from the camera; is its"
-    assert (distant in " ".join(run("info", rig).output.replace("│", " ").split())) == (translation > 1)
+    assert (distant in " ".join(command("info", rig).output.replace("│", " ").split())) == (translation > 1)
 
 
 def test_a_file_that_is_there_is_kept(rig):
     (rig / "ldls.toml").write_text("mine")
-    outcome = run("init", rig)
+    outcome = command("init", rig)
     assert outcome.exit_code == 1
     assert "ldls.toml: is there already" in outcome.stderr
     assert (rig / "ldls.toml").read_text() == "mine"
@@ -375,7 +365,7 @@ def test_a_file_that_is_there_is_kept(rig):
 
 def test_a_folder_without_a_sweep(tmp_path):
     write(tmp_path / "notes.md", "nothing")
-    outcome = run("init", tmp_path)
+    outcome = command("init", tmp_path)
     assert outcome.exit_code == 1
     assert "no file is a lidar sweep" in outcome.stderr
     assert "found notes.md" in outcome.stderr
@@ -387,10 +377,10 @@ def test_real_folders(tmp_path):
     real = Path(os.environ["LDLS_TEST_DATA"]) / "real"
     if not real.exists():
         pytest.skip("LDLS_TEST_DATA has no folder real")
-    drive = run("init", real / "kitti_raw/2011_09_26/2011_09_26_drive_0005_sync")
+    drive = command("init", real / "kitti_raw/2011_09_26/2011_09_26_drive_0005_sync")
     assert "is read as it is (kitti-raw)" in drive.output
     shutil.copytree(real / "boards", tmp_path / "boards", copy_function=shutil.copyfile)
-    outcome = run("init", tmp_path / "boards")
+    outcome = command("init", tmp_path / "boards")
     assert outcome.exit_code == 0, outcome.output
     with pytest.warns(ldls.errors.LeftOutWarning, match="7 of 8 sweeps are left out: 7 no cameras.camera"):
         camera = open_source(tmp_path / "boards")[0].images[0].camera

@@ -3,16 +3,9 @@ import json
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
-from ldls.cli import app
-
-run = CliRunner().invoke
-
-
-def ldls_masks(*words):
-    return run(app, ["masks", *map(str, words)])
+from command import command
 
 
 @pytest.fixture
@@ -33,7 +26,7 @@ def test_masks_go_through_every_format_and_stay_what_they_are(masks):
     stops = ["a.png", "b.npz", "c.json", "d.npz"]
     before = "start.json"
     for stop in stops:
-        outcome = ldls_masks("convert", folder / before, folder / stop)
+        outcome = command("masks", "convert", folder / before, folder / stop)
         assert outcome.exit_code == 0, outcome.output
         assert f"wrote 3 of 3 masks to {folder / stop}" in outcome.output
         before = stop
@@ -58,7 +51,7 @@ def test_masks_go_through_every_format_and_stay_what_they_are(masks):
 )
 def test_masks_change_on_the_way(masks, options, change):
     made, folder = masks
-    outcome = ldls_masks("convert", folder / "masks.json", folder / "out.npz", *options)
+    outcome = command("masks", "convert", folder / "masks.json", folder / "out.npz", *options)
     assert outcome.exit_code == 0, outcome.output
     expected, found = change(made), ldls.read_masks(folder / "out.npz")
     np.testing.assert_array_equal(found.to_array(), expected.to_array())
@@ -72,7 +65,7 @@ def test_of_overlapping_masks_what_is_left_of_one_may_be_too_small(tmp_path):
     pixels[2, 0:10, 0:12] = True
     ldls.save(ldls.InstanceMasks.from_array(pixels), tmp_path / "masks.json")
     words = ["convert", tmp_path / "masks.json", tmp_path / "out.npz", "--resolve", "order", "--min-area", 50]
-    outcome = ldls_masks(*words)
+    outcome = command("masks", *words)
     assert outcome.exit_code == 0, outcome.output
     # the mask of four pixels leaves them to the next
     np.testing.assert_array_equal(ldls.read_masks(tmp_path / "out.npz").to_array(), pixels[1:2])
@@ -83,9 +76,9 @@ def test_a_folder_of_one_png_an_instance_is_taken(masks):
     (folder / "each").mkdir()
     for number, pixels in enumerate(made.to_array()):
         Image.fromarray(pixels).save(folder / f"each/{number}.png")
-    outcome = ldls_masks("show", folder / "each")
+    outcome = command("masks", "show", folder / "each")
     assert outcome.exit_code == 0 and "3 masks of 40 x 60 pixels (height x width)" in outcome.output, outcome.output
-    outcome = ldls_masks("convert", folder / "each", folder / "out.npz")
+    outcome = command("masks", "convert", folder / "each", folder / "out.npz")
     assert outcome.exit_code == 0, outcome.output
     np.testing.assert_array_equal(ldls.read_masks(folder / "out.npz").to_array(), made.to_array())
 
@@ -93,14 +86,14 @@ def test_a_folder_of_one_png_an_instance_is_taken(masks):
 def test_variants_are_written(masks):
     made, folder = masks
     for name, variant in {"list.json": "results", "research.npz": "research", "stack.npy": "pixels"}.items():
-        outcome = ldls_masks("convert", folder / "masks.json", folder / name, "--variant", variant)
+        outcome = command("masks", "convert", folder / "masks.json", folder / name, "--variant", variant)
         assert outcome.exit_code == 0, outcome.output
     assert isinstance(json.loads((folder / "list.json").read_text()), list)
     with np.load(folder / "research.npz") as arrays:
         assert arrays["masks"].shape == (40, 60, 3)
     stack = np.load(folder / "stack.npy")
     np.save(folder / "last.npy", np.moveaxis(stack, 0, -1))
-    outcome = ldls_masks("convert", folder / "last.npy", folder / "back.npz", "--instance-axis", "last")
+    outcome = command("masks", "convert", folder / "last.npy", folder / "back.npz", "--instance-axis", "last")
     assert outcome.exit_code == 0, outcome.output
     np.testing.assert_array_equal(ldls.read_masks(folder / "back.npz").to_array(), made.to_array())
 
@@ -119,7 +112,7 @@ def test_variants_are_written(masks):
 )
 def test_faults_are_said_in_a_line_and_nothing_is_written(masks, words, message):
     _, folder = masks
-    outcome = ldls_masks("convert", folder / "masks.json", folder / words[0], *words[1:])
+    outcome = command("masks", "convert", folder / "masks.json", folder / words[0], *words[1:])
     assert outcome.exit_code == 1
     assert message in outcome.stderr
     assert not (folder / words[0]).exists()
@@ -128,8 +121,8 @@ def test_faults_are_said_in_a_line_and_nothing_is_written(masks, words, message)
 def test_show_prints_a_line_a_mask_and_draws_them(masks):
     _, folder = masks
     Image.new("RGB", (60, 40), (90, 120, 90)).save(folder / "image.png")
-    outcome = ldls_masks(
-        "show", folder / "masks.json", "--image", folder / "image.png", "--picture", folder / "picture.png"
+    outcome = command(
+        "masks", "show", folder / "masks.json", "--image", folder / "image.png", "--picture", folder / "picture.png"
     )
     assert outcome.exit_code == 0, outcome.output
     assert "3 masks of 40 x 60 pixels (height x width)" in outcome.output
@@ -144,13 +137,13 @@ def test_make_saves_what_a_segmenter_finds(tmp_path):
     label = "Car 0.00 0 -1.5 5 6 20 30 1.5 1.6 3.9 1.0 1.7 20.0 -1.6 0.75\n"
     (tmp_path / "label.txt").write_text(label + label.replace("Car", "Pedestrian").replace("0.75", "0.25"))
     segmenter = f"boxes:{tmp_path / 'label.txt'}"
-    outcome = ldls_masks("make", tmp_path / "image.png", tmp_path / "masks.npz", "--segmenter", segmenter)
+    outcome = command("masks", "make", tmp_path / "image.png", tmp_path / "masks.npz", "--segmenter", segmenter)
     assert outcome.exit_code == 0, outcome.output
     found = ldls.read_masks(tmp_path / "masks.npz")
     assert [mask.name for mask in found] == ["car", "person"]
     assert found[0].bounding_box == (6, 5, 25, 16)
     wanted = ["--min-score", "0.5", "--categories", "car,person"]
-    ldls_masks("make", tmp_path / "image.png", tmp_path / "some.npz", "--segmenter", segmenter, *wanted)
+    command("masks", "make", tmp_path / "image.png", tmp_path / "some.npz", "--segmenter", segmenter, *wanted)
     assert [mask.name for mask in ldls.read_masks(tmp_path / "some.npz")] == ["car"]
 
 
@@ -159,5 +152,5 @@ def test_any_number_of_masks(count, tmp_path):
     pixels = np.zeros((count, 40, 60), bool)
     pixels.reshape(count, 2400)[np.arange(count), 7 * np.arange(count)] = True
     ldls.save(ldls.InstanceMasks.from_array(pixels), tmp_path / "masks.json")
-    assert ldls_masks("convert", tmp_path / "masks.json", tmp_path / "masks.png").exit_code == 0
+    assert command("masks", "convert", tmp_path / "masks.json", tmp_path / "masks.png").exit_code == 0
     np.testing.assert_array_equal(ldls.read_masks(tmp_path / "masks.png").to_array(), pixels)

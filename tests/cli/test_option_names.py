@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
 import ldls
+from command import command
 from datasets import layouts
 from ldls.cli import app
 from ldls.cli.option_names import OF_SOURCES, WORDS, by_options
@@ -127,7 +127,7 @@ FRAME = "segment --points points.npy --calib camera.yml --masks masks.npz --out 
     ],
 )  # fmt: skip
 def test_errors_name_options(files, words, message):
-    done = CliRunner().invoke(app, words.split())
+    done = command(*words.split())
     assert done.exit_code == 1 and message in " ".join(done.stderr.split()), done.output
 
 
@@ -141,7 +141,7 @@ def test_errors_name_options(files, words, message):
     ],
 )
 def test_errors_of_values_say_what_was_given(files, words, option, given):
-    done = CliRunner().invoke(app, words.split(), env={"COLUMNS": "200"})
+    done = command(*words.split(), COLUMNS="200")
     _, found, said = done.stderr.partition(f"Invalid value for '{option}':")
     assert done.exit_code == 2 and found and given in said and "Value error" not in said, done.output
 
@@ -149,7 +149,7 @@ def test_errors_of_values_say_what_was_given(files, words, option, given):
 def test_findings_and_frames_that_fail_name_no_arguments_as_if_they_were_options(files):
     expected = "in Python or ldls.toml, pass columns= if rows are of another length; else copy it again, or have "
     expected += "ldls.read_points recover the whole points"
-    found = CliRunner().invoke(app, ["info", "kitti", "--all"])
+    found = command("info", "kitti", "--all")
     assert found.exit_code == 1 and expected in " ".join(found.output.replace("│", " ").split()), found.output
-    shown = CliRunner().invoke(app, ["view", "kitti", "--rerun", "a.rrd"])
+    shown = command("view", "kitti", "--rerun", "a.rrd")
     assert shown.exit_code == 2 and expected in shown.output, shown.output

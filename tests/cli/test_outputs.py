@@ -3,13 +3,10 @@
 import shutil
 
 import pytest
-from typer.testing import CliRunner
 
 from batch import runs
+from command import command
 from datasets import layouts
-from ldls.cli import app
-
-run = CliRunner().invoke
 
 
 @pytest.fixture
@@ -31,7 +28,7 @@ SEGMENT = "segment --points points.bin --calib calib.txt --masks masks.npz"
 
 
 @pytest.mark.parametrize(
-    ("command", "option", "output"),
+    ("words", "option", "output"),
     [
         pytest.param(f"{SEGMENT} --image points.png --out .", "--out", "points.png", id="the image"),
         pytest.param(
@@ -48,8 +45,8 @@ SEGMENT = "segment --points points.bin --calib calib.txt --masks masks.npz"
         pytest.param("view result.npz --image image.png --picture image.png", "--picture", "image.png", id="result"),
     ],
 )  # fmt: skip
-def test_a_command_writes_over_no_input(folder, command, option, output):
-    outcome = run(app, command.split(), env={"COLUMNS": "500"})
+def test_a_command_writes_over_no_input(folder, words, option, output):
+    outcome = command(*words.split(), COLUMNS="500")
     assert outcome.exit_code == 1
     expected = rf"error: {option}: would write over {output}, which is an input ("
     assert outcome.stderr.replace("out/../", "").startswith(expected), outcome.stderr
@@ -57,7 +54,7 @@ def test_a_command_writes_over_no_input(folder, command, option, output):
 
 
 @pytest.mark.parametrize(
-    ("command", "made"),
+    ("words", "made"),
     [
         pytest.param(f"{SEGMENT} --out new --picture {{}}/a.png", "new", id="picture"),
         pytest.param(f"{SEGMENT} --out new --objects {{}}/a.json", "new", id="objects"),
@@ -70,27 +67,27 @@ def test_a_command_writes_over_no_input(folder, command, option, output):
         pytest.param("view result.npz --rerun {}/a.rrd", None, id="recorded"),
     ],
 )
-def test_a_folder_to_write_to_must_be_there_before_any_work(folder, monkeypatch, command, made):
+def test_a_folder_to_write_to_must_be_there_before_any_work(folder, monkeypatch, words, made):
     for name in ("ldls.io.read_points", "ldls.io.read_masks", "ldls.io.read_image", "ldls.viewing.save_pictures"):
         monkeypatch.setattr(name, lambda *_, **__: pytest.fail("work was done"))
-    outcome = run(app, command.format("nowhere").split(), env={"COLUMNS": "500"})
+    outcome = command(*words.format("nowhere").split(), COLUMNS="500")
     assert outcome.exit_code == 1
     assert outcome.stderr == "error: nowhere: no such folder to write to; make it first\n"
     monkeypatch.undo()
     if made is not None:
         monkeypatch.chdir(folder)
-        assert run(app, command.format(made).split(), env={"COLUMNS": "500"}).exit_code == 0
+        assert command(*words.format(made).split(), COLUMNS="500").exit_code == 0
         assert list((folder / made).glob("a.*"))
         shutil.rmtree(folder / made)
 
 
 def test_a_run_makes_its_folder_and_no_other(tmp_path):
     source = layouts.many_frames(tmp_path / "source", 2)
-    words = ["run", str(source), "--masks", str(source / "masks"), "--out", str(tmp_path / "out")]
-    outcome = run(app, [*words, "--objects", str(tmp_path / "nowhere/a.csv")], env={"COLUMNS": "500"})
+    words = runs.arguments(source, tmp_path / "out")
+    outcome = command(*words, "--objects", tmp_path / "nowhere/a.csv", COLUMNS="500")
     assert outcome.exit_code == 1 and "nowhere: no such folder to write to" in outcome.stderr
     assert not (tmp_path / "out").exists()
-    assert run(app, [*words, "--objects", str(tmp_path / "out/a.csv")]).exit_code == 0
+    assert command(*words, "--objects", tmp_path / "out/a.csv").exit_code == 0
     assert (tmp_path / "out/a.csv").is_file()
 
 
@@ -102,23 +99,23 @@ def test_a_run_makes_its_folder_and_no_other(tmp_path):
     ],
 )
 def test_two_options_do_not_write_one_file(folder, option, output):
-    command = f"{SEGMENT} --out out --formats npz,csv {option} {output}"
-    outcome = run(app, command.split(), env={"COLUMNS": "500"})
+    words = f"{SEGMENT} --out out --formats npz,csv {option} {output}"
+    outcome = command(*words.split(), COLUMNS="500")
     assert outcome.exit_code == 1
     assert outcome.stderr == f"error: {option}: {output} is what --out writes, too; give another\n"
 
 
-@pytest.mark.parametrize("command", ["view", "info"])
-def test_pictures_of_a_source_are_none_of_its_files(tmp_path, command):
+@pytest.mark.parametrize("name", ["view", "info"])
+def test_pictures_of_a_source_are_none_of_its_files(tmp_path, name):
     source = layouts.many_frames(tmp_path / "source", 2)
     picture = source / "image_2/000000.png"
-    if command == "view":
+    if name == "view":
         for part, ending in (("image_2", "png"), ("velodyne", "bin"), ("calib", "txt")):
             (source / f"{part}/000001.{ending}").rename(source / f"{part}/a-0.{ending}")
             (source / f"{part}/000000.{ending}").rename(source / f"{part}/0.{ending}")
         picture = source / "image_2/a.png"
     before = runs.contents(source)
-    outcome = run(app, [command, str(source), "--picture", str(picture)], env={"COLUMNS": "500"})
+    outcome = command(name, source, "--picture", picture, COLUMNS="500")
     assert outcome.exit_code == 1
     assert "error: --picture: would write over" in outcome.stderr
     assert runs.contents(source) == before
@@ -127,6 +124,6 @@ def test_pictures_of_a_source_are_none_of_its_files(tmp_path, command):
 def test_annotations_are_written_over_no_boxes(tmp_path):
     source = layouts.many_frames(tmp_path / "source", 2)
     layouts.write_text(source / "label_2/000000.txt", "Car 0 0 0 1 1 2 2 1 1 1 0 0 5 0\n")
-    outcome = run(app, ["annotate", str(source), str(source / "label_2")], env={"COLUMNS": "500"})
+    outcome = command("annotate", source, source / "label_2", COLUMNS="500")
     assert outcome.exit_code == 1
     assert "error: OUT: would write over" in outcome.stderr

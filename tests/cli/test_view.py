@@ -2,18 +2,16 @@
 
 import csv
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
+from command import command, process
 from datasets import layouts
-from ldls.cli import app
 from ldls.cli.recording_options import default_target
 from ldls.cli.view import image_files
 from ldls.viewing import overlay
@@ -21,10 +19,7 @@ from viewing.recorded import Recorded, vectors
 
 
 @pytest.fixture(autouse=True)
-def no_display(monkeypatch, tmp_path):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(sys, "platform", "linux")
+def in_a_folder_of_its_own(no_display, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
 
 
@@ -36,19 +31,15 @@ def saved(small_scene, tmp_path):
     return result
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, ["view", *map(str, arguments)])
-
-
 def test_a_result_is_recorded_with_its_diffusion(saved):
-    done = run("frame.npz", "--image", "image.png")
+    done = command("view", "frame.npz", "--image", "image.png")
     assert done.exit_code == 0, done.output
     assert "open it with: rerun frame.rrd" in done.output
     found = Recorded("frame.rrd")
     np.testing.assert_array_equal(vectors(found.last("world/points", "Points3D:positions")), saved.points)
     assert r"world/camera/camera\ 0/image" in found.entities
     assert len(found.each("diffusion/points", "Points3D:colors")) == 11
-    assert run("frame.npz", "--rerun", "plain.rrd", "--diffusion", 0).exit_code == 0
+    assert command("view", "frame.npz", "--rerun", "plain.rrd", "--diffusion", 0).exit_code == 0
     plain = Recorded("plain.rrd")
     assert plain.timelines == {"frame"} and not plain.each(r"world/camera/camera\ 0/image/masks", "EncodedImage:blob")
 
@@ -58,13 +49,13 @@ def test_a_ring_takes_an_image_for_each_camera(small_scene, saved):
     views = [ldls.View(masks, camera, "left"), ldls.View(masks, camera, "right")]
     ldls.save(ldls.segment(points, views), "ring.npz")
     for images in (["image.png", "image.png"], ["right=image.png", "left=image.png"]):
-        done = run("ring.npz", *(word for image in images for word in ("--image", image)), "--diffusion", 0)
+        done = command("view", "ring.npz", *(word for image in images for word in ("--image", image)), "--diffusion", 0)
         assert done.exit_code == 0, done.output
         assert {"world/camera/left/image", "world/camera/right/image"} <= Recorded("ring.rrd").entities
     for image, message in {"image.png": "of which camera", "nosuch=image.png": "no camera nosuch"}.items():
-        done = run("ring.npz", "--image", image, "--diffusion", 0)
+        done = command("view", "ring.npz", "--image", image, "--diffusion", 0)
         assert done.exit_code == 1 and message in done.stderr and "one of left, right" in done.stderr
-    one = run("ring.npz", "--image", "right=image.png", "--diffusion", 0)
+    one = command("view", "ring.npz", "--image", "right=image.png", "--diffusion", 0)
     assert one.exit_code == 0 and "world/camera/left/image" not in Recorded("ring.rrd").entities
 
 
@@ -99,30 +90,15 @@ def test_images_of_no_one_camera_are_refused(texts, message):
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drive")
-    done = CliRunner().invoke(
-        app,
-        [
-            "simulate",
-            "--layout",
-            "kitti-raw",
-            "--count",
-            "3",
-            "--lidar",
-            "vlp-16",
-            "--rig",
-            "robot",
-            "--cores",
-            "1",
-            str(folder),
-        ],
-    )
+    words = "simulate --layout kitti-raw --count 3 --lidar vlp-16 --rig robot --cores 1"
+    done = command(*words.split(), folder)
     assert done.exit_code == 0, done.output
     (found,) = folder.glob("*/*_sync")
     return found
 
 
 def test_a_drive_is_segmented_and_recorded_frame_by_frame(drive):
-    done = run(drive, "--masks", drive / "masks_02", "--rerun", "drive.rrd")
+    done = command("view", drive, "--masks", drive / "masks_02", "--rerun", "drive.rrd")
     assert done.exit_code == 0, done.output
     assert "3 of 3 frames; wrote drive.rrd" in done.output
     found = Recorded("drive.rrd")
@@ -140,7 +116,7 @@ def test_a_drive_is_segmented_and_recorded_frame_by_frame(drive):
 
 
 def test_without_masks_frames_are_shown_as_they_are(drive):
-    done = run(drive, "--frames", "1", "--rerun", "raw.rrd")
+    done = command("view", drive, "--frames", "1", "--rerun", "raw.rrd")
     assert done.exit_code == 0 and "1 of 3 frames" in done.output, done.output
     found = Recorded("raw.rrd")
     assert "world/truth" in found.entities and "world/objects" not in found.entities
@@ -148,10 +124,11 @@ def test_without_masks_frames_are_shown_as_they_are(drive):
 
 
 def test_results_of_a_run_are_shown_and_nothing_is_segmented(drive, monkeypatch):
-    command = ["run", drive, "--masks", drive / "masks_02", "--out", "results", "--formats", "npz", "--frames", "0:2"]
-    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    words = ["--out", "results", "--formats", "npz", "--frames", "0:2"]
+    done = command("run", drive, "--masks", drive / "masks_02", *words)
+    assert done.exit_code == 0, done.output
     monkeypatch.setattr("ldls.label_diffusion.diffuse_labels", None)
-    done = run(drive, "--results", "results", "--frames", "0:2", "--rerun", "a.rrd")
+    done = command("view", drive, "--results", "results", "--frames", "0:2", "--rerun", "a.rrd")
     assert done.exit_code == 0, done.output
     name = ldls.datasets.open_source(drive).names[1]
     row = Recorded("a.rrd").each("world/points", "Points3D:class_ids")[1].values
@@ -161,23 +138,23 @@ def test_results_of_a_run_are_shown_and_nothing_is_segmented(drive, monkeypatch)
 
 @pytest.mark.parametrize("target", [["--picture", "seen.png"], ["--rerun", "seen.rrd"]], ids=["picture", "recording"])
 def test_results_of_another_drive_are_refused(drive, tmp_path, target):
-    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--formats", "npz", "--frames", "0:2"]
-    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    done = command("run", drive, "--masks", drive / "masks_02", "--out", "out", "--formats", "npz", "--frames", "0:2")
+    assert done.exit_code == 0, done.output
     first, second = ldls.datasets.open_source(drive).names[:2]
     shutil.copy(f"out/{second}.npz", f"out/{first}.npz")
     expected, got = (len(ldls.datasets.open_source(drive)[index].points) for index in (0, 1))
     message = f"out/{first}.npz: expected {expected:,} points, those of frame {first} of {drive}, got {got:,}; give"
-    alone = run(drive, "--results", "out", "--frames", "0", *target)
+    alone = command("view", drive, "--results", "out", "--frames", "0", *target)
     assert alone.exit_code == 1 and message in " ".join(alone.stderr.split()), alone.output
     assert not list(tmp_path.glob("seen*"))
-    both = run(drive, "--results", "out", "--frames", "0:2", *target)
+    both = command("view", drive, "--results", "out", "--frames", "0:2", *target)
     assert both.exit_code == 2 and f"{first} failed" in both.output and "1 of 3 frames" in both.output, both.output
 
 
 def test_objects_of_a_drive_keep_their_numbers(drive):
-    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track"]
-    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
-    done = run(drive, "--results", "out/tracks", "--rerun", "a.rrd")
+    done = command("run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track")
+    assert done.exit_code == 0, done.output
+    done = command("view", drive, "--results", "out/tracks", "--rerun", "a.rrd")
     assert done.exit_code == 0, done.output
     with Path("out/tracks.csv").open(newline="") as file:
         expected = {(row["frame"], f"{row['name']} {row['track']}") for row in csv.DictReader(file)}
@@ -189,18 +166,18 @@ def test_objects_of_a_drive_keep_their_numbers(drive):
 
 
 def test_a_sweep_of_several_is_recorded_without_its_diffusion(drive, capfd):
-    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1"]
-    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    done = command("run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1")
+    assert done.exit_code == 0, done.output
     first = f"out/{ldls.datasets.open_source(drive).names[0]}.npz"
     for words in ([first], [drive, "--results", "out", "--frames", "0:1"]):
-        done = run(*words, "--rerun", "one.rrd")
+        done = command("view", *words, "--rerun", "one.rrd")
         assert done.exit_code == 0, done.output
         assert done.output.count("without its diffusion: its graph has 3 sweeps") == 1
         found = Recorded("one.rrd")
         assert "world/points" in found.entities and "diffusion/points" not in found.entities
-        none = run(*words, "--rerun", "one.rrd", "--diffusion", 0)
+        none = command("view", *words, "--rerun", "one.rrd", "--diffusion", 0)
         assert none.exit_code == 0 and "without its diffusion" not in none.output
-        wished = run(*words, "--rerun", "none.rrd", "--diffusion", 5)
+        wished = command("view", *words, "--rerun", "none.rrd", "--diffusion", 5)
         assert wished.exit_code == 1 and "error: --diffusion: cannot be shown, its graph has 3 sweeps" in wished.stderr
         assert not Path("none.rrd").exists() and "Dropping data" not in capfd.readouterr().err
 
@@ -208,14 +185,14 @@ def test_a_sweep_of_several_is_recorded_without_its_diffusion(drive, capfd):
 def test_frames_that_fail_are_named_and_passed_over(tmp_path):
     source = layouts.kitti_object(tmp_path / "kitti")
     (source / "velodyne/000001.bin").write_bytes(b"123")
-    done = run(source, "--rerun", "a.rrd")
+    done = command("view", source, "--rerun", "a.rrd")
     assert done.exit_code == 2
     assert done.stderr.startswith("000001 failed") and "2 of 3 frames" in done.stdout
     assert "failed" not in done.stdout
     assert len(Recorded("a.rrd").each("world/points", "Points3D:positions")) == 2
     for broken in (source / "velodyne").iterdir():
         broken.write_bytes(b"123")
-    none = run(source, "--rerun", "b.rrd")
+    none = command("view", source, "--rerun", "b.rrd")
     assert none.exit_code == 1 and "not a multiple" in none.stderr
     assert not list(tmp_path.glob("*b.rrd*"))
 
@@ -241,14 +218,14 @@ def test_frames_that_fail_are_named_and_passed_over(tmp_path):
 )
 def test_wrong_wishes_are_refused(saved, tmp_path, arguments, message):
     layouts.kitti_object(tmp_path / "kitti")
-    done = run(*arguments)
+    done = command("view", *arguments)
     assert done.exit_code == 1 and message in " ".join(done.stderr.split()), done.output
     assert not list(tmp_path.glob("*.rrd"))
 
 
 def test_the_missing_extra_is_named_before_any_work(saved, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
-    done = run("frame.npz")
+    done = command("view", "frame.npz")
     assert done.exit_code == 1 and "pip install 'ldls[viz]'" in done.stderr
 
 
@@ -259,14 +236,14 @@ def test_segment_and_demo_record_too(small_scene, saved, tmp_path):
     rows = {"P2": camera.projection, "R0_rect": np.eye(3), "Tr_velo_to_cam": np.eye(4)[:3]}
     layouts.write_text(tmp_path / "c.txt", "".join(f"{key}: {layouts.row(m)}\n" for key, m in rows.items()))
     words = "segment --points p.bin --calib c.txt --masks m.npz --image image.png --out out --rerun s.rrd --diffusion 4"
-    done = CliRunner().invoke(app, words.split())
+    done = command(*words.split())
     assert done.exit_code == 0 and "rerun s.rrd" in done.output, done.output
     found = Recorded("s.rrd")
     assert "world/camera/image_2/image" in found.entities
     assert len(found.each("diffusion/points", "Points3D:colors")) == 4
-    done = CliRunner().invoke(app, ["demo", "--rerun", "d.rrd"])
+    done = command("demo", "--rerun", "d.rrd")
     assert done.exit_code == 0 and "world/boxes" in Recorded("d.rrd").entities, done.output
-    bad = CliRunner().invoke(app, words.replace("s.rrd", "s.png").split())
+    bad = command(*words.replace("s.rrd", "s.png").split())
     assert bad.exit_code == 1
 
 
@@ -277,23 +254,22 @@ def test_where_there_is_a_display_the_viewer_is_the_target(monkeypatch):
 
 
 def test_the_command_ends_by_itself_and_says_one_line(saved):
-    command = [sys.executable, "-m", "ldls", "view", "frame.npz", "--rerun", "a.rrd"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=True)
-    assert done.stderr == "" and len(done.stdout.splitlines()) == 1
+    done = process("view", "frame.npz", "--rerun", "a.rrd")
+    assert (done.returncode, done.stderr) == (0, "") and len(done.stdout.splitlines()) == 1
 
 
 def test_a_result_as_pictures_needs_no_recording(saved, tmp_path):
-    done = run("frame.npz", "--image", "image.png", "--picture", "seen.png")
+    done = command("view", "frame.npz", "--image", "image.png", "--picture", "seen.png")
     assert done.exit_code == 0, done.output
     assert {path.name for path in tmp_path.glob("seen*")} == {"seen.png", "seen-birds-eye.png", "seen-comparison.png"}
     assert not list(tmp_path.glob("*.rrd"))
-    assert run("frame.npz", "--picture", "seen.png", "--rerun", "seen.rrd").exit_code == 0
+    assert command("view", "frame.npz", "--picture", "seen.png", "--rerun", "seen.rrd").exit_code == 0
     assert (tmp_path / "seen.rrd").is_file()
 
 
 def test_an_image_of_another_size_leaves_no_picture(saved, tmp_path):
     Image.new("RGB", (60, 80)).save(tmp_path / "other.png")
-    done = run("frame.npz", "--image", "other.png", "--picture", "seen.png")
+    done = command("view", "frame.npz", "--image", "other.png", "--picture", "seen.png")
     assert done.exit_code == 1 and "got 80 x 60 (height x width), the masks are of 60 x 80" in done.stderr
     assert not list(tmp_path.glob("seen*"))
 
@@ -307,16 +283,16 @@ def test_a_place_that_no_picture_can_be_written_to_is_refused_before_anything_is
 ):
     of_frames = [drive, "--masks", drive / "masks_02"]
     for words in (["frame.npz"], of_frames):
-        done = run(*words, "--picture", picture, "--rerun", "seen.rrd")
+        done = command("view", *words, "--picture", picture, "--rerun", "seen.rrd")
         assert done.exit_code == 1 and message in done.output and "failed" not in done.output, done.output
     assert {path.name for path in tmp_path.glob("seen*")} == set()
 
 
 def test_frames_of_a_source_as_pictures_have_the_tracks_of_their_run(drive, tmp_path, monkeypatch):
-    command = ["run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track"]
-    assert CliRunner().invoke(app, list(map(str, command))).exit_code == 0
+    done = command("run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track")
+    assert done.exit_code == 0, done.output
     monkeypatch.setitem(sys.modules, "rerun", None)
-    done = run(drive, "--results", "out/tracks", "--frames", "1:", "--picture", "seen.png")
+    done = command("view", drive, "--results", "out/tracks", "--frames", "1:", "--picture", "seen.png")
     assert done.exit_code == 0 and "2 of 3 frames; wrote seen-FRAME.png and others" in done.output, done.output
     source = ldls.datasets.open_source(drive)
     kinds = ("", "-birds-eye", "-comparison")
@@ -330,6 +306,6 @@ def test_frames_of_a_source_as_pictures_have_the_tracks_of_their_run(drive, tmp_
 
 @pytest.mark.parametrize("more", [[], ["--rerun", "a.rrd"]], ids=["alone", "beside a recording"])
 def test_frames_without_labels_are_no_pictures(drive, tmp_path, more):
-    done = run(drive, "--frames", "1", "--picture", "seen.png", *more)
+    done = command("view", drive, "--frames", "1", "--picture", "seen.png", *more)
     assert done.exit_code == 1 and "no labels to draw; give --masks, --segmenter or --results" in done.output
     assert not list(tmp_path.glob("*.png"))

@@ -5,11 +5,10 @@ import shutil
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import ldls
 from batch import runs
-from ldls.cli import app
+from command import command
 from ldls.datasets import KittiObjectSource
 from ldls.errors import LeftOutWarning
 from ldls.evaluation import ClassSet, paper
@@ -136,7 +135,7 @@ def test_on_real_frames_each_step_of_the_method_gains(data_folder):
 
 def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
     out = tmp_path / "out"
-    ran = CliRunner().invoke(app, ["reproduce", str(folder), "--out", str(out)])
+    ran = command("reproduce", folder, "--out", out)
     assert ran.exit_code == 0, ran.output
     for title in (
         "Points by class",
@@ -157,12 +156,12 @@ def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
 
 
 def test_a_scored_name_that_occurs_nowhere_is_warned_of(folder, tmp_path):
-    words = ["reproduce", str(folder), "--out", str(tmp_path / "out"), "--categories"]
-    ran = CliRunner().invoke(app, [*words, "persn"])
+    words = ["reproduce", folder, "--out", tmp_path / "out", "--categories"]
+    ran = command(*words, "persn")
     assert ran.exit_code == 1
     assert ran.stderr.endswith("error: --categories: 'persn' is unknown; did you mean 'person'?\n")
     assert not (tmp_path / "out").exists()
-    ran = CliRunner().invoke(app, [*words, "car,persn"])
+    ran = command(*words, "car,persn")
     assert ran.exit_code == 0, ran.output
     assert ran.stderr.endswith("warning: --categories: 'persn' is unknown; did you mean 'person'?\n")
     assert (tmp_path / "out/comparison.md").is_file()
@@ -174,7 +173,7 @@ def test_tables_are_written_over_no_input(folder, tmp_path):
     for path in mine.rglob("000000.*"):
         path.rename(path.with_stem("range"))
     before = runs.contents(mine)
-    ran = CliRunner().invoke(app, ["reproduce", str(mine), "--out", str(mine / "masks")], env={"COLUMNS": "500"})
+    ran = command("reproduce", mine, "--out", mine / "masks", COLUMNS="500")
     assert ran.exit_code == 1
     assert ran.stderr.startswith("error: --out: would write over "), ran.stderr
     assert runs.contents(mine) == before
@@ -182,7 +181,7 @@ def test_tables_are_written_over_no_input(folder, tmp_path):
 
 @pytest.mark.parametrize("arguments", [[], ["FOLDER", "--suite", "tuning"]], ids=["neither", "both"])
 def test_the_command_wants_a_folder_or_a_suite(folder, tmp_path, arguments):
-    arguments = [str(folder) if argument == "FOLDER" else argument for argument in arguments]
-    ran = CliRunner().invoke(app, ["reproduce", *arguments, "--out", str(tmp_path / "out")])
+    arguments = [folder if argument == "FOLDER" else argument for argument in arguments]
+    ran = command("reproduce", *arguments, "--out", tmp_path / "out")
     assert ran.exit_code != 0
     assert "expected a folder of frames or --suite" in ran.output

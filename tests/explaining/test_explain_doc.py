@@ -4,9 +4,7 @@ import re
 import shlex
 from pathlib import Path
 
-from typer.testing import CliRunner
-
-from ldls.cli import app
+from command import command
 
 DOC = (Path(__file__).parents[2] / "docs/explain.md").read_text()
 
@@ -29,9 +27,9 @@ def test_commands_print_what_is_shown(own_demo, monkeypatch):
             assert printed[0] == shown[0]
             assert words("\n".join(printed)) == words(text)
             continue
-        for command in text.splitlines():
-            _, *arguments = shlex.split(command)
-            outcome = CliRunner().invoke(app, arguments)
+        for line in text.splitlines():
+            _, *arguments = shlex.split(line)
+            outcome = command(*arguments)
             assert outcome.exit_code == 0, outcome.output
             output = outcome.output
 

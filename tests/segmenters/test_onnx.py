@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from onnx import TensorProto
 from PIL import Image
-from typer.testing import CliRunner
 
 import ldls
+from command import command
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS
-from ldls.cli import app
 from ldls.errors import (
     DtypeError,
     FileFormatError,
@@ -118,8 +117,8 @@ def test_colours_become_labels_of_points(build, kind, least_iou, scene, tmp_path
 def test_the_command_reaches_the_same_labels(build, kind, least_iou, scene, tmp_path):
     model = graphs.save(build(scene), tmp_path / "model.onnx")
     files = frame_files(scene, tmp_path)
-    words = [word for name, path in files.items() for word in (f"--{name}", str(path))]
-    outcome = CliRunner().invoke(app, ["segment", *words, "--segmenter", f"onnx:{model}", "--out", str(tmp_path)])
+    words = [word for name, path in files.items() for word in (f"--{name}", path)]
+    outcome = command("segment", *words, "--segmenter", f"onnx:{model}", "--out", tmp_path)
     assert outcome.exit_code == 0, outcome.output
     masks = OnnxSegmenter(model, kind=kind)(scene.image)
     expected = ldls.segment(scene.points, masks, ldls.read_camera(files["calib"])).labels

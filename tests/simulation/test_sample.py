@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.spatial import KDTree
-from typer.testing import CliRunner
 
 import ldls
-from ldls.cli import app
+from command import command
 from ldls.io.labels.annotations import read_annotations
-from ldls.simulation import sample_frame
 from ldls.simulation.sample import FOLDER
 from simulation import make_sample
 
@@ -22,14 +20,9 @@ FILES = {
 
 
 @pytest.fixture(scope="module")
-def frame():
-    return sample_frame()
-
-
-@pytest.fixture(scope="module")
-def result(frame):
-    (image,) = frame.images
-    return ldls.segment(frame.points, image.masks, image.camera)
+def result(sample):
+    (image,) = sample.images
+    return ldls.segment(sample.points, image.masks, image.camera)
 
 
 @pytest.fixture(scope="module")
@@ -41,30 +34,30 @@ def anew(tmp_path_factory):
     return folder / "training"
 
 
-def test_the_frame_is_whole_and_small(frame):
+def test_the_frame_is_whole_and_small(sample):
     files = {path.parent.name: path.name for path in FOLDER.rglob("*") if path.is_file()}
     assert files == FILES
     assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 1_500_000
-    n = len(frame.points)
-    assert n > 30_000 and frame.points.shape == (n, 4) and frame.points.dtype == np.float32
-    assert len(frame.truth) == n and not frame.truth.ignored.any()
-    (image,) = frame.images
+    n = len(sample.points)
+    assert n > 30_000 and sample.points.shape == (n, 4) and sample.points.dtype == np.float32
+    assert len(sample.truth) == n and not sample.truth.ignored.any()
+    (image,) = sample.images
     assert image.read().shape == (375, 1242, 3)
     assert image.masks.image_size == image.camera.image_size == (375, 1242)
 
 
-def test_the_frame_shows_a_street_to_a_lidar_on_a_car(frame):
-    range_m = np.linalg.norm(frame.points[:, :3], axis=1)
+def test_the_frame_shows_a_street_to_a_lidar_on_a_car(sample):
+    range_m = np.linalg.norm(sample.points[:, :3], axis=1)
     assert range_m.min() > 3 and range_m.max() < 120.2
-    ground = frame.points[(frame.truth.classes == 0) & (np.abs(frame.points[:, 1]) < 1) & (range_m < 7), 2]
+    ground = sample.points[(sample.truth.classes == 0) & (np.abs(sample.points[:, 1]) < 1) & (range_m < 7), 2]
     assert np.median(ground) == pytest.approx(-1.73, abs=0.1)
-    assert ((frame.points[:, 3] >= 0) & (frame.points[:, 3] <= 1)).all()
-    names = [mask.name for mask in frame.images[0].masks]
+    assert ((sample.points[:, 3] >= 0) & (sample.points[:, 3] <= 1)).all()
+    names = [mask.name for mask in sample.images[0].masks]
     assert {"car", "person", "bicycle"} <= set(names) and len(names) >= 9
 
 
-def test_the_view_is_as_that_of_the_whole_turn(frame, result):
-    turn_deg = np.degrees(np.arctan2(frame.points[:, 1], frame.points[:, 0]))
+def test_the_view_is_as_that_of_the_whole_turn(sample, result):
+    turn_deg = np.degrees(np.arctan2(sample.points[:, 1], sample.points[:, 0]))
     assert np.abs(turn_deg).max() <= make_sample.AHEAD_DEG
     assert np.abs(turn_deg[result.in_view]).max() < make_sample.AHEAD_DEG - 5
 
@@ -102,8 +95,8 @@ def test_the_command_makes_boxes_masks_and_image(anew):
     np.testing.assert_allclose(cameras[0].T_camera_lidar, cameras[1].T_camera_lidar, atol=1e-9)
 
 
-def test_points_of_objects_project_into_their_masks(frame, result):
-    direct, truth = result.direct_labels[result.in_view], frame.truth.instances[result.in_view]
+def test_points_of_objects_project_into_their_masks(sample, result):
+    direct, truth = result.direct_labels[result.in_view], sample.truth.instances[result.in_view]
     recalls = []
     for label in range(1, len(result.instances) + 1):
         instance = np.bincount(truth[(direct == label) & (truth > 0)]).argmax()
@@ -111,9 +104,9 @@ def test_points_of_objects_project_into_their_masks(frame, result):
     assert np.median(recalls) > 0.8
 
 
-def test_direct_projection_smears_and_the_method_puts_it_right(frame, result):
+def test_direct_projection_smears_and_the_method_puts_it_right(sample, result):
     seen = result.in_view
-    truth = frame.truth.instances[seen] > 0
+    truth = sample.truth.instances[seen] > 0
     named = [labels[seen] > 0 for labels in (result.direct_labels, result.labels)]
     direct, method = ((labels & truth).sum() / labels.sum() for labels in named)
     assert direct < 0.85 and method > direct + 0.1
@@ -121,8 +114,8 @@ def test_direct_projection_smears_and_the_method_puts_it_right(frame, result):
 
 def test_segment_on_the_files_gives_the_labels_of_the_frame(result, tmp_path):
     files = {"points": "velodyne/000000.bin", "calib": "calib/000000.txt", "masks": "masks/000000.json"}
-    words = [word for option, file in files.items() for word in (f"--{option}", str(FOLDER / file))]
-    outcome = CliRunner().invoke(app, ["segment", *words, "--out", str(tmp_path)])
+    words = [word for option, file in files.items() for word in (f"--{option}", FOLDER / file)]
+    outcome = command("segment", *words, "--out", tmp_path)
     assert outcome.exit_code == 0, outcome.output
     with np.load(tmp_path / "000000.npz") as stored:
         np.testing.assert_array_equal(stored["labels"], result.labels)

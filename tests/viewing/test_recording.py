@@ -19,6 +19,7 @@ from rerun.error_utils import RerunWarning
 
 import ldls
 from batch import runs
+from command import python
 from conftest import pinhole
 from ldls import stages
 from ldls.explaining import rebuild
@@ -497,8 +498,7 @@ with open_recording(sys.argv[1]) as made:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="files have no limits of size there")
 def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path):
-    command = [sys.executable, "-c", FULL_DISK, tmp_path / "a.rrd"]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    ended = python("-c", FULL_DISK, tmp_path / "a.rrd")
     assert ended.returncode == 1 and "OSError: [Errno 27]" in ended.stderr and "a.rrd" in ended.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -532,16 +532,13 @@ def test_displays_are_seen(environment, platform, expected):
 
 
 @pytest.fixture
-def no_display(monkeypatch):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(sys, "platform", "linux")
+def no_viewer(no_display, monkeypatch):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         monkeypatch.setattr(viewer, "PORT", free.getsockname()[1])
 
 
-def test_without_display_and_viewer_one_is_told_so_at_once(no_display, result, monkeypatch):
+def test_without_display_and_viewer_one_is_told_so_at_once(no_viewer, result, monkeypatch):
     # what starts a viewer waits for it to answer
     monkeypatch.setattr(rr.RecordingStream, "spawn", lambda *_, **__: pytest.fail("a viewer was started"))
     with pytest.raises(ConnectionError, match="no display to open a viewer on; name a file"):
@@ -549,7 +546,7 @@ def test_without_display_and_viewer_one_is_told_so_at_once(no_display, result, m
     assert viewer.ANSWER_S <= 1
 
 
-def test_what_listens_for_viewers_gets_all(tmp_path, no_display, result):
+def test_what_listens_for_viewers_gets_all(tmp_path, no_viewer, result):
     # the program itself: the script of this name would leave it running when it is ended
     program = Path(rerun_cli.__file__).with_name("rerun.exe" if os.name == "nt" else "rerun")
     path = tmp_path / "received.rrd"
