@@ -261,7 +261,7 @@ def _add_calibration(
 
 
 def _by_frame_or_camera(pattern: Pattern, frames: Set[str], cameras: Sequence[Pattern]) -> Sequence[Pattern]:
-    """The pattern where its files are of frames, some of which may have none; else its files, as cam0.yaml, cam1.yaml."""
+    """The pattern where its files are of frames, though some have none; else its files, as cam0.yaml and cam1.yaml."""
     if len(pattern.files) > MOST_CAMERAS:
         return [pattern] if frames & pattern.files.keys() else []
     files = [Pattern(pattern.text.replace(FRAME, name), {name: path}) for name, path in pattern.files.items()]
