@@ -172,8 +172,15 @@ def test_an_extrinsic_in_the_projection_may_be_of_any_hand(mirror, to_optical):
     "mirror",
     [pytest.param(np.eye(3), id="as it is"), pytest.param([[-1.0, 0, 80], [0, 1, 0], [0, 0, 1]], id="mirrored")],
 )
-def test_an_extrinsic_in_the_projection_is_that_of_the_camera(mirror):
-    turn = from_parts(Rotation.from_rotvec([0.1, -0.05, 0.2]).as_matrix() @ TO_OPTICAL, np.array([0.3, -2, 0.1]))
+@pytest.mark.parametrize(
+    "rotation",
+    [
+        pytest.param(Rotation.from_rotvec([0.1, -0.05, 0.2]).as_matrix() @ TO_OPTICAL, id="from the lidar"),
+        pytest.param(Rotation.from_rotvec([0, 0, np.pi / 2]).as_matrix(), id="about the axis"),
+    ],
+)
+def test_an_extrinsic_in_the_projection_is_that_of_the_camera(mirror, rotation):
+    turn = from_parts(rotation, np.array([0.3, -2, 0.1]))
     intrinsic = mirror @ np.array([[100, 1.5, 40], [0, 90, 30], [0, 0, 1]])
     earlier = from_parts(Rotation.from_rotvec([0, 0, 0.3]).as_matrix(), np.array([1.0, 2, 3]))
     camera = ldls.Camera(projection=2 * intrinsic @ turn[:3], T_camera_lidar=earlier, image_size=(60, 80))

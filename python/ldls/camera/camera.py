@@ -37,15 +37,14 @@ def _depth_forward(projection: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _taken_apart(projection: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """K (3, 4) and the transform (4, 4) to the frame in which it is one, of a projection K [R | t].
-
-    Its third row is the axis along which the camera looks, and what the second has across that points down.
-    """
-    left, axis = projection[:, :3], projection[2, :3] / np.linalg.norm(projection[2, :3])
-    down = left[1] - (left[1] @ axis) * axis
-    down /= np.linalg.norm(down)
-    rotation = np.stack([np.cross(down, axis), down, axis])
-    intrinsic = np.triu(left @ rotation.T)
+    """K (3, 4) and the transform (4, 4) to the frame in which it is one, of a projection K [R | t]."""
+    # numpy has QR only: turned about, a matrix's QR is its RQ
+    Q, U = np.linalg.qr(projection[::-1, :3].T)
+    intrinsic, rotation = np.triu(U.T[::-1, ::-1]), Q.T[::-1]
+    signs = np.where(np.diag(intrinsic) < 0, -1.0, 1.0)
+    # a mirror stays in K
+    signs[0] *= np.linalg.det(rotation) * signs.prod()
+    intrinsic, rotation = intrinsic * signs, signs[:, None] * rotation
     translation = np.linalg.solve(intrinsic, projection[:, 3])
     return np.column_stack([intrinsic, np.zeros(3)]), from_parts(rotation, translation)
 
@@ -62,9 +61,8 @@ class Camera:
     Attributes:
         projection: (3, 4) from homogeneous points in the camera frame (metres; x right, y down, z forward) to
             homogeneous pixels; pixel centres lie at integer coordinates. A (3, 3) intrinsic matrix K is taken as
-            [K | 0], a matrix of negative sign, which projects alike, as its negative, and one of which the third row
-            is not the depth, K [R | t] for points of the lidar, as K; its [R | t] then comes after `T_camera_lidar`,
-            which holds both.
+            [K | 0], -K, which projects alike, as its negative, and one that turns points,
+            K [R | t] for points of the lidar, as K; its [R | t] then comes after `T_camera_lidar`, which holds both.
         T_camera_lidar: (4, 4) rigid transform from lidar to camera coordinates, column vectors.
         distortion: How the lens departs from a pinhole; nothing by default, as in rectified images. With one,
             `projection` is the intrinsic matrix K of the raw image.
@@ -102,7 +100,7 @@ class Camera:
                 f"projection: the last column is {projection[:, 3].tolist()}, expected zeros beside a distortion; pass "
                 "the intrinsic matrix K of the raw image, or leave the distortion out for a rectified one"
             )
-        if projection[2, :2].any():
+        if np.tril(projection[:, :3], -1).any():
             # up, and how far away points are, go by the camera's own frame
             projection, extrinsic = _taken_apart(projection)
             self._hold(projection, extrinsic @ transform)

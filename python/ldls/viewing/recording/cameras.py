@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.camera import Camera
+from ldls.camera.rigid import from_parts, inverse
 from ldls.errors import InputError
 from ldls.view import SeenView
 from ldls.viewing.recording.stream import Entity, rerun
@@ -27,15 +28,12 @@ def pinhole_of(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
     K (3, 3) is upper triangular, of pixels whose centres lie at halves. T_lidar_camera (4, 4) is the pose: the rigid
     transform from camera (x right, y down, z forward) to lidar coordinates. The last column of a projection K [I | t],
-    as of KITTI's P2, and a rotation in it go to the pose.
+    as of KITTI's P2, goes to the pose.
     """
-    K, R = _upper_triangular_times_rotation(camera.projection[:, :3])
-    T_pinhole_camera = np.eye(4)
-    T_pinhole_camera[:3, :3] = R
-    T_pinhole_camera[:3, 3] = np.linalg.solve(K, camera.projection[:, 3])
-    K /= K[2, 2]
+    K = camera.projection[:, :3] / camera.projection[2, 2]
+    T_pinhole_camera = from_parts(np.eye(3), np.linalg.solve(camera.projection[:, :3], camera.projection[:, 3]))
     K[:2] += PIXEL_CENTRE * K[2]
-    return K, np.asarray(np.linalg.inv(T_pinhole_camera @ camera.T_camera_lidar), np.float64)
+    return K, inverse(T_pinhole_camera @ camera.T_camera_lidar)
 
 
 def log_camera(entity: Entity, camera: Camera, image_size: tuple[int, int]) -> None:
@@ -83,14 +81,3 @@ def log_masks(entity: Entity, seen: SeenView, ids: NDArray[np.uint16]) -> None:
 def log_pixels(entity: Entity, uv_px: NDArray[np.float64], **fields: Any) -> None:  # noqa: ANN401
     """Log points on an image: (n, 2) pixels, and their colours, class ids and the like as `rerun.Points2D` has them."""
     entity.log(rerun().Points2D((uv_px + PIXEL_CENTRE).astype(np.float32), **fields))
-
-
-def _upper_triangular_times_rotation(
-    matrix: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """K and R of K R = `matrix`, K upper triangular with a positive diagonal, R orthogonal (RQ decomposition)."""
-    # numpy has QR only: turned about, a matrix's QR is its RQ
-    Q, U = np.linalg.qr(matrix[::-1].T)
-    K, R = U.T[::-1, ::-1], Q.T[::-1]
-    signs = np.diag(np.where(np.diag(K) < 0, -1.0, 1.0))
-    return K @ signs, signs @ R
