@@ -10,6 +10,7 @@ from ldls.errors import ParameterError
         pytest.param({}, {}, id="no classes"),
         pytest.param({0: "person", 2: "car"}, {0: 1, 2: 3}, id="names of COCO"),
         pytest.param({0: "Car", 1: " Potted Plant"}, {0: 3, 1: 64}, id="capitals and spaces"),
+        pytest.param({0: "traffic_light", 1: "traffic  light"}, {0: 10, 1: 10}, id="_ and blanks"),
         pytest.param({0: "cone", 1: "dog", 7: "drone"}, {0: 100, 1: 18, 7: 107}, id="names of its own"),
         pytest.param(
             dict(enumerate(COCO_NAMES.values())), dict(enumerate(CONTIGUOUS_IDS)), id="COCO's 80 classes without gaps"
@@ -31,6 +32,7 @@ def test_own_ids_never_meet_those_of_coco():
     [
         pytest.param([(3, "car"), (1, "person"), (3, "car")], [3, 1, 3], id="one numbering"),
         pytest.param([(1, "car"), (2, "Car ")], [1, 1], id="one name of two numbers"),
+        pytest.param([(100, "road sign"), (101, "road_sign")], [100, 100], id="one name with _ and a blank"),
         pytest.param([(100, "cone"), (100, "sign"), (101, "cone")], [100, 101, 100], id="two names of one number"),
         pytest.param([(100, "cone"), (100, "sign"), (101, "drum")], [100, 101, 102], id="a number that was given"),
         pytest.param([(2**31 - 1, "cone"), (2**31 - 1, "sign")], [2**31 - 1, 100], id="the greatest number"),

@@ -49,14 +49,14 @@ SYNONYMS: tuple[tuple[str, ...], ...] = (
 """Names of one class in KITTI, COCO, SqueezeSeg, SemanticKITTI and nuScenes; the usual one of several first."""
 
 
-NO_OBJECTS = frozenset(("background", "_background_", "__background__", "__ignore__"))
-"""What results, labelme and networks call what is no object, folded."""
-
-
 def folded(name: str) -> str:
-    """What names of classes are compared by: `name` without capitals and outer blanks."""
-    return name.strip().lower()
+    """What names of classes are compared by: `name` without capitals and outer blanks, and with a blank for `_`."""
+    # KITTI's files, whose fields blanks separate, hold traffic_light
+    return " ".join(name.lower().split()).replace("_", " ")
 
+
+NO_OBJECTS = frozenset(map(folded, ("background", "_background_", "__background__", "__ignore__")))
+"""What results, labelme and networks call what is no object, folded."""
 
 _GROUPS = {folded(name): group for group in SYNONYMS for name in group}
 

@@ -5,6 +5,7 @@ import pytest
 
 import ldls
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
+from ldls.evaluation import ClassSet
 from ldls.io.labels.kitti_objects import (
     KittiObject,
     in_camera_frame,
@@ -229,12 +230,15 @@ def test_names_become_types_of_kitti(small_scene, tmp_path, name, written):
     assert {row.type for row in read_kitti_objects(tmp_path / "a.txt")} == {written}
 
 
-def test_masks_of_names_of_two_words_can_be_read_again(small_scene, tmp_path):
+def test_names_of_two_words_can_be_read_again(small_scene, tmp_path):
     points, masks, camera = small_scene
     plants = ldls.InstanceMasks.from_array(masks.to_array(), categories=[64, 10])
     ldls.save(ldls.segment(points, plants, camera), tmp_path / "a.txt")
     again = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))
     assert [mask.name for mask in again] == ["potted plant", "traffic light"]
+    labeling = read_kitti_boxes(tmp_path / "a.txt", points=points, camera=camera)
+    scored = ClassSet(names=("traffic light", "Potted Plant"))
+    assert set(scored.map(labeling, truth=False).classes) == {0, 1, 2}
 
 
 def test_several_cameras_are_refused(tmp_path):

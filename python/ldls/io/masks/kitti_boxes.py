@@ -67,9 +67,8 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
 
 
 def _ids_by_type(names: Mapping[int, str]) -> dict[str, int]:
-    """Category id of each class, by its name as KITTI's files have it, folded."""
-    # a blank separates fields, so names are written without
-    return {folded(name).replace(" ", "_"): category for category, name in names.items()}
+    """Category id of each class, by its folded name."""
+    return {folded(name): category for category, name in names.items()}
 
 
 def read(path: str | PathLike[str], *, image_size: tuple[int, int], names: Mapping[int, str] | None) -> InstanceMasks:
