@@ -363,7 +363,7 @@ def test_formats_are_asked_for_where_no_file_tells(frames):
         (frames / f"truth/{name}.txt").write_text("")
     outcome = evaluate(frames)
     assert outcome.exit_code == 1
-    assert "may be annotations or kitti-boxes; say which by FORMAT:PATH" in outcome.stderr
+    assert "may be kitti-boxes or annotations; say which by FORMAT:PATH" in outcome.stderr
     outcome = command("evaluate", frames / "mine", f"kitti-boxes:{frames / 'truth'}")
     assert outcome.exit_code == 1
     assert "frame 1: needs its points" in outcome.stderr

@@ -281,7 +281,7 @@ def test_endings_tell_formats(name, format):
 
 def test_what_no_ending_tells_is_asked_for(tmp_path):
     (tmp_path / "empty.txt").write_text("")
-    with pytest.raises(UnsupportedFormatError, match="may be annotations or kitti-boxes; say which by format="):
+    with pytest.raises(UnsupportedFormatError, match="may be kitti-boxes or annotations; say which by format="):
         read_labeling(tmp_path / "empty.txt")
     with pytest.raises(UnsupportedFormatError, match="no format of labels has this name; expected lidarseg"):
         read_labeling("a.bin")

@@ -88,6 +88,7 @@ BOX = "Car -1 3 0 1 2 3 4 1.5 1.6 4 1 1.5 20 0 0.9\n"
         pytest.param(["-1 potted plant\n"], "annotations", id="no instance, two words"),
         pytest.param([BOX], "kitti-boxes", id="16 fields"),
         pytest.param([BOX.rsplit(" ", 1)[0]], "kitti-boxes", id="15 fields"),
+        pytest.param([BOX.replace("Car", "1")], "kitti-boxes", id="a class that is a number"),
         pytest.param(["", "\n", BOX], "kitti-boxes", id="frames without objects first"),
     ],
 )
@@ -104,5 +105,5 @@ def test_notes_beside_labels_are_no_labels(tmp_path):
     assert {name: file.format for name, file in label_files(folder).items()} == {"1": "npz", "2": "label"}
     (folder / "1.npz").unlink()
     (folder / "2.label").unlink()
-    with pytest.raises(UnsupportedFormatError, match=r"README\.txt: may be annotations or kitti-boxes; say which"):
+    with pytest.raises(UnsupportedFormatError, match=r"README\.txt: may be kitti-boxes or annotations; say which"):
         label_files(folder)

@@ -48,10 +48,11 @@ FORMATS: dict[str, Format] = {
     "npz": Format(".npz", read_labeling_npz, ignores=True),
     "label": Format(".label", read_semantic_kitti),
     "squeezeseg": Format(".npy", read_squeezeseg, ignores=True),
-    "annotations": Format(".txt", read_annotations, has_line=is_annotation),
     "kitti-boxes": Format(".txt", read_kitti_boxes, needs_points=True, ignores=True, has_line=is_kitti_object),
+    "annotations": Format(".txt", read_annotations, has_line=is_annotation),
 }
-"""Formats by name; longer endings come before the shorter ones that they end in."""
+"""Formats by name; longer endings come before the shorter ones that they end in, and KITTI's lines, whose class may be a
+number, before annotations, which begin with one."""
 
 SAY_WHICH = "say which by format="
 LISTED = 10
