@@ -273,6 +273,7 @@ def test_arrays_that_do_not_fit(tmp_path, arrays, error, message):
         pytest.param("a.npz", "npz", id="npz"),
         pytest.param("a.label", "label", id="label"),
         pytest.param("a.npy", "squeezeseg", id="npy"),
+        pytest.param("a_LIDARSEG.Bin", "lidarseg", id="capitals"),
     ],
 )
 def test_endings_tell_formats(name, format):

@@ -40,6 +40,17 @@ def test_nuscenes_endings_belong_to_the_format(tmp_path):
     assert frame.name == "token"
 
 
+def test_endings_may_be_capitals(tmp_path):
+    ours = touch(tmp_path / "ours", "Σ.NPZ", "B_PANOPTIC.npz")
+    theirs = touch(tmp_path / "theirs", "Σ.LABEL", "B_Lidarseg.bin")
+    frames, _ = pair_files(ours, theirs)
+    assert [(frame.name, frame.prediction.format, frame.truth.format) for frame in frames] == [
+        ("B", "panoptic", "lidarseg"),
+        ("Σ", "npz", "label"),
+    ]
+    assert label_files(ours / "Σ.NPZ") == {"Σ": LabelFile(ours / "Σ.NPZ", "npz")}
+
+
 def test_frames_without_their_pair_are_listed(tmp_path):
     ours = touch(tmp_path / "ours", "1.npz", "2.npz")
     theirs = touch(tmp_path / "theirs", "2.label", *(f"{n}.label" for n in range(3, 15)))

@@ -51,8 +51,8 @@ FORMATS: dict[str, Format] = {
     "kitti-boxes": Format(".txt", read_kitti_boxes, needs_points=True, ignores=True, has_line=is_kitti_object),
     "annotations": Format(".txt", read_annotations, has_line=is_annotation),
 }
-"""Formats by name; longer endings come before the shorter ones that they end in, and KITTI's lines, whose class may be a
-number, before annotations, which begin with one."""
+"""Formats by name; longer endings come before the shorter ones that they end in, and KITTI's lines, whose class may be
+a number, before annotations, which begin with one."""
 
 SAY_WHICH = "say which by format="
 LISTED = 10
@@ -112,7 +112,7 @@ def guess_format(*paths: str | PathLike[str]) -> str:
         UnsupportedFormatError: No format has this ending, or several have and no line tells which it is.
         FileNotFoundError: A file whose first line is asked for is not there.
     """
-    name = Path(paths[0]).name
+    name = Path(paths[0]).name.lower()
     ending = next((each.ending for each in FORMATS.values() if name.endswith(each.ending)), None)
     fitting = [key for key, each in FORMATS.items() if each.ending == ending]
     if not fitting:
@@ -209,7 +209,7 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
     known = list(dict.fromkeys(each.ending for each in FORMATS.values()))
     for ending in endings:
         names = {entry: _frame_name(entry, known) for entry in entries}
-        new = {name: entry for entry, name in names.items() if name and entry.name == name + ending}
+        new = {name: entry for entry, name in names.items() if name and entry.name[len(name) :].lower() == ending}
         if not new.keys() - files.keys():
             continue
         try:
@@ -232,4 +232,4 @@ def _known(format: str) -> str:
 
 
 def _frame_name(path: Path, endings: list[str]) -> str | None:
-    return next((path.name.removesuffix(ending) for ending in endings if path.name.endswith(ending)), None)
+    return next((path.name[: -len(ending)] for ending in endings if path.name.lower().endswith(ending)), None)
