@@ -123,6 +123,10 @@ def test_las_says_what_it_cannot_hold(result, tmp_path):
     points[7, 1] = 5e5
     with pytest.raises(ldls.LimitError, match="the cloud is 50000. m wide"):
         ldls.save(replace(result, points=points), tmp_path / "a.las")
+    # too far from their middle, rounded, alone
+    points[7:9, 1] = 214748.69, -214747.71
+    with pytest.raises(ldls.LimitError, match="the cloud is 429496 m wide"):
+        ldls.save(replace(result, points=points), tmp_path / "a.las")
     many = tuple(replace(instance, category=70_000) for instance in result.instances)
     with pytest.raises(ldls.LimitError, match="category ids 0 to 70000"):
         ldls.save(replace(result, instances=many), tmp_path / "a.las")

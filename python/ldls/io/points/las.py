@@ -213,7 +213,7 @@ def _check_writable(path: Path, xyz: NDArray[np.float64], categories: NDArray[np
             f"{path}: {(~finite).sum()} of {len(xyz)} points are not finite, the first in row {np.argmin(finite)}; "
             "LAS has no such numbers, save .ply or .npz instead"
         )
-    if len(xyz) and (np.ptp(xyz, axis=0) / 2 > MAX_STEPS * SCALE_M).any():
+    if len(xyz) and (np.abs(xyz - _middle(xyz)) >= MAX_STEPS * SCALE_M).any():
         raise LimitError(f"{path}: the cloud is {np.ptp(xyz, axis=0).max():.0f} m wide, expected at most 429,000 m")
     if len(categories) and not 0 <= categories.min() <= categories.max() <= MAX_CATEGORY:
         raise LimitError(
