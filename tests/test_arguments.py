@@ -11,6 +11,7 @@ import pytest
 import ldls
 from conftest import pinhole
 from ldls import evaluation, stages
+from ldls.segmentation import fit_upright_box
 
 NONSENSE = [
     None, True, -1, 10**400, float("nan"), 1e308, "x", b"x", object(), {}, {"a": 1}, [], [1], ["a"], [None],
@@ -224,6 +225,7 @@ CALLS = {
         {"graph": W.A, "labels": W.z.argmax(axis=1), "points": W.xyz, "part_gap": 0.5},
     ),
     "stages.confidence": (stages.confidence, {"z": W.z, "labels": W.z.argmax(axis=1), "masks": W.masks}),
+    "fit_upright_box": (fit_upright_box, {"points": W.points}),
     "Sweep": (
         ldls.Sweep,
         {"points": W.points, "views": [ldls.View(W.masks, W.camera)], "pose": np.eye(4), "stamp": 0.1},

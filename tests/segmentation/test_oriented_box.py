@@ -71,9 +71,18 @@ def test_a_box_holds_points_in_any_layout():
     assert fit_upright_box(turned_round).yaw == fit_upright_box(points).yaw
 
 
-@pytest.mark.parametrize("points", [np.zeros((0, 3)), np.zeros((4, 2))])
-def test_no_points_have_no_box(points):
-    with pytest.raises(ldls.ShapeError, match="points: expected"):
+@pytest.mark.parametrize(
+    ("points", "error"),
+    [
+        pytest.param(np.zeros((0, 3)), ldls.ShapeError, id="none"),
+        pytest.param(np.zeros((4, 2)), ldls.ShapeError, id="two columns"),
+        pytest.param(np.zeros(3), ldls.ShapeError, id="no rows"),
+        pytest.param([[0, 0, 0], [1, np.nan, 0]], ldls.NonFiniteError, id="NaN"),
+        pytest.param([[0, 0, 0], [1, 0, np.inf]], ldls.NonFiniteError, id="infinite"),
+    ],
+)
+def test_what_has_no_box_is_refused(points, error):
+    with pytest.raises(error, match="points: expected"):
         fit_upright_box(points)
 
 

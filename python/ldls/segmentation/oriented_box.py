@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.checks import checked, numbers
+from ldls.errors import NonFiniteError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,7 +40,8 @@ class OrientedBox:
         return np.asarray(self.center + offsets, np.float64)
 
 
-def fit_upright_box(points: NDArray[np.float64]) -> OrientedBox:
+@checked
+def fit_upright_box(points: ArrayLike) -> OrientedBox:
     """The upright box around (n, 3) points in metres whose sides run along the sides that the lidar saw.
 
     Of 90 headings, one degree apart, it has the one at which points lie nearest to two sides that meet (closeness, of
@@ -48,6 +51,10 @@ def fit_upright_box(points: NDArray[np.float64]) -> OrientedBox:
 
     Raises:
         ShapeError: There are none, or they are no (n, 3).
+        NonFiniteError: One is not finite.
     """
-    center, size, yaw = _ldls.upright_box(np.ascontiguousarray(points, np.float64))
+    xyz = numbers("points", points, np.float64, ("n", 3))
+    if not np.isfinite(xyz).all():
+        raise NonFiniteError("points: expected finite coordinates; leave other rows out first")
+    center, size, yaw = _ldls.upright_box(xyz)
     return OrientedBox(center=np.array(center), size=np.array(size), yaw=yaw)
