@@ -81,7 +81,8 @@ def rectangles(boxes: ArrayLike, size: tuple[int, int]) -> list[_ldls.Rle]:
     if edges.ndim != 2 or edges.shape[1] != 4:
         raise MaskError(f"boxes: expected (M, 4) left, top, right, bottom, got shape {edges.shape}")
     edges = numbers("boxes", edges, np.float64, ("M", 4), error=MaskError)
-    if edges.size and edges.min() >= 0 and edges.max() <= 1 and (edges != np.floor(edges)).any():
+    # one that begins at 0, 0 may be clipped to the corner of its image
+    if edges[:, :2].any() and edges.min() >= 0 and edges.max() <= 1 and (edges != np.floor(edges)).any():
         raise MaskError(
             f"boxes: all {len(edges)} lie within 0 and 1, expected pixels; are they shares of the image? Multiply them "
             "by its width and height"
