@@ -173,6 +173,7 @@ CALLS = {
         {"points": W.points, "camera": W.camera, "image_size": (60, 80), "keep_origin": False, "threads": None},
     ),
     "stages.ground": (stages.ground, {"points": W.xyz, "camera": W.camera, "local_ground": True, "threads": None}),
+    "stages.on_ground": (stages.on_ground, {"heights": W.heights}),
     "stages.in_graph": (stages.in_graph, {"heights": W.heights, "ground_clearance": 0.1}),
     "stages.depth_groups": (
         stages.depth_groups,

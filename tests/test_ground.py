@@ -211,6 +211,11 @@ def test_a_slope_that_bends_is_followed():
     assert np.abs(ldls.stages.ground(points, CAMERA, local_ground=False)).max() < 0.08
 
 
+def test_the_ground_is_within_30_cm_below_and_15_above():
+    heights = [-0.31, -0.29, 0, 0.14, 0.16, np.nan]
+    assert ldls.stages.on_ground(heights).tolist() == [False, True, True, True, False, False]
+
+
 @pytest.mark.parametrize(
     "points",
     [
