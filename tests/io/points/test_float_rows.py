@@ -17,6 +17,7 @@ def rows(n, columns):
     [
         pytest.param("sweep.bin", 4, {}, id="KITTI"),
         pytest.param("sweep.pcd.bin", 5, {}, id="nuScenes"),
+        pytest.param("SWEEP.PCD.BIN", 5, {}, id="nuScenes, in capitals"),
         pytest.param("sweep.bin", 7, {"columns": 7}, id="seven columns"),
     ],
 )
@@ -167,6 +168,13 @@ def test_a_sweep_of_another_width_is_refused_with_its_width(tmp_path, values):
 )
 def test_rows_of_four_are_read_whatever_their_points(tmp_path, n, change):
     values = change(scan(N)[:: N // n][:n]).astype("<f4")
+    values.tofile(tmp_path / "sweep.bin")
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / "sweep.bin"), values)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_a_few_points_of_which_one_is_far_away_are_not_of_other_numbers(tmp_path, n):
+    values = np.array([[1e9, 1.5, 2, 0], [1, 2, 3, 0], [1, 2, 3, 0]], "<f4")[:n]
     values.tofile(tmp_path / "sweep.bin")
     np.testing.assert_array_equal(ldls.read_points(tmp_path / "sweep.bin"), values)
 

@@ -37,12 +37,12 @@ def read(path: Path, *, columns: int | None = None, recover: bool = False) -> ND
 
     Raises:
         TruncatedFileError: The file is empty, or its size is no whole number of rows.
-        FileFormatError: The rows look as if they had another number of columns.
+        FileFormatError: The rows look as if they had another number of columns or were not of little-endian float32.
         ParameterError: `columns` is out of range.
     """
     guessed = columns is None
     if columns is None:
-        columns = 5 if path.name.endswith(".pcd.bin") else 4
+        columns = 5 if path.name.lower().endswith(".pcd.bin") else 4
     if not 3 <= columns <= MAX_COLUMNS:
         raise ParameterError(f"columns: got {columns}, expected 3 to {MAX_COLUMNS}")
     with open_file(path, "file of float32 rows") as file:
@@ -86,7 +86,8 @@ def _check_positions(values: NDArray[np.float32], columns: int) -> None:
         raise _wrong_guess(columns, f"then points lie farther than {FARTHEST_M:.0e} m", likeliest)
     for other in OTHER_NUMBERS:
         numbers = np.frombuffer(values, other, count=values.nbytes // np.dtype(other).itemsize)
-        if any(_are_positions(numbers[: numbers.size // tried * tried], tried) for tried in range(3, MOST_TRIED + 1)):
+        most_tried = min(MOST_TRIED, numbers.size)
+        if any(_are_positions(numbers[: numbers.size // tried * tried], tried) for tried in range(3, most_tried + 1)):
             raise FileFormatError(
                 f"as float32 points lie farther than {FARTHEST_M:.0e} m, as {other!r} none does; write the file anew: "
                 f"numpy.fromfile(path, {other!r}).astype('<f4').tofile(path)"

@@ -49,7 +49,8 @@ def read_points(path: str | PathLike[str], *, columns: int | None = None, recove
     Raises:
         TruncatedFileError: The file ends before its header, or the size of its rows, says.
         CorruptFileError: The file contradicts itself or its format.
-        FileFormatError: It is no regular file, or its rows look as if they had another number of columns.
+        FileFormatError: It is no regular file, or rows of a `.bin` look as if they had another number of columns or
+            were not of little-endian float32.
         UnsupportedFormatError: No format has this suffix, or the file is of a variant that cannot be read.
         ParameterError: `columns` or `recover` is given for another format than `.bin`.
         ImportError: The format needs an extra that is not installed; the message names it.
