@@ -105,25 +105,23 @@ def _doubts(results: Sequence[Segmentation]) -> Iterator[tuple[str, type[Warning
 
 def _doubts_of_views(result: Segmentation) -> Iterator[tuple[str, type[Warning]]]:
     """What is odd about the place of cameras, and the sizes of their images."""
-    far = {}
     for name, seen in _named(result.views):
         size = _doubt_of_size(seen.view)
         if size is not None:
             yield f"{name}: {size}", ImageSizeWarning
         distance = doubt_of_distance(seen.view.camera.T_camera_lidar)
-        if distance is not None:
-            far[name] = (seen, distance)
-    known = result.points[finite_rows(result.points), :3] if far else result.points[:0, :3]
-    if not len(known):
-        return
-    low, high = known.min(axis=0), known.max(axis=0)
-    # those of a map may be far from its origin, and some of a cloud from lidar and camera
-    if not ((low <= 0) & (high >= 0)).all():
-        return
-    for name, (seen, distance) in far.items():
-        place = inverse(seen.view.camera.T_camera_lidar)[:3, 3]
-        if not ((low <= place) & (place <= high)).all():
+        if distance is not None and _is_outside(seen.view.camera, result.points):
             yield f"{name}: {distance}", ScaleWarning
+
+
+def _is_outside(camera: Camera, points: Points) -> bool:
+    """True for a camera outside of a cloud that its lidar is in."""
+    known = points[finite_rows(points), :3]
+    low, high = known.min(axis=0, initial=np.inf), known.max(axis=0, initial=-np.inf)
+    # a lidar is outside of its cloud where that is of a map whose origin is elsewhere, or a part of one
+    places = (np.zeros(3), inverse(camera.T_camera_lidar)[:3, 3])
+    has_lidar, has_camera = (bool(((low <= place) & (place <= high)).all()) for place in places)
+    return has_lidar and not has_camera
 
 
 def _doubt_of_size(view: View) -> str | None:
@@ -147,7 +145,8 @@ def _doubt_of_size(view: View) -> str | None:
         return None
     return (
         f"masks: of an image of {height} x {width}, but the camera's principal point ({u:.1f}, {v:.1f}) is the middle "
-        f"of about {2 * v:.0f} x {2 * u:.0f}; {mend} A camera that knows the size of its image has no such doubt"
+        f"of about {2 * v:.0f} x {2 * u:.0f}; {mend} If the principal point is right, as of "
+        f"an image that was cropped, give the camera image_size=({height}, {width})"
     )
 
 

@@ -386,6 +386,7 @@ def test_masks_of_a_resized_image_are_doubted(size, doubtful):
     if doubtful:
         assert f"camera 0: masks: of an image of {size[0]} x {size[1]}" in said[0]
         assert "(80.0, 60.0) is the middle of about 120 x 160" in said[0]
+        assert f"right, as of an image that was cropped, give the camera image_size={size}" in said[0]
 
 
 def test_a_cloud_of_nans_is_warned_of(small_scene):
