@@ -153,6 +153,7 @@ def test_a_full_disk_is_named_and_the_run_goes_on(tmp_path, small_disk, kind):
     said = " ".join(outcome.output.split())
     assert f"labelled{'.bag' if kind == 'rosbag1' else ''}: " in said
     assert "full while writing the bag" in said or "No space left on device while writing the bag" in said
+    assert "; free space, or write it to another disk" in said
     assert len(list(out.glob("*.npz"))) == 12 and not [path for path in out.iterdir() if "labelled" in path.name]
     subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
     assert run(bag, out, "--formats", "bag").exit_code == 0

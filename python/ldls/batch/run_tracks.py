@@ -219,7 +219,7 @@ def _line(objects: FrameObjects) -> bytes:
 
 
 def digest_of_records(records: Iterable[Record]) -> str:
-    """Digest of all that is made of frames together depends on, as tracks."""
+    """Digest of what is made into tracks, or a labelled bag: results of frames, their windows, stamps and poses."""
     digest = hashlib.sha256(_ldls.__version__.encode())
     for record in records:
         name = file_name(record["frame"], RESULT)

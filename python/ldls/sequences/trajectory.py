@@ -201,7 +201,7 @@ class Trajectory:
 
 
 def is_gap(step_s: float) -> bool:
-    """Whether poses or sweeps so many seconds apart are too far from each other to be joined."""
+    """True where poses or sweeps so many seconds apart are too far from each other to be joined."""
     return not step_s <= LONGEST_GAP_S + SAME_S
 
 

@@ -136,7 +136,7 @@ def _names_bag(path: Path) -> Iterator[None]:
 
 
 def _unwritten(path: Path, code: int | None, found: str) -> OSError:
-    return OSError(code, f"{found} while writing the bag; mend it and try again", str(path))
+    return OSError(code, f"{found} while writing the bag; free space, or write it to another disk", str(path))
 
 
 def _keep_last(latched: bool) -> Any:  # noqa: ANN401
