@@ -82,7 +82,7 @@ def test_frames_that_fail_have_no_rows(few, settings, tmp_path):
 
 
 def test_another_ending_is_refused_before_anything_is_done(few, settings, tmp_path):
-    with pytest.raises(UnsupportedFormatError, match=r"objects\.xlsx: cannot write objects"):
+    with pytest.raises(UnsupportedFormatError, match=r"objects\.xlsx: cannot write '\.xlsx' tables of objects"):
         batch.run(few, tmp_path / "out", settings, objects=tmp_path / "objects.xlsx")
     assert not (tmp_path / "out").exists()
 

@@ -217,7 +217,7 @@ def test_a_map_holds_what_the_tracked_results_leave_standing(drive, tmp_path):
 def test_a_map_without_tracks_or_of_no_format_is_refused_before_anything_is_done(drive, tmp_path):
     with pytest.raises(ParameterError, match=r"map_file: .*map\.ply is without what moves, .* add --track"):
         run_with_map(drive, tmp_path / "out", tmp_path / "map.ply")
-    with pytest.raises(UnsupportedFormatError, match=r"cannot write a map to '\.xyz'"):
+    with pytest.raises(UnsupportedFormatError, match=r"cannot write '\.xyz' maps"):
         run_with_map(drive, tmp_path / "out", tmp_path / "map.xyz", track=True)
     with pytest.raises(FileNotFoundError, match="no such folder to write to"):
         run_with_map(drive, tmp_path / "out", tmp_path / "nowhere/map.ply", track=True)

@@ -108,7 +108,7 @@ def test_segment_writes_a_table_of_the_objects(demo, tmp_path, ending):
 def test_an_unknown_ending_of_the_table_is_refused_before_anything_is_done(demo, tmp_path):
     outcome = command(*arguments(demo[0], tmp_path / "out", objects=tmp_path / "objects.xlsx"))
     assert outcome.exit_code == 1
-    assert "cannot write objects as '.xlsx', expected .csv, .json" in outcome.stderr
+    assert "cannot write '.xlsx' tables of objects, expected .csv, .json" in outcome.stderr
     assert not (tmp_path / "out").exists()
 
 
@@ -281,7 +281,7 @@ def test_a_camera_of_opencv_and_the_lidar_beside_it_give_the_same(demo, tmp_path
             id="cloud as calibration",
         ),
         pytest.param({"masks": "image.png"}, "colours do not tell which instance", id="image as masks"),
-        pytest.param({"points": "image.png"}, "cannot read '.png' files, expected .bin", id="image as points"),
+        pytest.param({"points": "image.png"}, "cannot read '.png' clouds, expected .bin", id="image as points"),
         pytest.param({"points": "calib.txt"}, "calib.txt: line 1: expected a number", id="calibration as points"),
     ],
 )

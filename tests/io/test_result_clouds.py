@@ -276,7 +276,7 @@ def decoded(pypcd4, cloud):
 
 
 def test_maps_have_no_other_formats_and_no_options(places, tmp_path):
-    with pytest.raises(ldls.UnsupportedFormatError, match=r"cannot write a map to '.npz' files, expected .ply, .pcd"):
+    with pytest.raises(ldls.UnsupportedFormatError, match=r"cannot write '.npz' maps, expected .ply, .pcd"):
         ldls.save(places, tmp_path / "a.npz")
     with pytest.raises(ldls.ParameterError, match=r"image_id: no option of .ply maps"):
         ldls.save(places, tmp_path / "a.ply", image_id=1)

@@ -56,15 +56,15 @@ def test_ply_files_hold_points_labels_and_colours(result, tmp_path):
 
 @pytest.mark.parametrize("name", [".npz", ".PLY", ".laz"])
 def test_a_name_that_is_an_ending_is_refused(result, tmp_path, name):
-    with pytest.raises(ldls.UnsupportedFormatError, match=f"{name}: cannot write '' files, expected a name and .npz"):
+    with pytest.raises(ldls.UnsupportedFormatError, match=f"{name}: cannot write '' results, expected a name and .npz"):
         ldls.save(result, tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_unknown_suffixes_are_refused(result, tmp_path):
-    with pytest.raises(ldls.UnsupportedFormatError, match="expected a name and .npz, .label, .ply"):
+    with pytest.raises(ldls.UnsupportedFormatError, match="cannot write '.xyz' results, expected .npz, .label, .ply"):
         ldls.save(result, tmp_path / "a.xyz")
-    with pytest.raises(ldls.UnsupportedFormatError, match="cannot write '.bin' files"):
+    with pytest.raises(ldls.UnsupportedFormatError, match="cannot write '.bin' results"):
         ldls.save(result, tmp_path / "a.bin")
 
 

@@ -33,7 +33,8 @@ from ldls.io import read_result, save
 from ldls.io.files import LARGE_BYTES, open_file, refuse_link, sweep, whole_file
 from ldls.io.labels.semantic_kitti import MOST_INSTANCES as MOST_TRACKS
 from ldls.io.objects import DECIMALS, FrameObjects
-from ldls.io.results import map_writer
+from ldls.io.options import of_ending
+from ldls.io.results import MAP_WRITERS
 from ldls.segmentation import Segmentation
 from ldls.sequences import LabelledMap, Sweep, Tracker
 from ldls.viewing.formats import RESULT, TRACKS, file_name
@@ -72,7 +73,7 @@ class RunTracks:
                 f"frame {TRACKS!r}: its files and {TRACKS_TABLE} may be one; rename it, or do not track"
             )
         if map_file is not None:
-            map_writer(map_file)
+            of_ending(map_file, MAP_WRITERS, "write", "maps")
         self._folder, self.folder, self._map = folder, folder / TRACKS, map_file
         self._formats = {"label", *formats}
 

@@ -8,14 +8,13 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 from typing import IO, Any
 
 import ldls._ldls as _ldls
 from ldls.categories import class_id
 from ldls.checks import checked
-from ldls.errors import UnsupportedFormatError
 from ldls.io.files import whole_file
+from ldls.io.options import of_ending
 from ldls.segmentation import Segmentation
 from ldls.segmentation.object_rows import COLUMNS, Row
 from ldls.view import camera_names
@@ -75,10 +74,7 @@ def objects_writer(path: str | PathLike[str]) -> Callable[[Iterable[FrameObjects
     Raises:
         UnsupportedFormatError: No table has this ending.
     """
-    path = Path(path)
-    writer = WRITERS.get(path.suffix.lower())
-    if writer is None:
-        raise UnsupportedFormatError(f"{path}: cannot write objects as {path.suffix!r}, expected {', '.join(WRITERS)}")
+    writer = of_ending(path, WRITERS, "write", "tables of objects")
 
     def write(frames: Iterable[FrameObjects]) -> None:
         with whole_file(path) as file:

@@ -1,12 +1,37 @@
-"""Options of the reader or writer of one format, held against those that it has."""
+"""The reader or writer that the name of a file chooses, and its options, held against those that it has."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
+from os import PathLike
+from pathlib import Path
+from typing import TypeVar
 
-from ldls.errors import ParameterError
+from ldls.errors import ParameterError, UnsupportedFormatError
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def of_ending(path: str | PathLike[str], known: Mapping[str, _Function], verb: str, what: str) -> _Function:
+    """Return the reader or writer that has the ending of `path`, the longest where several fit, as _panoptic.npz.
+
+    Args:
+        path: The file.
+        known: Readers or writers by their endings.
+        verb: "read" or "write", for messages.
+        what: What they read or write, as "masks".
+
+    Raises:
+        UnsupportedFormatError: There is none, or the name is an ending alone.
+    """
+    path = Path(path)
+    endings = [ending for ending in known if path.suffix and path.name.lower().endswith(ending)]
+    if not endings:
+        expected = f"expected {'' if path.suffix else 'a name and '}{', '.join(known)}"
+        raise UnsupportedFormatError(f"{path}: cannot {verb} {path.suffix!r} {what}, {expected}")
+    return known[max(endings, key=len)]
 
 
 def check_options(place: str, function: Callable[..., object], given: Iterable[str]) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ from ldls.checks import checked
 from ldls.errors import UnsupportedFormatError
 from ldls.io import result_npz, tables
 from ldls.io.labels import kitti_objects, nuscenes_labels, semantic_kitti
-from ldls.io.masks.formats import write_masks
-from ldls.io.options import check_options
+from ldls.io.masks.formats import WRITERS as MASK_WRITERS
+from ldls.io.options import check_options, of_ending
 from ldls.io.points import las, pcd, ply
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
@@ -47,6 +47,12 @@ MAP_WRITERS: dict[str, Callable[[Path, LabelledMap], None]] = {
     ".laz": las.write,
 }
 """Writers of maps by the ending of the name."""
+WRITERS: dict[str, tuple[type, Mapping[str, Callable[..., None]]]] = {
+    "results": (Segmentation, dict(FORMATS.values())),
+    "maps": (LabelledMap, MAP_WRITERS),
+    "masks": (InstanceMasks, MASK_WRITERS),
+}
+"""What is written, and by what, by the ending of the name."""
 
 
 @checked
@@ -93,37 +99,7 @@ def save(thing: Segmentation | InstanceMasks | LabelledMap, path: str | PathLike
         ImportError: The format needs an extra that is not installed; the message names it.
     """
     path = Path(path)
-    if isinstance(thing, InstanceMasks):
-        write_masks(path, thing, **options)
-        return
-    if isinstance(thing, LabelledMap):
-        _save_map(thing, path, options)
-        return
-    # a name that is an ending has none
-    fitting = [each for each in FORMATS.values() if path.suffix and path.name.lower().endswith(each.ending)]
-    if not fitting:
-        known = ", ".join(each.ending for each in FORMATS.values())
-        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} files, expected a name and {known}")
-    writer = max(fitting, key=lambda each: len(each.ending)).write
-    check_options(f"{path.suffix} results ({path})", writer, options)
-    writer(path, thing)
-
-
-def map_writer(path: Path) -> Callable[[Path, LabelledMap], None]:
-    """The writer of a map to files with the ending of `path`.
-
-    Raises:
-        UnsupportedFormatError: There is none.
-    """
-    writer = MAP_WRITERS.get(path.suffix.lower())
-    if writer is None:
-        raise UnsupportedFormatError(
-            f"{path}: cannot write a map to {path.suffix!r} files, expected {', '.join(MAP_WRITERS)}"
-        )
-    return writer
-
-
-def _save_map(places: LabelledMap, path: Path, options: Mapping[str, object]) -> None:
-    writer = map_writer(path)
-    check_options(f"{path.suffix} maps ({path})", writer, options)
-    writer(path, places)
+    what, writers = next((what, writers) for what, (kind, writers) in WRITERS.items() if isinstance(thing, kind))
+    writer = of_ending(path, writers, "write", what)
+    check_options(f"{path.suffix} {what} ({path})", writer, options)
+    writer(path, thing, **options)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from ldls.errors import UnsupportedFormatError
 from ldls.io.files import whole_file
 from ldls.io.images import png_of
+from ldls.io.options import of_ending
 from ldls.segmentation import Segmentation
 from ldls.viewing.birds_eye import birds_eye_view
 from ldls.viewing.comparison import comparison
@@ -58,9 +58,7 @@ def check_picture(path: str | PathLike[str]) -> None:
     Raises:
         UnsupportedFormatError: The name does not end in `.png`.
     """
-    path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise UnsupportedFormatError(f"{path}: cannot write {path.suffix!r} pictures, expected .png")
+    of_ending(path, {".png": png_of}, "write", "pictures")
 
 
 def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:

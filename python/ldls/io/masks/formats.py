@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ldls.checks import checked
 from ldls.errors import UnsupportedFormatError, within
 from ldls.io.masks import instance_png, json_file, npz, numpy_stack, png_folder, text
-from ldls.io.options import check_options
+from ldls.io.options import check_options, of_ending
 from ldls.masks import InstanceMasks
 from ldls.masks.pixels import check_same_size, checked_size
 
@@ -30,8 +30,6 @@ WRITERS: dict[str, Callable[..., None]] = {
     ".npz": npz.write,
     ".npy": numpy_stack.write,
 }
-
-_Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 @checked
@@ -71,7 +69,9 @@ def read_masks(
     """
     path = Path(path)
     is_folder = path.is_dir() and path.suffix.lower() not in READERS
-    reader: Callable[..., InstanceMasks] = png_folder.read if is_folder else _of_suffix(path, READERS, "read")
+    if path.suffix.lower() == ".xml" and not is_folder:
+        raise UnsupportedFormatError(f"{path}: cannot read masks of CVAT, export COCO 1.0")
+    reader: Callable[..., InstanceMasks] = png_folder.read if is_folder else of_ending(path, READERS, "read", "masks")
     options = {
         "image_id": image_id,
         "instance_axis": instance_axis,
@@ -89,25 +89,3 @@ def read_masks(
     with within(path):
         check_same_size(masks.image_size, size)
     return masks
-
-
-def write_masks(path: str | PathLike[str], masks: InstanceMasks, **options: Any) -> None:  # noqa: ANN401
-    """Write `masks` in the format of the suffix of `path`; options are those of the format's writer.
-
-    Raises:
-        UnsupportedFormatError: No format has this suffix.
-        ParameterError: The format has no such option.
-        MaskError: The format cannot keep these masks.
-    """
-    path = Path(path)
-    writer = _of_suffix(path, WRITERS, "write")
-    check_options(f"{path.suffix} masks ({path})", writer, options)
-    writer(path, masks, **options)
-
-
-def _of_suffix(path: Path, known: Mapping[str, _Function], verb: str) -> _Function:
-    function = known.get(path.suffix.lower())
-    if function is None:
-        hint = "; of CVAT, export COCO 1.0" if path.suffix.lower() == ".xml" else ""
-        raise UnsupportedFormatError(f"{path}: cannot {verb} {path.suffix!r} masks, expected {', '.join(known)}{hint}")
-    return function

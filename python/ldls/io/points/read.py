@@ -8,9 +8,10 @@ from pathlib import Path
 
 from ldls.checks import checked
 from ldls.cloud import Points, as_points
-from ldls.errors import ParameterError, UnsupportedFormatError, within
+from ldls.errors import ParameterError, within
 from ldls.io.arrays import read_npy
 from ldls.io.files import open_file
+from ldls.io.options import of_ending
 from ldls.io.points import float_rows, las, pcd, ply, text
 
 
@@ -57,12 +58,11 @@ def read_points(path: str | PathLike[str], *, columns: int | None = None, recove
         FileNotFoundError: There is no such file.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in READERS:
-        with open_file(path, "cloud"):
-            raise UnsupportedFormatError(f"cannot read {path.suffix!r} files, expected {', '.join(READERS)}")
-    if suffix == ".bin":
-        return READERS[suffix](path, columns=columns, recover=recover)
+    # what is missing or a folder is told so, whatever its name
+    with open_file(path, "cloud"):
+        reader = of_ending(path, READERS, "read", "clouds")
+    if reader is float_rows.read:
+        return reader(path, columns=columns, recover=recover)
     if columns is not None or recover:
         raise ParameterError(f"columns, recover: they are for .bin files alone, got {path.name}; leave them out")
-    return READERS[suffix](path)
+    return reader(path)
