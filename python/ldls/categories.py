@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from itertools import count
 
+from ldls.checks import did_you_mean
 from ldls.errors import ParameterError
 
 COCO_NAMES: dict[int, str] = {
@@ -137,8 +137,6 @@ def _ids(wanted: int | str, names: Mapping[int, str]) -> list[int]:
     found = found or [category for category, name in names.items() if folded(name) == asked]
     if found:
         return found
-    own = own_name(str(wanted), by_name, {})
-    near = [own] if own is not None else get_close_matches(folded(str(wanted)), by_name, n=1)
+    near = did_you_mean(own_name(str(wanted), by_name, {}) or str(wanted), names.values())
     some = ", ".join(list(names.values())[:8]) + (", ..." if len(names) > 8 else "")
-    hint = f"did you mean {by_name[near[0]]!r}?" if near else f"expected one of {some}"
-    raise ParameterError(f"categories: {wanted!r} is unknown; {hint}")
+    raise ParameterError(f"categories: {wanted!r} is unknown{near or f'; expected one of {some}'}")

@@ -80,8 +80,8 @@ def test_pictures_are_a_format(few, tmp_path):
 @pytest.mark.parametrize(
     ("ending", "hint"),
     [
-        pytest.param("lable", "did you mean label?", id="a slip"),
-        pytest.param(".ply", "did you mean ply?", id="with a dot"),
+        pytest.param("lable", "did you mean 'label'?", id="a slip"),
+        pytest.param(".ply", "did you mean 'ply'?", id="with a dot"),
         pytest.param("42", "expected some of npz, label, ply", id="nothing like it"),
     ],
 )

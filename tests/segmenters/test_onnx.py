@@ -260,7 +260,7 @@ def test_models_of_no_known_kind(inputs, outputs, match, tmp_path):
         pytest.param({"min_score": 1.5}, "min_score: got 1.5", id="score above 1"),
         pytest.param({"min_score": NAN}, "min_score: got", id="score NaN"),
         pytest.param({"threads": 0}, "threads: got 0", id="no threads"),
-        pytest.param({"kind": "yolov9"}, "expected mask-rcnn-zoo, mask-rcnn, yolo", id="unknown kind"),
+        pytest.param({"kind": "yolov9"}, "expected one of mask-rcnn-zoo, mask-rcnn, yolo", id="unknown kind"),
         pytest.param({"providers": ["NoSuchProvider"]}, "expected some of .*CPUExecution", id="unknown provider"),
     ],
 )

@@ -49,7 +49,7 @@ def test_torchvision_is_opened():
 @pytest.mark.parametrize(
     ("spec", "match"),
     [
-        pytest.param("onx:model.onnx", "did you mean onnx:model.onnx", id="misspelt"),
+        pytest.param("onx:model.onnx", "did you mean 'onnx'", id="misspelt"),
         pytest.param("model.onnx", "expected onnx:model.onnx, torchvision or", id="a bare path"),
         pytest.param("C:\\model.onnx", "is unknown", id="a bare path of Windows"),
         pytest.param("", "'' is unknown", id="empty"),

@@ -107,7 +107,7 @@ def test_recordings_and_entities_have_names_of_their_own(small_scene, tmp_path) 
 
 
 def test_an_unknown_way_to_log_contexts_is_refused() -> None:
-    with pytest.raises(ldls.ParameterError, match="contexts: got 'late', expected static, timed, held"):
+    with pytest.raises(ldls.ParameterError, match="contexts: got 'late', expected one of static, timed, held"):
         Recording(rr.RecordingStream("test"), contexts="late")
 
 

@@ -149,7 +149,7 @@ def test_a_picture_without_width_is_refused(result) -> None:
 
 
 def test_an_unknown_stage_is_refused(result) -> None:
-    with pytest.raises(ldls.ParameterError, match="stage: got 'diffuse', expected direct, diffused, final"):
+    with pytest.raises(ldls.ParameterError, match="stage: got 'diffuse', expected one of direct, diffused, final"):
         overlay(result, stage="diffuse")
 
 

@@ -11,6 +11,7 @@ from ldls.batch.frame_work import FrameWork
 from ldls.batch.local import run_local
 from ldls.batch.ray_engine import RayCluster, run_ray
 from ldls.batch.window import Frames, Outcome
+from ldls.checks import choice
 from ldls.errors import ParameterError
 
 MAX_WORKERS = 1024
@@ -67,6 +68,4 @@ def open_engine(engine: str | Engine, options: EngineOptions) -> Engine:
     """
     if not isinstance(engine, str):
         return engine
-    if engine not in ENGINES:
-        raise ParameterError(f"engine: got {engine!r}, expected one of {', '.join(ENGINES)}")
-    return ENGINES[engine](options)
+    return ENGINES[choice("engine", engine, ENGINES)](options)

@@ -14,6 +14,7 @@ from ldls.checks.values import (
     shown,
     whole_number,
 )
+from ldls.checks.words import choice, did_you_mean
 
 __all__ = [
     "as_array",
@@ -21,6 +22,8 @@ __all__ = [
     "as_python",
     "checked",
     "checked_as",
+    "choice",
+    "did_you_mean",
     "hold_python_values",
     "numbers",
     "shown",

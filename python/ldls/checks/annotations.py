@@ -7,12 +7,12 @@ import inspect
 import itertools
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from numbers import Real
 from os import PathLike
 from typing import Any, Literal, TypeGuard, TypeVar, Union, cast, get_args, get_origin
 
 from ldls.checks.values import is_of_numpy, is_whole, loaded, shown
+from ldls.checks.words import did_you_mean
 from ldls.errors import InputError, ParameterError
 
 MAKERS = {
@@ -213,10 +213,9 @@ def _is_iterable(value: object) -> bool:
 
 def _unknown(word: str, callee: Callable[..., Any], parameters: Iterable[str]) -> TypeError:
     known = [name for name in parameters if name not in ("self", "cls")]
-    near = get_close_matches(word, known, n=1, cutoff=0.5)
-    hint = f"did you mean {near[0]!r}?" if near else f"expected {', '.join(known) or 'none'}"
+    hint = did_you_mean(word, known) or f"; expected {', '.join(known) or 'none'}"
     name = callee.__qualname__.removesuffix(".__init__")
-    return TypeError(f"{name}() got an unexpected keyword argument {word!r}; {hint}")
+    return TypeError(f"{name}() got an unexpected keyword argument {word!r}{hint}")
 
 
 def _refused(name: str, value: object, kind: _Kind, error: type[InputError] | None) -> InputError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Distortion
 from ldls.camera.rigid import as_matrix
+from ldls.checks import did_you_mean
 from ldls.errors import CorruptFileError, ParameterError, within
 from ldls.io.files import open_file
 
@@ -230,9 +230,8 @@ def _check(place: str, content: Any, keys: Mapping[str, tuple[type, ...]], *, ne
         raise ParameterError(f"{place}: expected a table, got {content!r}")
     for key, value in content.items():
         if key not in keys:
-            close = difflib.get_close_matches(key, keys, n=1)
-            hint = f"; did you mean {close[0]}?" if close else ""
-            raise ParameterError(f"{place}: unknown key {key!r}, expected {', '.join(keys)}{hint}")
+            expected = f"expected {', '.join(keys)}{did_you_mean(key, keys)}"
+            raise ParameterError(f"{place}: unknown key {key!r}, {expected}")
         if type(value) not in keys[key]:
             expected = " or ".join(KINDS[kind] for kind in keys[key])
             raise ParameterError(f"{place}: {key} is {value!r}, expected {expected}")

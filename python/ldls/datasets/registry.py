@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
 
+from ldls.checks import choice
 from ldls.datasets.folder import FolderSource
 from ldls.datasets.frame import Source
 from ldls.datasets.kitti_object import KittiObjectSource
@@ -16,7 +16,7 @@ from ldls.datasets.kitti_raw import KittiRawSource
 from ldls.datasets.nuscenes import NuScenesSource
 from ldls.datasets.nuscenes_frame import NuScenesFrameSource
 from ldls.datasets.rosbag import RosBag
-from ldls.errors import ParameterError, SourceError
+from ldls.errors import SourceError
 from ldls.io.options import check_options
 
 
@@ -79,11 +79,7 @@ def open_source(
     path = Path(path)
     if not path.exists():
         raise FileNotFoundError(f"{path}: there is no such file or folder")
-    if kind is not None and kind not in SOURCES:
-        near = get_close_matches(kind, SOURCES, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(SOURCES)}{hint}")
-    source = SOURCES[guess_kind(path) if kind is None else kind]
+    source = SOURCES[guess_kind(path) if kind is None else choice("kind", kind, SOURCES)]
     known = check_options(source.kind, source, options)
     options |= {name: value for name, value in (("truth", truth), ("poses", poses)) if name in known}
     return source(path, **options)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import TypeVar
 
+from ldls.checks import did_you_mean
 from ldls.errors import ParameterError, UnsupportedFormatError
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
@@ -50,7 +50,5 @@ def check_options(place: str, function: Callable[..., object], given: Iterable[s
     for option in given:
         if option not in known:
             expected = f"expected {', '.join(known)}" if known else "they have none"
-            near = get_close_matches(option, known, n=1)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise ParameterError(f"{option}: no option of {place}; {expected}{hint}")
+            raise ParameterError(f"{option}: no option of {place}; {expected}{did_you_mean(option, known)}")
     return known

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls._optional import require
+from ldls.checks import choice
 from ldls.errors import FileFormatError, ParameterError, ShapeError, UnsupportedFormatError, within
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes, coco_classes, contiguous_coco_classes, named_classes
@@ -96,7 +97,7 @@ class OnnxSegmenter:
         file = read_onnx(path)
         signature = Signature.of(str(file.path), file.model)
         self._image = image_input(signature)
-        self.kind = _kind(signature) if kind is None else _named_kind(kind)
+        self.kind = _kind(signature) if kind is None else choice("kind", kind, KINDS)
         self._family = KINDS[self.kind].family(signature, _by_class(names))
         classes = self._family.classes
         self.names = None if classes is None else classes.names
@@ -180,12 +181,6 @@ def _kind(signature: Signature) -> str:
             "docs/segmenters.md says how to export one"
         )
     return family
-
-
-def _named_kind(kind: str) -> str:
-    if kind not in KINDS:
-        raise ParameterError(f"kind: got {kind!r}, expected {', '.join(KINDS)}")
-    return kind
 
 
 def _by_class(names: Mapping[int, str] | Sequence[str] | None) -> Names | None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ldls.checks import did_you_mean
 from ldls.errors import ParameterError
 from ldls.io.masks.kitti_boxes import KITTI_NAMES
 from ldls.segmenters.boxes import BoxSegmenter
@@ -64,9 +64,8 @@ def open_segmenter(spec: str, *, min_score: float | None = None, **options: Any)
     """
     name, _, argument = spec.partition(":")
     if name not in SEGMENTERS:
-        near = get_close_matches(name, SEGMENTERS, n=1)
-        hint = f"did you mean {EXAMPLES[near[0]]}? " if near else ""
-        raise ParameterError(f"segmenter: {spec!r} is unknown; {hint}expected {', '.join(EXAMPLES.values())}")
+        expected = f"expected {', '.join(EXAMPLES.values())}{did_you_mean(name, SEGMENTERS)}"
+        raise ParameterError(f"segmenter: {spec!r} is unknown; {expected}")
     if not argument and name not in WITHOUT_ARGUMENT:
         raise ParameterError(f"segmenter: {spec!r} names no file, expected {EXAMPLES[name]}")
     if min_score is not None:

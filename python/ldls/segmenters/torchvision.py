@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls._optional import require
-from ldls.errors import ParameterError
+from ldls.checks import choice
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import coco_classes
 from ldls.segmenters.crops import Crop, assemble
@@ -57,7 +56,7 @@ class TorchvisionSegmenter:
         self.names = self._classes.names
         self._torch = require("torch", "torch")
         models = require("torchvision", "torch").models
-        _check_name(name, mask_models())
+        choice("name", name, mask_models())
         self.device = device or ("cuda" if self._torch.cuda.is_available() else "cpu")
         # without this, random weights would still fetch those of the backbone
         backbone = {"weights_backbone": None} if weights is None else {}
@@ -105,10 +104,3 @@ def mask_models() -> list[str]:
     """
     models = require("torchvision", "torch").models
     return [name for name in models.list_models(module=models.detection) if name.startswith("mask")]
-
-
-def _check_name(name: str, known: list[str]) -> None:
-    if name not in known:
-        near = get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise ParameterError(f"name: {name!r} is no mask model; {hint}expected one of {', '.join(known)}")

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ldls.checks import hold_python_values
+from ldls.checks import choice, hold_python_values
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.kitti_layout import check_there, write_kitti, write_lines
@@ -168,9 +168,8 @@ def suite_orders(part: str = "validation") -> list[FrameOrder]:
     Raises:
         ParameterError: There is no such part.
     """
-    if part not in SUITE_SEEDS:
-        raise ParameterError(f"suite: got {part!r}, expected one of {', '.join(SUITE_SEEDS)}")
-    return seeded_orders(SUITE_SEEDS[part], segmenter=SUITE_SEGMENTER, sensors=SUITE_SENSORS)
+    seeds = SUITE_SEEDS[choice("suite", part, SUITE_SEEDS)]
+    return seeded_orders(seeds, segmenter=SUITE_SEGMENTER, sensors=SUITE_SENSORS)
 
 
 def seeded_orders(

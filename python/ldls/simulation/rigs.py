@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ldls.camera import Camera, Distortion
+from ldls.checks import choice
 from ldls.cloud import Floats
-from ldls.errors import CalibrationError, ParameterError
+from ldls.errors import CalibrationError
 from ldls.simulation.lidars import LIDARS, Lidar
 
 STEPS = 30
@@ -181,8 +182,4 @@ def make_rig(*, lidar: str = "hdl-64e", camera: str = "kitti") -> Rig:
     Raises:
         ParameterError: A name is unknown.
     """
-    if lidar not in LIDARS:
-        raise ParameterError(f"lidar: got {lidar!r}, expected one of {', '.join(LIDARS)}")
-    if camera not in MOUNTS:
-        raise ParameterError(f"camera: got {camera!r}, expected one of {', '.join(MOUNTS)}")
-    return Rig(LIDARS[lidar], *MOUNTS[camera])
+    return Rig(LIDARS[choice("lidar", lidar, LIDARS)], *MOUNTS[choice("camera", camera, MOUNTS)])

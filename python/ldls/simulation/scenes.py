@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.errors import ParameterError
+from ldls.checks import choice
 from ldls.simulation.layouts import LAYOUTS
 from ldls.simulation.plan import Plan
 from ldls.simulation.scene_object import SceneObject
@@ -69,9 +69,7 @@ def make_plan(seed: int, *, kind: str) -> Plan:
     Raises:
         ParameterError: There is no such kind.
     """
-    if kind not in LAYOUTS:
-        raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(LAYOUTS)}")
-    return LAYOUTS[kind](np.random.default_rng(seed))
+    return LAYOUTS[choice("kind", kind, LAYOUTS)](np.random.default_rng(seed))
 
 
 def build(plan: Plan) -> Scene:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.checks import did_you_mean
 from ldls.errors import ParameterError
 from ldls.io import save
 from ldls.io.results import FORMATS
@@ -46,9 +46,8 @@ def check_formats(formats: Sequence[str], *, of_run: bool = False) -> None:
         if word == BAG and not of_run:
             raise ParameterError(f"formats: {BAG} is of a whole run; label the ROS bag with `ldls run`")
         if word not in known:
-            near = get_close_matches(word.lstrip("."), known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"expected some of {', '.join(known)}"
-            raise ParameterError(f"formats: {word!r} is unknown; {hint}")
+            hint = did_you_mean(word, known) or f"; expected some of {', '.join(known)}"
+            raise ParameterError(f"formats: {word!r} is unknown{hint}")
 
 
 def file_name(frame: str, word: str) -> str:

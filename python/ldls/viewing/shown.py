@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ldls.checks import as_array, shown
-from ldls.errors import InputError, ParameterError
+from ldls.checks import as_array, choice, shown
+from ldls.errors import InputError
 from ldls.palette import Colour, as_tuples, label_colours
 from ldls.segmentation import Segmentation
 
@@ -50,11 +50,9 @@ class Shown:
         Raises:
             ParameterError: There is no such stage.
         """
-        if stage not in STAGES:
-            raise ParameterError(f"stage: got {stage!r}, expected {', '.join(STAGES)}")
         return cls(
             result=result,
-            labels=getattr(result, STAGES[stage]),
+            labels=getattr(result, STAGES[choice("stage", stage, STAGES)]),
             colours=as_tuples(label_colours(result.instances)[1:]),
             names=names_of(result),
             marked=np.zeros(len(result.labels), bool) if marked is None else marked,

@@ -29,7 +29,7 @@ def test_capitals_do_not_count_in_the_research_layout(tmp_path):
 def test_the_research_layout_knows_only_cocos_categories(tmp_path):
     with pytest.raises(ldls.MaskError, match=r"mask \d: category 10\d '.*' is not COCO's"):
         ldls.save(random_masks(1), tmp_path / "masks.npz", layout="research")
-    with pytest.raises(ldls.ParameterError, match="layout: got 'dense', expected runs or research"):
+    with pytest.raises(ldls.ParameterError, match="layout: got 'dense', expected one of runs, research"):
         ldls.save(random_masks(1), tmp_path / "masks.npz", layout="dense")
     assert list(tmp_path.iterdir()) == []
 

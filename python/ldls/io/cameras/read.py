@@ -10,8 +10,8 @@ from typing import Any
 
 from ldls.camera import Camera
 from ldls.camera.fields import Fields
-from ldls.checks import checked
-from ldls.errors import CalibrationError, ParameterError, UnsupportedFormatError
+from ldls.checks import checked, choice
+from ldls.errors import CalibrationError, UnsupportedFormatError
 from ldls.io.cameras import kalibr, kitti, opencv
 from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
 from ldls.io.cameras.field_file import read_fields
@@ -70,8 +70,8 @@ def read_camera(
         FileNotFoundError: There is no such file.
     """
     path = Path(path)
-    if format is not None and format not in READERS:
-        raise ParameterError(f"format: got {format!r}, expected one of {', '.join(READERS)}")
+    if format is not None:
+        choice("format", format, READERS)
     options: dict[str, Any] = {
         "camera": camera,
         "T_camera_lidar": None if T_camera_lidar is None else as_extrinsic(T_camera_lidar),

@@ -11,7 +11,8 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from ldls.camera import Camera
-from ldls.errors import InputError, ParameterError, UnsupportedFormatError, some
+from ldls.checks import choice
+from ldls.errors import InputError, UnsupportedFormatError, some
 from ldls.io.files import folder_hint, open_file
 from ldls.io.labels.annotations import is_annotation, read_annotations
 from ldls.io.labels.kitti_objects import is_kitti_object, read_kitti_boxes
@@ -95,7 +96,7 @@ def read_labeling(
         FileFormatError: The file is broken.
         FileNotFoundError: There is no such file.
     """
-    name = guess_format(path) if format is None else _known(format)
+    name = guess_format(path) if format is None else choice("format", format, FORMATS)
     chosen = FORMATS[name]
     if not chosen.needs_points:
         return chosen.read(path)
@@ -166,8 +167,7 @@ def pair_files(
         ParameterError: There is no such format, or no such `missing`.
         FileNotFoundError: A path does not exist.
     """
-    if missing not in ("error", "skip"):
-        raise ParameterError(f"missing: got {missing!r}, expected 'error' or 'skip'")
+    choice("missing", missing, ("error", "skip"))
     ours = label_files(predictions, prediction_format)
     theirs = label_files(truth, truth_format)
     if Path(predictions).is_file() and Path(truth).is_file():
@@ -199,7 +199,7 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
         FileNotFoundError: There is no such path.
     """
     path = Path(path)
-    wanted = list(FORMATS) if format is None else [_known(format)]
+    wanted = list(FORMATS) if format is None else [choice("format", format, FORMATS)]
     endings = list(dict.fromkeys(FORMATS[name].ending for name in wanted))
     if path.is_file():
         return {_frame_name(path, endings) or path.stem: LabelFile(path, format or guess_format(path))}
@@ -223,12 +223,6 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
         hint = folder_hint(path, "annotations", "label")
         raise InputError(f"{path}: holds no labels, expected files that end in {', '.join(endings)}{hint}")
     return files
-
-
-def _known(format: str) -> str:
-    if format not in FORMATS:
-        raise ParameterError(f"format: got {format!r}, expected one of {', '.join(FORMATS)}")
-    return format
 
 
 def _frame_name(path: Path, endings: list[str]) -> str | None:

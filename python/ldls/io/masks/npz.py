@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, CONTIGUOUS_IDS, folded
-from ldls.errors import MaskError, ParameterError, UnsupportedFormatError
+from ldls.checks import choice
+from ldls.errors import MaskError, UnsupportedFormatError
 from ldls.io.arrays import open_npz, write_npz
 from ldls.masks import InstanceMasks
 from ldls.masks.pixels import checked_size, encode
@@ -52,9 +53,7 @@ def write(path: str | PathLike[str], masks: InstanceMasks, *, layout: Literal["r
         MaskError: The research code does not know a category.
     """
     layouts = {"runs": mask_arrays, "research": _research_arrays}
-    if layout not in layouts:
-        raise ParameterError(f"layout: got {layout!r}, expected {' or '.join(layouts)}")
-    write_npz(path, layouts[layout](masks))
+    write_npz(path, layouts[choice("layout", layout, layouts)](masks))
 
 
 def mask_arrays(masks: InstanceMasks) -> dict[str, NDArray[Any]]:

@@ -9,8 +9,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ldls.checks import checked
-from ldls.errors import ParameterError, TruncatedFileError, UnsupportedFormatError
+from ldls.checks import checked, choice
+from ldls.errors import TruncatedFileError, UnsupportedFormatError
 from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.files import MAX_TEXT_BYTES, open_file
 from ldls.io.options import check_options
@@ -55,11 +55,9 @@ def read_poses(
         FileNotFoundError: There is no such file.
     """
     path = Path(path)
-    if format is not None and format not in READERS:
-        raise ParameterError(f"format: got {format!r}, expected one of {', '.join(READERS)}")
     options: dict[str, Any] = {"stamps": stamps, "T_camera_lidar": T_camera_lidar}
     given = {name: value for name, value in options.items() if value is not None}
-    format = format_of(path) if format is None else format
+    format = format_of(path) if format is None else choice("format", format, READERS)
     check_options(f"{format} poses ({path})", READERS[format], given)
     return READERS[format](path, **given)
 

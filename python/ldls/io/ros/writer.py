@@ -14,7 +14,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from ldls._optional import require
-from ldls.errors import InputError, ParameterError, UnsupportedFormatError
+from ldls.checks import choice
+from ldls.errors import InputError, UnsupportedFormatError
 from ldls.io.ros.messages import Message, Topic, Types, serialize, standard_types
 
 STORAGES = {"rosbag2": "SQLITE3", "mcap": "MCAP"}
@@ -46,9 +47,7 @@ class BagWriter:
             FileExistsError: There is something at `path` already.
             ImportError: The extra `ros` is not installed.
         """
-        if kind not in KINDS:
-            raise ParameterError(f"kind: got {kind!r}, expected one of {', '.join(KINDS)}")
-        self.path, self.kind, self.ros2 = Path(path), kind, kind != "rosbag1"
+        self.path, self.kind, self.ros2 = Path(path), choice("kind", kind, KINDS), kind != "rosbag1"
         if self.path.exists():
             raise FileExistsError(f"{self.path}: exists already; remove it or write to another name")
         self.types = standard_types(ros2=self.ros2)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from ldls._optional import require
-from ldls.errors import InputError, ParameterError
+from ldls.checks import choice
+from ldls.errors import InputError
 
 Contexts = Literal["static", "timed", "held"]
 """Annotation contexts are logged for all times as they come, for the time that is set, or for all times at the end."""
@@ -39,8 +40,7 @@ class Stream:
             InputError: No stream is active.
             ParameterError: There is no such way to log contexts.
         """
-        if contexts not in get_args(Contexts):
-            raise ParameterError(f"contexts: got {contexts!r}, expected {', '.join(get_args(Contexts))}")
+        choice("contexts", contexts, get_args(Contexts))
         self.rerun = rerun().get_data_recording(stream)
         if self.rerun is None:
             raise InputError(
