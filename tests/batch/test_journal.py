@@ -12,7 +12,10 @@ from ldls.errors import BatchError, ChangedFileWarning, CorruptFileError
 BRACKETS = b"[" * 100_000 + b"]" * 100_000
 DIGITS = b"9" * 5_000
 STATE = [1, 2, "0" * 64]
-FRAME = {"frame": "000001", "files": {}, "inputs": {}, "images": [], "objects": [], "nothing_in_view": None}
+FRAME = {
+    "frame": "000001", "files": {}, "inputs": {}, "window": ["000001"], "stamp": None, "pose": None, "images": [],
+    "objects": [], "nothing_in_view": None,
+}  # fmt: skip
 ERROR = {"stage": "read", "code": "a", "message": "b"}
 
 
@@ -71,6 +74,10 @@ def test_a_line_that_is_no_record_is_refused_with_its_number(finished, content, 
         pytest.param(line(objects=None), id="no objects"),
         pytest.param(line(images=[["image_2", 375]]), id="an image without its width"),
         pytest.param(line(images=None), id="no images"),
+        pytest.param(line(window=[1]), id="a number for a name in the window"),
+        pytest.param(line(stamp="1"), id="a stamp in words"),
+        pytest.param(line(pose=[[1, 0, 0]] * 4), id="a pose of three columns"),
+        pytest.param(line(pose=[[1, 0, 0, 0]] * 3), id="a pose of three rows"),
         pytest.param(line(nothing_in_view=1), id="a number for a cause"),
         pytest.param(b'{"frame":"000001","error":null}', id="no error"),
         pytest.param(b'{"frame":"000001","error":{"stage":"read"}}', id="half an error"),
@@ -82,6 +89,12 @@ def test_a_record_of_another_shape_is_refused(finished, content):
     journal.write_bytes(journal.read_bytes() + content + b"\n")
     with pytest.raises(CorruptFileError, match=r"line 14: not a journal of ldls \(expected a record of a frame, got"):
         again()
+
+
+def test_a_record_of_this_shape_is_taken(finished):
+    journal, again = finished
+    journal.write_bytes(journal.read_bytes() + line(frame="of the past") + b"\n")
+    assert again().n_earlier == 12
 
 
 def test_records_name_no_files_outside_the_folder(finished):

@@ -32,6 +32,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
+from types import UnionType
 from typing import IO, Any
 
 from ldls.batch.poses import holds_found_poses
@@ -129,7 +130,7 @@ class Journal:
         # those that the source has no more come last
         frames = [*order, *sorted(self._places.keys() - set(order))]
         with self._path.open("rb") as before, whole_file(self._path) as file:
-            file.write(_line(self._header))
+            file.write(line_of(self._header))
             for frame in frames:
                 if frame in self._places:
                     places[frame] = file.tell()
@@ -139,7 +140,7 @@ class Journal:
 
     def _append(self, records: Iterable[Record]) -> list[int]:
         """Return the offset of the line of each record."""
-        lines = [_line(record) for record in records]
+        lines = [line_of(record) for record in records]
         places = list(accumulate((len(line) for line in lines), initial=self._end))
         rest = memoryview(b"".join(lines))
         with names_file(self._path):
@@ -168,7 +169,7 @@ class Journal:
 
     def _may_be_cut(self, line: bytes, number: int) -> bool:
         """Return True for a line without an end that a run may have left; only our own are dropped."""
-        return len(line) < LONGEST_LINE_BYTES and (number > 1 or _line(self._header).startswith(line))
+        return len(line) < LONGEST_LINE_BYTES and (number > 1 or line_of(self._header).startswith(line))
 
     def _parsed(self, line: bytes, number: int) -> Record:
         try:
@@ -259,42 +260,18 @@ def _is_of_frame(record: object) -> bool:
             "nothing_in_view": str() | None,
         }:
             return (
-                all(map(_is_of_file, files.values()))
-                and all(map(_is_of_input, inputs.values()))
+                all(_is_list_of(state, int, str) for state in files.values())
+                and all(state is None or _is_list_of(state, int, int, str | None) for state in inputs.values())
                 and all(isinstance(name, str) for name in window)
-                and all(_is_of_pose(row) for row in pose or ())
-                and all(map(_is_of_image, images))
+                and all(_is_list_of(row, *[int | float] * 4) for row in pose or ())
+                and all(_is_list_of(image, str, int, int) for image in images)
                 and all(isinstance(row, dict) and row.keys() == {*COLUMNS} for row in objects)
             )
     return False
 
 
-def _is_of_file(state: object) -> bool:
-    match state:
-        case [int(), str()]:
-            return True
-    return False
-
-
-def _is_of_input(state: object) -> bool:
-    match state:
-        case None | [int(), int(), str() | None]:
-            return True
-    return False
-
-
-def _is_of_pose(row: object) -> bool:
-    match row:
-        case [int() | float(), int() | float(), int() | float(), int() | float()]:
-            return True
-    return False
-
-
-def _is_of_image(image: object) -> bool:
-    match image:
-        case [str(), int(), int()]:
-            return True
-    return False
+def _is_list_of(value: object, *kinds: type | UnionType) -> bool:
+    return isinstance(value, list) and len(value) == len(kinds) and all(map(isinstance, value, kinds))
 
 
 def _record_at(file: IO[bytes], place: int) -> Record:
@@ -307,7 +284,8 @@ def _line_at(file: IO[bytes], place: int) -> bytes:
     return file.readline()
 
 
-def _line(record: Record) -> bytes:
+def line_of(record: Record) -> bytes:
+    """The line of a record: the same bytes whatever order it was made in."""
     return json.dumps(record, sort_keys=True, separators=(",", ":")).encode() + b"\n"
 
 

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 import ldls._ldls as _ldls
-from ldls.batch.journal import Record
+from ldls.batch.journal import Record, line_of
 from ldls.batch.known_files import is_written, written
 from ldls.errors import LimitError, UnsafePathError
 from ldls.io import read_result, save
@@ -125,7 +125,8 @@ class RunTracks:
                     save(result, path)
                     now[_place(frame, word)] = written(path)
                 table.writerows(_rows(frame, placed, result))
-                objects_file.write(_line(FrameObjects.of(frame, result)))
+                objects = FrameObjects.of(frame, result)
+                objects_file.write(line_of({"frame": frame, "images": objects.images, "objects": objects.rows}))
                 if self._map is not None:
                     places.add(placed, result)
             # the file outlives the wrapper
@@ -211,12 +212,6 @@ def _is_ours(name: str) -> bool:
     return name in (TRACKS_TABLE, TRACKED_OBJECTS) or (
         name.startswith(f"{TRACKS}/") and name.endswith(endings) and len(Path(name).parts) == 2
     )
-
-
-def _line(objects: FrameObjects) -> bytes:
-    """The objects of a frame as a line of JSON."""
-    record = {"frame": objects.frame, "images": objects.images, "objects": objects.rows}
-    return json.dumps(record, sort_keys=True, separators=(",", ":")).encode() + b"\n"
 
 
 def digest_of_records(records: Iterable[Record]) -> str:
