@@ -171,6 +171,11 @@ class FrameWork:
             return Earlier.CHANGED
         return Earlier.DONE if there == names else Earlier.OPEN
 
+    def has_other_labels(self, outcome: Outcome) -> bool:
+        """True if frames that an earlier run labelled were labelled together with others now, or failed."""
+        pairs = [(self._done_earlier(record["frame"]), record) for record in outcome.records]
+        return any(before is not None and before["window"] != now.get("window") for before, now in pairs)
+
     def _done_earlier(self, frame: str) -> Mapping[str, Any] | None:
         record = None if self.records is None else self.records.get(frame)
         return None if record is None or "error" in record else record

@@ -171,7 +171,8 @@ def run(
             seconds: Counter[str] = Counter()
             n_finished, n_failed = n_earlier, 0
             outdate = partial(_outdate, opened, settings, folder)
-            with warnings.catch_warnings(), closing(_recorded(runner(work, pending), journal, outdate)) as outcomes:
+            recorded = _recorded(runner(work, pending), journal, work, outdate)
+            with warnings.catch_warnings(), closing(recorded) as outcomes:
                 # said of all frames at once, below
                 warnings.simplefilter("ignore", NothingInView)
                 warnings.simplefilter("ignore", NoUsablePoints)
@@ -301,7 +302,9 @@ def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> li
     return [window for window in windows if any(name not in done for _, name in window)]
 
 
-def _recorded(outcomes: Generator[Outcome], journal: Journal, outdate: Callable[[], None]) -> Generator[Outcome]:
+def _recorded(
+    outcomes: Generator[Outcome], journal: Journal, work: FrameWork, outdate: Callable[[], None]
+) -> Generator[Outcome]:
     """The outcomes, their records in the journal within `GROUP_S` or by the end, however it comes.
 
     `outdate` is called before those of frames that have other labels than they had.
@@ -312,7 +315,7 @@ def _recorded(outcomes: Generator[Outcome], journal: Journal, outdate: Callable[
     with closing(outcomes):
         try:
             for outcome in outcomes:
-                if _has_other_labels(outcome, journal):
+                if work.has_other_labels(outcome):
                     outdate()
                 waiting.extend(outcome.records)
                 if time.monotonic() - since > GROUP_S:
@@ -321,15 +324,6 @@ def _recorded(outcomes: Generator[Outcome], journal: Journal, outdate: Callable[
                 yield outcome
         finally:
             _flush(journal, waiting)
-
-
-def _has_other_labels(outcome: Outcome, journal: Journal) -> bool:
-    """True if frames that an earlier run labelled were labelled together with others now, or failed."""
-    earlier = journal.kept(record["frame"] for record in outcome.records)
-    pairs = [(earlier.get(record["frame"]), record) for record in outcome.records]
-    return any(
-        before is not None and "error" not in before and before["window"] != now.get("window") for before, now in pairs
-    )
 
 
 def _outdate(source: Source, settings: RunSettings, folder: Path) -> None:
