@@ -70,10 +70,9 @@ def info(
         check_outputs({"--picture": [picture]}, (file for at in range(len(frames)) for file in frames.files(at)))
     indices = list(range(len(frames))) if every else sample(len(frames), LOOKED_AT)
     facts = [inspect(frames, at) for at in progress(indices, len(indices), "looking at frames")]
-    stamps = stamps_of(frames)
-    findings = [finding for each in facts for finding in each.findings] + check_stamps(frames.names, stamps)
+    findings = [finding for each in facts for finding in each.findings] + check_stamps(frames.names, frames.stamps)
     screen = console()
-    screen.print(summary_table(frames, facts, stamps))
+    screen.print(summary_table(frames, facts))
     for table in (topic_table(frames), camera_table(frames, facts)):
         if table is not None:
             screen.print(table)
@@ -121,14 +120,7 @@ def topic_table(source: Source) -> Table | None:
     return table
 
 
-def stamps_of(source: Source) -> tuple[float | None, ...]:
-    """Times of all sweeps that the source knows without reading them; None for each of a source that does not."""
-    unknown: tuple[float | None, ...] = (None,) * len(source)
-    stamps: tuple[float | None, ...] = getattr(source, "stamps", unknown)
-    return stamps
-
-
-def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[float | None]) -> Table:
+def summary_table(source: Source, facts: Sequence[FrameFacts]) -> Table:
     """Kind, frames, time, poses, masks, points and truth."""
     from rich.table import Table
 
@@ -142,7 +134,7 @@ def summary_table(source: Source, facts: Sequence[FrameFacts], stamps: Sequence[
     left_out = getattr(source, "left_out", {}).values()
     if left_out:
         table.add_row("left out", f"{len(left_out):,} ({counts_of(left_out)})")
-    table.add_row("time", _time(stamps))
+    table.add_row("time", _time(source.stamps))
     table.add_row("poses", _poses(source, facts))
     counts = [each.n_points for each in facts if each.n_points] or [0]
     masks = ", ".join(f"{camera}: {place}" for camera, place in own_masks(source).items())
