@@ -660,7 +660,7 @@ NUSCENES_TABLES = tuple(f"v1.0-mini/{name}.json" for name in (*nuscenes_tables.T
 def read_tables(folder):
     tables = nuscenes_tables.find_tables(folder, None)
     samples = nuscenes_tables.read_sample_names(tables, None)
-    sensors = nuscenes_tables.read_sensors(tables, ("LIDAR_TOP", "CAM_FRONT"))
+    sensors = nuscenes_tables.read_sensors(tables, nuscenes_tables.read_channels(tables), ("LIDAR_TOP", "CAM_FRONT"))
     readings = nuscenes_tables.read_readings(tables, samples, sensors)
     taken = [each for frame in readings.values() for each in frame.values()]
     poses = nuscenes_tables.read_poses(tables, {each.pose for each in taken})

@@ -381,9 +381,8 @@ def test_folder_has_distortion_stamps_and_masks(tmp_path):
 
 
 def test_the_template_describes_a_folder(tmp_path):
-    from ldls.datasets.folder import template
+    from ldls.datasets.folder import TEMPLATE as description
 
-    description = template()
     layouts.kitti_object(tmp_path / "kitti", frames=("a",))
     layouts.write_text(tmp_path / "ldls.toml", description)
     layouts.write_points(tmp_path / "lidar/a.bin")

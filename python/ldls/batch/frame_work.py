@@ -16,7 +16,7 @@ from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames, Outcome, StageError, Window, Work, stage
 from ldls.categories import find_categories
 from ldls.datasets import CameraImage, Frame, Source
-from ldls.datasets.stored_masks import StoredMasks, fill, own_category_names, own_masks
+from ldls.datasets.stored_masks import FRAME, StoredMasks, fill, own_category_names, own_masks
 from ldls.doubts import nothing_in_view
 from ldls.errors import BatchError, InputError, ParameterError
 from ldls.io import read_result
@@ -307,7 +307,7 @@ def _segmenters(
 
     There is one segmenter for all images, or one each where files name frames.
     """
-    if "{frame}" in spec or "{camera}" in spec:
+    if FRAME in spec or "{camera}" in spec:
         names = OF_ONE_IMAGE.get(spec.partition(":")[0], {})
         return lambda frame, image: open_segmenter(fill(spec, frame, image.name), min_score=min_score), (names,)
     # every worker runs it, each on a core of its own

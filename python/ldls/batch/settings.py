@@ -11,7 +11,7 @@ from typing import Any
 
 import ldls._ldls as _ldls
 from ldls.checks import as_python, checked, hold_python_values
-from ldls.datasets.stored_masks import fill
+from ldls.datasets.stored_masks import FRAME, fill
 from ldls.errors import ParameterError
 from ldls.label_diffusion import SAME_OBJECT
 from ldls.params import Params
@@ -99,7 +99,7 @@ class RunSettings:
         if self.segmenter is not None and self.segmenter.partition(":")[0] in OF_ONE_IMAGE:
             name, place = "segmenter", self.segmenter
         # what of masks has no {frame} is a folder, or a file of all images
-        elif place is None or "{frame}" not in place:
+        elif place is None or FRAME not in place:
             return
         for word, count in (("frame", n_frames), ("camera", n_cameras)):
             if count > 1 and f"{{{word}}}" not in place:

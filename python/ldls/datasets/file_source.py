@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera
 from ldls.cloud import Points
-from ldls.datasets.frame import LEAVE_POSES_OUT, CameraImage, Frame
+from ldls.datasets.frame import LEAVE_POSES_OUT, CameraImage, Frame, Source
 from ldls.errors import InputError, LeftOutWarning, PoseError, SourceError, some, within
 from ldls.io import read_image, read_points
 from ldls.io.labels import read_labeling
@@ -26,7 +27,7 @@ POINT_SUFFIXES = (".bin", ".npy")
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
-class FileSource:
+class FileSource(Source):
     """A source whose frames are files of one name: a sweep, an image of each camera, and others.
 
     Attributes:
@@ -71,13 +72,6 @@ class FileSource:
         self.left_out = {name: f"no {' and no '.join(lacks[name])}" for name in left_out}
         self._points = next(iter(parts.values()))
         warn_left_out(path, [why for name, why in self.left_out.items() if name in self._points], len(self._points))
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def __iter__(self) -> Iterator[Frame]:
-        """Read the frames one after the other."""
-        return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
@@ -142,6 +136,11 @@ def find_files(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
     check_folders(folder.parent, [folder.name])
     files = (path for path in folder.iterdir() if path.suffix in suffixes and not path.name.startswith("."))
     return {path.name.removesuffix(path.suffix): path for path in sorted(files, key=lambda path: name_order(path.name))}
+
+
+def described_in(path: str | PathLike[str], name: str) -> Path:
+    """The file of that name that `path` is, or holds."""
+    return Path(path) / name if Path(path).is_dir() else Path(path)
 
 
 def find_points(folder: Path) -> dict[str, Path]:

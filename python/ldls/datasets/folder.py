@@ -14,9 +14,10 @@ from pathlib import Path, PurePath
 from ldls.camera import Camera
 from ldls.checks import checked
 from ldls.checks.values import as_seconds, number_of
-from ldls.datasets.file_source import FileSource, image_from_file
-from ldls.datasets.folder_description import FILE, read_description, template
+from ldls.datasets.file_source import FileSource, described_in, image_from_file
+from ldls.datasets.folder_description import FILE, TEMPLATE, read_description
 from ldls.datasets.frame import CameraImage
+from ldls.datasets.stored_masks import FRAME
 from ldls.errors import CorruptFileError, ParameterError, SourceError, within
 from ldls.io import read_camera, read_masks
 from ldls.io.cameras.extrinsic_file import as_extrinsic
@@ -26,13 +27,11 @@ from ldls.io.images import read_image_size
 from ldls.io.masks.data_set import MaskDataSet
 from ldls.masks import InstanceMasks
 
-__all__ = ["FolderSource", "template"]
-
-FRAME = "{frame}"
+__all__ = ["TEMPLATE", "FolderSource"]
 
 
 class FolderSource(FileSource):
-    """Frames of a folder that an ldls.toml describes; `template()` has every key.
+    """Frames of a folder that an ldls.toml describes; `TEMPLATE` has every key.
 
     Attributes:
         kind: "folder".
@@ -65,7 +64,7 @@ class FolderSource(FileSource):
             MaskError: One file of all masks contradicts itself.
             FileNotFoundError: There is no description, or a file that it names is not there.
         """
-        self._file = _description_in(Path(path))
+        self._file = described_in(path, FILE)
         self.path, self._allow_outside = self._file.parent, allow_outside
         self._described = read_description(self._file)
         self._cameras = self._described.cameras
@@ -88,7 +87,7 @@ class FolderSource(FileSource):
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """True for a folder with an ldls.toml, and for a TOML file."""
-        return _description_in(path).suffix == ".toml" and _description_in(path).is_file()
+        return described_in(path, FILE).suffix == ".toml" and described_in(path, FILE).is_file()
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from, those of its cameras and stamps among them."""
@@ -182,10 +181,6 @@ class FolderSource(FileSource):
 
     def _safe(self, name: str) -> Path:
         return self.path / name if self._allow_outside else strictly_below(self.path, name, place=str(self._file))
-
-
-def _description_in(path: Path) -> Path:
-    return path / FILE if path.is_dir() else path
 
 
 def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:

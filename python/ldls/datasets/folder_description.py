@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ldls.camera import Distortion
 from ldls.camera.rigid import as_matrix
 from ldls.checks import did_you_mean
+from ldls.datasets.stored_masks import FRAME
 from ldls.errors import CorruptFileError, ParameterError, within
 from ldls.io.files import open_file
 
@@ -79,6 +80,7 @@ translation = [0.1, -0.2, 0.0]
 quaternion_xyzw = [0.0, 0.0, 0.0, 1.0]  # or quaternion_wxyz, roll_pitch_yaw_deg, rotation (3 x 3)
 optical = false                     # the camera's frame has x forward, y left, z up; true by default: x right, y down
 """
+"""A complete ldls.toml with every key, to be changed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,11 +161,6 @@ def read_description(path: Path) -> FolderDescription:
         )
 
 
-def template() -> str:
-    """A complete ldls.toml with every key, to be changed."""
-    return TEMPLATE
-
-
 def _camera(place: str, content: Any) -> CameraDescription:  # noqa: ANN401
     _check(place, content, CAMERA, needed=("images",))
     inline = [key for key in ("K", "distortion") if key in content]
@@ -193,7 +190,7 @@ def _check_masks(path: str, masks: Mapping[str, str]) -> None:
         named = f"{path}, cameras.{camera}: masks is {place!r}"
         if "{camera}" in place:
             raise ParameterError(f"{named}, expected {{frame}} and nothing else in braces; write the camera's name")
-        if "{frame}" not in place:
+        if FRAME not in place:
             if not place.lower().endswith(".json"):
                 raise ParameterError(
                     f"{named}, expected {{frame}} where the name of the frame stands, or one .json of all images"

@@ -114,29 +114,23 @@ class Source(Protocol):
         kind: Name in the registry, as "kitti-object".
         path: Where it lies.
         names: Name of each frame, known without reading any.
+        stamps: Time of each sweep in seconds, known without reading any; None where the source does not say.
+        camera_names: Name of the camera of each image of a frame.
     """
 
     kind: str
     path: Path
     names: tuple[str, ...]
-
-    @property
-    def stamps(self) -> tuple[float | None, ...]:
-        """Time of each sweep in seconds, known without reading any; None where the source does not say."""
-        ...
-
-    @property
-    def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame."""
-        ...
+    stamps: tuple[float | None, ...]
+    camera_names: tuple[str, ...]
 
     def __len__(self) -> int:
         """Number of frames."""
-        ...
+        return len(self.names)
 
     def __iter__(self) -> Iterator[Frame]:
         """Read the frames one after the other."""
-        ...
+        return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from, found without reading them, and folders of files."""

@@ -6,7 +6,7 @@ FOLDER/lidarseg with their tables.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from ldls.checks import checked
 from ldls.cloud import Points
 from ldls.datasets import nuscenes_tables as tables
 from ldls.datasets.file_source import check_truth, choose, counts_of, image_from_file, warn_left_out
-from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame
+from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame, Source
 from ldls.datasets.nuscenes_tables import Reading
 from ldls.errors import SourceError
 from ldls.io import read_points
@@ -33,7 +33,7 @@ TRUTHS = {"panoptic": read_panoptic, "lidarseg": read_lidarseg}
 """Readers of the tables of truth, the one with instances first."""
 
 
-class NuScenesSource:
+class NuScenesSource(Source):
     """The key frames of one scene of nuScenes, or of all.
 
     The car moves between the stamps of sweep and images; each camera's transform contains that.
@@ -82,17 +82,21 @@ class NuScenesSource:
         self.path = Path(path)
         folder = tables.find_tables(self.path, version)
         samples = tables.read_sample_names(folder, scene)
-        lidars, cameras = tables.read_channels(folder)
+        channels = tables.read_channels(folder)
+        lidars, cameras = (
+            [*dict.fromkeys(channel for channel, kind in channels.values() if kind == wanted)]
+            for wanted in ("lidar", "camera")
+        )
         if not lidars or not cameras:
             raise SourceError(f"{folder / 'sensor.json'}: has no {'camera' if lidars else 'lidar'}")
         self._lidar = choose(folder, "lidar", lidars, LIDAR if lidar is None and LIDAR in lidars else lidar)
         # nuScenes' own cameras in its order
         self.camera_names = tuple(sorted(cameras, key=lambda c: CAMERAS.index(c) if c in CAMERAS else len(CAMERAS)))
-        channels = (self._lidar, *self.camera_names)
-        sensors = tables.read_sensors(folder, channels)
+        wanted = (self._lidar, *self.camera_names)
+        sensors = tables.read_sensors(folder, channels, wanted)
         readings = tables.read_readings(folder, samples, sensors)
         self._sensors = {token: sensor for token, sensor in sensors.items() if sensor is not None}
-        missing = _missing(self.path, readings, channels)
+        missing = _missing(self.path, readings, wanted)
         self.left_out = {samples[token]: f"no {' and no '.join(what)}" for token, what in missing.items()}
         self.names = tuple(name for token, name in samples.items() if token not in missing)
         if not self.names:
@@ -100,7 +104,7 @@ class NuScenesSource:
             raise SourceError(f"{self.path}: none of {len(samples)} key frames has all its files: {why}")
         warn_left_out(self.path, self.left_out.values(), len(samples))
         self._frames = tuple(readings[token] for token in samples if token not in missing)
-        self.stamps: tuple[float | None, ...] = tuple(frame[self._lidar].stamp_us / 1e6 for frame in self._frames)
+        self.stamps = tuple(frame[self._lidar].stamp_us / 1e6 for frame in self._frames)
         self._tables, self._posed = folder, poses
         self._poses = tables.read_poses(folder, {taken.pose for frame in self._frames for taken in frame.values()})
         sweeps = {frame[self._lidar].token for frame in self._frames} if truth else set()
@@ -111,13 +115,6 @@ class NuScenesSource:
     def recognises(cls, path: Path) -> bool:
         """True for a path that looks like nuScenes."""
         return any(path.glob("v1.0-*/sample_data.json"))
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def __iter__(self) -> Iterator[Frame]:
-        """Read the frames one after the other."""
-        return map(self.__getitem__, range(len(self)))
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from, the tables among them."""

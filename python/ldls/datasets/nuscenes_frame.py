@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -22,8 +22,8 @@ from ldls.camera import Camera
 from ldls.checks import checked
 from ldls.checks.values import as_seconds
 from ldls.cloud import MAX_COLUMNS, Points
-from ldls.datasets.file_source import image_from_file
-from ldls.datasets.frame import CameraImage, Frame
+from ldls.datasets.file_source import described_in, image_from_file
+from ldls.datasets.frame import CameraImage, Frame, Source
 from ldls.errors import CorruptFileError, within
 from ldls.io import read_points
 from ldls.io.files import below, open_file, parsing
@@ -47,7 +47,7 @@ class Box2d:
     ltrb_px: tuple[float, float, float, float]
 
 
-class NuScenesFrameSource:
+class NuScenesFrameSource(Source):
     """One key frame with six cameras.
 
     Its truth is that of the 3D boxes, the smaller where two hold a point; instances are the numbers of boxes, from 1.
@@ -75,7 +75,7 @@ class NuScenesFrameSource:
             UnsafePathError: It names a file out of its folder.
             FileNotFoundError: It, or a file that it names, is not there.
         """
-        self._file = described_in(path)
+        self._file = described_in(path, FILE)
         self.path = self._file.parent
         self._truth = truth
         with open_file(self._file, "key frame", limit=MAX_BYTES) as file:
@@ -85,21 +85,14 @@ class NuScenesFrameSource:
             self._boxes: list[dict[str, Any]] = frame["boxes_3d"]
             self._images = tuple(self._image(name, each) for name, each in frame["cameras"].items())
             stamp = as_seconds("timestamp", float(frame["timestamp"]), CorruptFileError)
-            self.stamps: tuple[float | None, ...] = (stamp,)
-        self.names: tuple[str, ...] = (self._points.name.split(".")[0],)
+            self.stamps = (stamp,)
+        self.names = (self._points.name.split(".")[0],)
         self.camera_names = tuple(image.name for image in self._images)
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """True for a frame.json, and for a folder that holds one."""
-        return described_in(path).name == FILE and described_in(path).is_file()
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def __iter__(self) -> Iterator[Frame]:
-        """Read the frames one after the other."""
-        return map(self.__getitem__, range(len(self)))
+        return described_in(path, FILE).name == FILE and described_in(path, FILE).is_file()
 
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from."""
@@ -136,7 +129,7 @@ def read_boxes_2d(path: str | PathLike[str]) -> dict[str, tuple[Box2d, ...]]:
         CorruptFileError: It is not such a file.
         FileNotFoundError: There is no such file.
     """
-    with open_file(described_in(path), "key frame", limit=MAX_BYTES) as file:
+    with open_file(described_in(path, FILE), "key frame", limit=MAX_BYTES) as file:
         frame = json.loads(file.text())
         return {name: tuple(_box_2d(box) for box in each["boxes_2d"]) for name, each in frame["cameras"].items()}
 
@@ -168,11 +161,6 @@ def points_in_upright_box(points: Points, numbers: NDArray[np.float64]) -> NDArr
         (np.abs(along) <= length / 2) & (np.abs(across) <= width / 2) & (np.abs(z) <= height / 2)
     )
     return inside
-
-
-def described_in(path: str | PathLike[str]) -> Path:
-    """The frame.json that `path` is, or holds."""
-    return Path(path) / FILE if Path(path).is_dir() else Path(path)
 
 
 def _n_columns(columns: Sequence[str]) -> int:

@@ -125,42 +125,40 @@ def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
     return {token: f"{name}_{number:03d}" for own, name in in_order for number, (_, token) in enumerate(own)}
 
 
-def read_channels(tables: Path) -> tuple[list[str], list[str]]:
-    """Channels of the lidars and of the cameras, in the order of the table.
+def read_channels(tables: Path) -> dict[str, tuple[str, str]]:
+    """Channel and modality, as "lidar" and "camera", of each sensor by token, in the order of the table.
 
     Raises:
         CorruptFileError: The table is broken.
     """
-    channels: dict[str, list[str]] = {"lidar": [], "camera": []}
-    for row in _rows(tables, "sensor", {"token": str, "channel": str, "modality": str}):
-        if row["modality"] in channels and row["channel"] not in channels[row["modality"]]:
-            channels[row["modality"]].append(row["channel"])
-    return channels["lidar"], channels["camera"]
+    rows = _rows(tables, "sensor", {"token": str, "channel": str, "modality": str})
+    return {row["token"]: (row["channel"], row["modality"]) for row in rows}
 
 
-def read_sensors(tables: Path, channels: Sequence[str]) -> dict[str, CalibratedSensor | None]:
-    """The calibrated sensors of the wanted channels, by token; None for each of the others.
+def read_sensors(
+    tables: Path, channels: Mapping[str, tuple[str, str]], wanted: Sequence[str]
+) -> dict[str, CalibratedSensor | None]:
+    """The calibrated sensors of the `wanted` of `channels`, by token; None for each of the others.
 
     Raises:
         CalibrationError: A pose is none, or a camera has no intrinsic matrix.
         CorruptFileError: A table is broken, or lacks a sensor.
     """
-    kinds = {row["token"]: row for row in _rows(tables, "sensor", {"token": str, "channel": str, "modality": str})}
     columns = {"token": str, "sensor_token": str, "translation": list, "rotation": list, "camera_intrinsic": list}
     sensors: dict[str, CalibratedSensor | None] = {}
     for row in _rows(tables, "calibrated_sensor", columns):
-        kind = _named(tables, "calibrated_sensor", row, "sensor", kinds)
-        if kind["channel"] not in channels:
+        channel, modality = _named(tables, "calibrated_sensor", row, "sensor", channels)
+        if channel not in wanted:
             sensors[row["token"]] = None
             continue
         place = f"{tables / 'calibrated_sensor.json'}, {row['token']}"
         intrinsic = _numbers(place, row["camera_intrinsic"])
-        if kind["modality"] == "camera" and intrinsic.shape not in ((3, 3), (3, 4)):
+        if modality == "camera" and intrinsic.shape not in ((3, 3), (3, 4)):
             raise CalibrationError(
-                f"{place}: camera_intrinsic of {kind['channel']} has the shape {intrinsic.shape}, expected (3, 3)"
+                f"{place}: camera_intrinsic of {channel} has the shape {intrinsic.shape}, expected (3, 3)"
             )
         distortion = _distortion(place, row.get("camera_distortion") or [])
-        sensors[row["token"]] = CalibratedSensor(kind["channel"], _transform(place, row), intrinsic, distortion)
+        sensors[row["token"]] = CalibratedSensor(channel, _transform(place, row), intrinsic, distortion)
     return sensors
 
 

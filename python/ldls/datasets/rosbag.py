@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ldls.camera import Camera
 from ldls.camera.camera_info import MESSAGE_FIELDS
 from ldls.checks import checked
-from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame
+from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame, Source
 from ldls.datasets.ros_odometry import Odometry, odometry_topics, read_odometry
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
 from ldls.datasets.ros_topics import choose_topics
@@ -49,7 +49,7 @@ UNPICKLED = ("_bag", "_tree", "_odometry")
 """Attributes that another process makes itself."""
 
 
-class RosBag:
+class RosBag(Source):
     """The sweeps of a ROS bag with the images nearest to them in time.
 
     Opening reads the stamps of clouds, images and calibrations and decodes none of them; a frame decodes its own
@@ -66,6 +66,8 @@ class RosBag:
         kind: "rosbag".
         path: The bag.
         names: Stamp of each sweep in nanoseconds; running numbers of six digits where stamps repeat themselves.
+        stamps: Times of the sweeps in seconds.
+        camera_names: Name of the camera of each image of a frame: its topic, fit for a file name.
         topics: The topics that are read.
         max_offset_s: The tolerance.
         unpaired: Number of sweeps with no image within the tolerance.
@@ -156,6 +158,8 @@ class RosBag:
         self._sweeps = [sweeps[row] for row in kept]
         self._images = [[column[row] for column in columns] for row in kept]
         self._infos = {image: messages[info] for image, info in zip(images, infos, strict=True)}
+        self.stamps = tuple(sweep.header.stamp_ns / NANOSECONDS for sweep in self._sweeps)
+        self.camera_names = tuple(_camera_name(topic) for topic in images)
         stamps = [str(sweep.header.stamp_ns) for sweep in self._sweeps]
         repeated = len(set(stamps)) < len(stamps)
         self.names = tuple(f"{number:06d}" for number in range(len(stamps))) if repeated else tuple(stamps)
@@ -188,13 +192,6 @@ class RosBag:
             for sweep, images in zip(self._sweeps, self._images, strict=True)
         ]
         return np.array(offsets, np.float64).reshape(len(self), len(self.topics.images))
-
-    def __len__(self) -> int:
-        """Number of frames."""
-        return len(self._sweeps)
-
-    def __iter__(self) -> Iterator[Frame]:
-        return (self[index] for index in range(len(self)))
 
     @property
     def all_topics(self) -> tuple[Topic, ...]:
@@ -231,16 +228,6 @@ class RosBag:
         with within(self._place(self._sweeps[index])):
             return decode_points(self._message(self._sweeps[index]))
 
-    @property
-    def camera_names(self) -> tuple[str, ...]:
-        """Name of the camera of each image of a frame: its topic, fit for a file name."""
-        return tuple(_camera_name(topic) for topic in self.topics.images)
-
-    @property
-    def stamps(self) -> tuple[float, ...]:
-        """Times of the sweeps in seconds."""
-        return tuple(sweep.header.stamp_ns / NANOSECONDS for sweep in self._sweeps)
-
     def files(self, index: int) -> tuple[Path, ...]:
         """The files that a frame is read from: those of the bag, and of transforms that are given."""
         return (*storage_files(self.path), *self._given_files)
@@ -265,7 +252,7 @@ class RosBag:
             name=self.names[index],
             points=points,
             times=times,
-            stamp=sweep.header.stamp_ns / NANOSECONDS,
+            stamp=self.stamps[index],
             pose=pose,
             trajectory=trajectory,
             images=tuple(self._image(image, sweep.header) for image in self._images[index] if image),

@@ -11,6 +11,8 @@ from ldls.io import read_masks
 from ldls.io.masks.data_set import SHOWN, MaskDataSet
 from ldls.masks import InstanceMasks
 
+FRAME = "{frame}"
+"""What stands in a path where the name of a frame does."""
 PLACES = (
     "a folder with a file a frame, a path such as masks/{frame}.json, or one .json with the masks of all images and "
     "their file names"
@@ -38,7 +40,7 @@ class StoredMasks:
         """
         self.place = place
         path = Path(place)
-        if "{frame}" not in place and not path.is_dir() and not (path.suffix == ".json" and path.is_file()):
+        if FRAME not in place and not path.is_dir() and not (path.suffix == ".json" and path.is_file()):
             if not path.exists():
                 raise InputError(f"masks: there is no {place!r}; expected {PLACES}")
             raise InputError(f"masks: {place!r} is no folder and has no {{frame}} in it; expected {PLACES}")
@@ -90,7 +92,7 @@ class StoredMasks:
         return tuple(self.data_set.masks(image_id, size) for image_id, size in zip(found, sizes, strict=True))
 
     def _file(self, frame: str, camera: str, only_camera: bool) -> Path:
-        if "{frame}" in self.place:
+        if FRAME in self.place:
             return Path(fill(self.place, frame, camera))
         folders = [Path(self.place) / camera, *([Path(self.place)] if only_camera else [])]
         for folder in folders:
@@ -109,7 +111,7 @@ def own_category_names(source: Source) -> tuple[Mapping[int, str], ...]:
 
 def fill(pattern: str, frame: str, camera: str) -> str:
     """The pattern with the names of a frame and a camera in the places of {frame} and {camera}."""
-    return pattern.replace("{frame}", frame).replace("{camera}", camera)
+    return pattern.replace(FRAME, frame).replace("{camera}", camera)
 
 
 def own_masks(source: Source) -> Mapping[str, str]:

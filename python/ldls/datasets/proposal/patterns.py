@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from ldls.datasets.folder import FRAME
+from ldls.datasets.stored_masks import FRAME
 
 DEEPEST = 4
 """Folders within folders that are looked into."""

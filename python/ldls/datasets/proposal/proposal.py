@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from ldls.camera.rigid import doubt_of_distance
 from ldls.cloud import Points, doubt_of_scale, finite_rows
 from ldls.datasets.file_source import IMAGE_SUFFIXES
-from ldls.datasets.folder import FRAME
 from ldls.datasets.folder_description import FILE
 from ldls.datasets.proposal.calibrations import (
     FoundCamera,
@@ -26,6 +25,7 @@ from ldls.datasets.proposal.calibrations import (
     view_of,
 )
 from ldls.datasets.proposal.patterns import Pattern, patterns_of
+from ldls.datasets.stored_masks import FRAME
 from ldls.errors import FileFormatError, LdlsError, ScaleWarning, SourceError
 from ldls.io import read_masks, read_points
 from ldls.io.cameras.field_file import MAX_BYTES
