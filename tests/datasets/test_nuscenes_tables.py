@@ -119,6 +119,8 @@ def test_a_part_of_the_scenes_may_be_there(tmp_path):
     with pytest.warns(LeftOutWarning, match="frames are left out, of scenes that scene.json lacks: token scene-0002"):
         source = open_source(folder, kind="nuscenes")
     assert {name[:-4] for name in source.names} == {"scene-0001"}
+    # nobody asked for the others here, and a warning would be an error
+    assert open_source(folder, kind="nuscenes", scene="scene-0001").names == source.names
 
 
 def test_sensors_that_no_frame_has_may_be_of_any_kind(tmp_path):

@@ -96,7 +96,8 @@ def find_tables(path: Path, version: str | None) -> Path:
 def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
     """Names of the samples of a scene, or of all scenes, by token: scene and number, in the order of their time.
 
-    Those of scenes that the table of scenes lacks, as that of a part of a data set does, are left out with a warning.
+    Those of scenes that the table of scenes lacks, as that of a part of a data set does, are left out; with a warning
+    where all scenes are wanted.
 
     Raises:
         SourceError: There is no such scene.
@@ -116,7 +117,7 @@ def read_sample_names(tables: Path, scene: str | None) -> dict[str, str]:
             strange[row["scene_token"]] += 1
         elif scene in (None, name):
             samples[name].append((row["timestamp"], row["token"]))
-    if strange:
+    if strange and scene is None:
         message = (
             f"{tables / 'sample.json'}: {strange.total():,} key frames are left out, of scenes that scene.json lacks"
         )
