@@ -240,7 +240,8 @@ def test_a_bag_of_labels_that_a_run_of_other_formats_replaces_is_removed(tmp_pat
     bag, out = recorded(tmp_path, "rosbag1", moving=(("odom", "base"),)), tmp_path / "out"
     of_run = ("--option", "world=odom", "--sweeps", "1")
     run(bag, out, *of_run, "--formats", "bag")
-    assert "warning" not in run(bag, out, *of_run, "--formats", "npz").output
+    for more in ((), ("--track",)):
+        assert "warning" not in run(bag, out, *of_run, *more, "--formats", "npz").output
     outcome = run(bag, out, *of_run, "--formats", "npz", "--frames", "1:")
     assert "labelled.bag: labels or tracks are others than before; removed" in " ".join(outcome.output.split())
     assert not (out / "labelled.bag").exists()

@@ -194,7 +194,7 @@ def run(
         # workers of a killed run may have outlived it for a moment
         sweep(folder)
         stored = partial(_stored, journal, opened.names, folder)
-        unplaced = _write_of_all(tracks, bag, stored, partial(_outdate_bag, opened, settings, folder))
+        unplaced = _write_of_all(tracks, bag, stored, partial(_outdate_bag, opened, settings, folder, of_tracks=True))
         if write_objects is not None:
             write_objects(objects_of(_found(journal, names, tracks)))
         n_objects = count_objects(_found(journal, names, tracks))
@@ -337,11 +337,13 @@ def _outdate(source: Source, settings: RunSettings, folder: Path) -> None:
     _outdate_bag(source, settings, folder)
 
 
-def _outdate_bag(source: Source, settings: RunSettings, folder: Path) -> None:
-    """Remove the bag of earlier labels or tracks, with a warning where this run writes none anew."""
+def _outdate_bag(source: Source, settings: RunSettings, folder: Path, *, of_tracks: bool = False) -> None:
+    """Remove the bag of earlier labels, or if it has earlier tracks, with a warning where this run writes none anew."""
     if not (folder / NOTE).is_file():
         return
     bag = RunBag(source, folder)
+    if of_tracks and not bag.has_tracks():
+        return
     if bag.remove() and BAG not in settings.formats:
         message = f"{bag.path}: labels or tracks are others than before; removed (--formats bag makes it again)"
         warnings.warn(message, LdlsWarning, stacklevel=6)

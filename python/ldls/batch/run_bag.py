@@ -110,6 +110,10 @@ class RunBag:
         (self._folder / NOTE).unlink(missing_ok=True)
         return was_there
 
+    def has_tracks(self) -> bool:
+        """True if the bag that is there was made of results with tracks."""
+        return b" " in (self._note() or b"")
+
     def _note(self) -> bytes | None:
         """What the bag that is there was made of; None where nothing says it."""
         try:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.camera import Camera
-from ldls.camera.rigid import from_parts, inverse
+from ldls.camera.rigid import inverse
 from ldls.errors import InputError
 from ldls.view import SeenView
 from ldls.viewing.recording.stream import Entity, rerun
@@ -31,7 +31,8 @@ def pinhole_of(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]
     as of KITTI's P2, goes to the pose.
     """
     K = camera.projection[:, :3] / camera.projection[2, 2]
-    T_pinhole_camera = from_parts(np.eye(3), np.linalg.solve(camera.projection[:, :3], camera.projection[:, 3]))
+    T_pinhole_camera = np.eye(4)
+    T_pinhole_camera[:3, 3] = np.linalg.solve(camera.projection[:, :3], camera.projection[:, 3])
     K[:2] += PIXEL_CENTRE * K[2]
     return K, inverse(T_pinhole_camera @ camera.T_camera_lidar)
 
