@@ -120,6 +120,9 @@ def test_a_mask_labels_one_object_and_all_of_it(small_scene):
     for instance, label in ((1, 0), (2, 1), (3, 2)):
         assert set(labels[truth.instances == instance]) == {label}
     assert set(labels[~near]) == {0}
+    # without instances the people are one object, which the mask of most of them labels
+    classes_alone = replace(truth, instances=np.zeros(500, int))
+    assert {*bound_labels(result, classes_alone, CLASSES)[near & (people < 3)]} == {1}
     # a mask labels no object of another class
     swapped = replace(truth, names=("background", "Car", "Pedestrian", "Van"))
     assert not bound_labels(result, swapped, CLASSES).any()

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.checks import checked
-from ldls.evaluation.classes import CLASS_SHIFT, ClassSet, object_codes
+from ldls.evaluation.classes import CLASS_SHIFT, ClassSet
 from ldls.evaluation.on_masks import overlaps_with_masks, points_on_masks
 from ldls.labeling import Labeling
 from ldls.segmentation import Segmentation
@@ -16,7 +16,7 @@ from ldls.segmentation import Segmentation
 def bound_labels(result: Segmentation, truth: Labeling, classes: ClassSet) -> NDArray[np.int32]:
     """Labels (N,) in which every true object wholly has the label of the mask that overlaps it best.
 
-    A mask labels one object, of its own class. Pairs are taken from the largest IoU down, between the points of the
+    A mask labels one object, of its own class; true points of a class without an instance are one object. Pairs are taken from the largest IoU down, between the points of the
     object and those that fall on the mask, and of equals the first; points that do not count are in neither. An object
     without a mask is background.
 
@@ -32,7 +32,8 @@ def bound_labels(result: Segmentation, truth: Labeling, classes: ClassSet) -> ND
     labels = np.full(len(true), -1, np.int32)
     labels[result.in_view] = 0
     rows = np.flatnonzero((labels == 0) & ~true.ignored)
-    codes, objects = np.unique(object_codes(true.classes[rows], true.instances[rows]), return_inverse=True)
+    of_objects = np.where(true.classes > 0, true.classes.astype(np.int64) << CLASS_SHIFT | true.instances, -1)
+    codes, objects = np.unique(of_objects[rows], return_inverse=True)
     iou = overlaps_with_masks(objects, points_on_masks(result)[rows])
     of_masks = np.array([classes.index(instance.name) for instance in result.instances], np.int64)
     iou[(codes[:, None] >> CLASS_SHIFT != of_masks) | (codes[:, None] < 0)] = 0

@@ -17,7 +17,7 @@ from ldls.errors import (
 from ldls.io.labels import FORMATS, read_labeling, write_labeling
 from ldls.io.labels.label_formats import guess_format
 from ldls.io.labels.labeling_npz import read_labeling_npz
-from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
+from ldls.io.labels.nuscenes_labels import LIDARSEG, read_lidarseg, read_panoptic
 from ldls.io.labels.semantic_kitti import read_semantic_kitti
 from ldls.io.labels.squeezeseg import read_squeezeseg, read_squeezeseg_ranges
 from ldls.labeling import Labeling
@@ -158,6 +158,16 @@ def test_nuscenes(tmp_path):
     assert found.instances.tolist() == [17001, 2999, 0, 0]
 
 
+def test_names_of_the_lidarseg_challenge_are_kept(small_scene, tmp_path):
+    points, masks, camera = small_scene
+    for number, (name, held) in enumerate(LIDARSEG.items(), start=1):
+        named = ldls.InstanceMasks.from_array(masks.to_array()[:1], categories=[number], names={number: name})
+        result = ldls.segment(points, named, camera)
+        assert (result.labels > 0).any()
+        ldls.save(result, tmp_path / "a_lidarseg.bin")
+        assert {*class_names(read_lidarseg(tmp_path / "a_lidarseg.bin"))} - {"noise"} <= {*held}, name
+
+
 def test_nuscenes_faults(tmp_path):
     np.array([17, 32], np.uint8).tofile(tmp_path / "a_lidarseg.bin")
     with pytest.raises(CorruptFileError, match="point 1 has class 32"):
@@ -284,9 +294,9 @@ def test_what_no_ending_tells_is_asked_for(tmp_path):
     (tmp_path / "empty.txt").write_text("")
     with pytest.raises(UnsupportedFormatError, match="may be kitti-boxes or annotations; say which by format="):
         read_labeling(tmp_path / "empty.txt")
-    with pytest.raises(UnsupportedFormatError, match="no format of labels has this name; expected lidarseg"):
+    with pytest.raises(UnsupportedFormatError, match="no format of labels has this name; expected npz"):
         read_labeling("a.bin")
-    with pytest.raises(ParameterError, match="format: got 'kitti', expected one of lidarseg"):
+    with pytest.raises(ParameterError, match="format: got 'kitti', expected one of npz"):
         read_labeling("a.txt", format="kitti")
     with pytest.raises(InputError, match="points: a.txt holds boxes"):
         read_labeling("a.txt", format="kitti-boxes")

@@ -40,6 +40,13 @@ def test_nuscenes_endings_belong_to_the_format(tmp_path):
     assert frame.name == "token"
 
 
+def test_of_a_frame_in_several_formats_the_one_that_knows_most_is_read(tmp_path):
+    names = ["a.npz", "a_panoptic.npz", "a.label", "a_lidarseg.bin"]
+    for at, best in enumerate(["npz", "panoptic", "label", "lidarseg"]):
+        folder = touch(tmp_path / best, *names[at:])
+        assert label_files(folder) == {"a": LabelFile(folder / names[at], best)}
+
+
 def test_endings_may_be_capitals(tmp_path):
     ours = touch(tmp_path / "ours", "Σ.NPZ", "B_PANOPTIC.npz")
     theirs = touch(tmp_path / "theirs", "Σ.LABEL", "B_Lidarseg.bin")

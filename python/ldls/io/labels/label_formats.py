@@ -44,16 +44,16 @@ class Format:
 
 
 FORMATS: dict[str, Format] = {
-    "lidarseg": Format("_lidarseg.bin", read_lidarseg),
-    "panoptic": Format("_panoptic.npz", read_panoptic),
     "npz": Format(".npz", read_labeling_npz, ignores=True),
+    "panoptic": Format("_panoptic.npz", read_panoptic),
     "label": Format(".label", read_semantic_kitti),
+    "lidarseg": Format("_lidarseg.bin", read_lidarseg),
     "squeezeseg": Format(".npy", read_squeezeseg, ignores=True),
     "kitti-boxes": Format(".txt", read_kitti_boxes, needs_points=True, ignores=True, has_line=is_kitti_object),
     "annotations": Format(".txt", read_annotations, has_line=is_annotation),
 }
-"""Formats by name; longer endings come before the shorter ones that they end in, and KITTI's lines, whose class may be
-a number, before annotations, which begin with one."""
+"""Formats by name. Of a frame in several the first is read: those that know more, as instances, come before others, and
+KITTI's lines, whose class may be a number, before annotations, which begin with one."""
 
 SAY_WHICH = "say which by format="
 LISTED = 10
@@ -113,8 +113,7 @@ def guess_format(*paths: str | PathLike[str]) -> str:
         UnsupportedFormatError: No format has this ending, or several have and no line tells which it is.
         FileNotFoundError: A file whose first line is asked for is not there.
     """
-    name = Path(paths[0]).name.lower()
-    ending = next((each.ending for each in FORMATS.values() if name.endswith(each.ending)), None)
+    ending = _ending(Path(paths[0]).name)
     fitting = [key for key, each in FORMATS.items() if each.ending == ending]
     if not fitting:
         known = ", ".join(f"{key} (*{each.ending})" for key, each in FORMATS.items())
@@ -202,14 +201,14 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
     wanted = list(FORMATS) if format is None else [choice("format", format, FORMATS)]
     endings = list(dict.fromkeys(FORMATS[name].ending for name in wanted))
     if path.is_file():
-        return {_frame_name(path, endings) or path.stem: LabelFile(path, format or guess_format(path))}
+        ending = _ending(path.name)
+        name = path.name[: -len(ending)] if ending in endings else path.stem
+        return {name: LabelFile(path, format or guess_format(path))}
     files: dict[str, LabelFile] = {}
     entries = [entry for entry in sorted(path.iterdir()) if entry.is_file() and not entry.name.startswith(".")]
-    # of a_panoptic.npz the frame is a, in whatever format labels are wanted
-    known = list(dict.fromkeys(each.ending for each in FORMATS.values()))
     for ending in endings:
-        names = {entry: _frame_name(entry, known) for entry in entries}
-        new = {name: entry for entry, name in names.items() if name and entry.name[len(name) :].lower() == ending}
+        # of a_panoptic.npz the frame is a, in whatever format labels are wanted
+        new = {entry.name[: -len(ending)]: entry for entry in entries if _ending(entry.name) == ending}
         if not new.keys() - files.keys():
             continue
         try:
@@ -225,5 +224,7 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
     return files
 
 
-def _frame_name(path: Path, endings: list[str]) -> str | None:
-    return next((path.name[: -len(ending)] for ending in endings if path.name.lower().endswith(ending)), None)
+def _ending(name: str) -> str:
+    """The longest ending of a format that a name has; empty where it has none."""
+    fitting = (each.ending for each in FORMATS.values() if name.lower().endswith(each.ending))
+    return max(fitting, key=len, default="")

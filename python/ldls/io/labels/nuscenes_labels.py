@@ -61,6 +61,7 @@ Source: nuscenes-devkit, python-sdk/nuscenes/eval/lidarseg/utils.py."""
 
 OTHER_OBJECT = "static.other"
 WIDER: dict[str, str] = {
+    **{name: held for name, (held, *others) in LIDARSEG.items() if not others},
     "Person_sitting": "human.pedestrian.adult",
     **dict.fromkeys(
         ("bird", "cat", "dog", "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe"), "animal"
