@@ -102,11 +102,11 @@ def test_worlds_are_the_frames_that_transforms_lead_to_and_the_topics(tmp_path):
         tmp_path,
         {"/lio": drive(world="start")},
         edges=(("base", "lidar"), ("base", "hood")),
-        moving=(("map", "odom"), ("odom", "base")),
+        moving=(("map", "odom"), ("odom", "base"), ("vio", "base")),
     )
     bag = opened(path, None)
-    assert bag.worlds() == ["odom", "map", "/lio"]
-    options = "--option world=odom or --option world=map or --option world=/lio"
+    assert bag.worlds() == ["odom", "vio", "map", "/lio"]
+    options = " or ".join(f"--option world={world}" for world in ("odom", "vio", "map", "/lio"))
     assert bag.why_no_poses == f"they come with {options}"
     for world in bag.worlds():
         assert opened(path, world)[1].pose is not None

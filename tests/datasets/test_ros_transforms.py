@@ -107,6 +107,30 @@ def test_on_its_way_two_transforms_may_move_each_at_its_own_times():
     np.testing.assert_allclose(way.at(2.5)[:3, 3], [2.5, 0, 1.25], atol=1e-9)
 
 
+@pytest.mark.parametrize("corrections", [{1: 0, 2: 0, 3: 500}, {1: 0, 20: 1}], ids=["a jump", "a gap"])
+def test_what_lies_above_the_world_does_not_matter(corrections):
+    moving = [edge("odom", "base", (second, 0, 0), seconds=second) for second in (1, 2, 3)]
+    moving += [edge("map", "odom", (0, y, 0), seconds=second) for second, y in corrections.items()]
+    tree = TransformTree([edge("base", "lidar")], lambda: moving)
+    assert tree.pose("odom", "lidar", 2_500_000_000)[:3, 3].tolist() == [2.5, 0, 0]
+    with pytest.raises(PoseError, match="transforms from map to odom"):
+        tree.pose("map", "lidar", 2_500_000_000)
+
+
+def test_a_frame_may_have_several_parents():
+    seconds = (1, 2, 3)
+    wheels = [edge("odom", "base", (second, 0, 0), seconds=second) for second in seconds]
+    eyes = [edge("vio", "base", (0, second, 0), seconds=second) for second in seconds]
+    alternating = [each for both in zip(wheels, eyes, strict=True) for each in both]
+    tree = TransformTree([edge("base", "lidar")], lambda: [*alternating, edge("map", "odom", (0, 0, 7))])
+    assert tree.pose("odom", "lidar", 2_500_000_000)[:3, 3].tolist() == [2.5, 0, 0]
+    assert tree.pose("map", "lidar", 2_500_000_000)[:3, 3].tolist() == [2.5, 0, 7]
+    assert tree.pose("vio", "lidar", 2_500_000_000)[:3, 3].tolist() == [0, 2.5, 0]
+    assert tree.way("vio", "lidar", 1_500_000_000, 1_600_000_000).stamps.tolist() == [1, 2]
+    with pytest.raises(PoseError, match="found map <- odom <- base <- lidar; vio <- base; choose another world"):
+        tree.pose("earth", "lidar", 0)
+
+
 def test_frames_that_nothing_connects_are_listed():
     tree = TransformTree([edge("base", "lidar"), edge("base", "arm"), edge("arm", "hand"), edge("map", "camera")])
     with pytest.raises(CalibrationError, match="map <- camera; base <- arm <- hand; base <- lidar"):

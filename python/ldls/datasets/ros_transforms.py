@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -24,13 +25,11 @@ class _Edge:
     """Transforms from a frame to its parent over time; a static one has a single entry.
 
     Attributes:
-        parent: The parent.
         name: The frames, for messages.
         stamps_ns: The time at which each holds.
         transforms: (4, 4) each, from the frame's to the parent's coordinates.
     """
 
-    parent: str
     name: str
     stamps_ns: list[int] = field(default_factory=list)
     transforms: list[Floats] = field(default_factory=list)
@@ -69,14 +68,16 @@ class _Edge:
 
 
 class TransformTree:
-    """Frames and their parents.
+    """Frames and the transforms between them.
 
-    Moving transforms are read only when static ones do not connect what is asked for.
+    Moving transforms are read only when static ones do not connect what is asked for. A frame may have several parents,
+    as where two odometries run: of all ways from frame to frame the one of fewest transforms counts, and no others.
     """
 
     def __init__(self, static: Iterable[Message], moving: Callable[[], Iterable[Message]] | None = None) -> None:
         """A tree of the messages of /tf_static, and a function that reads those of /tf."""
-        self._edges: dict[str, _Edge] = {}
+        self._edges: dict[tuple[str, str], _Edge] = {}  # by child and parent
+        self._beside: defaultdict[str, list[str]] = defaultdict(list)
         self._moving = moving
         self._lock = threading.Lock()
         self._add(static)
@@ -85,9 +86,11 @@ class TransformTree:
         for message in messages:
             for one in message.transforms:
                 child, parent = plain(one.child_frame_id), plain(one.header.frame_id)
-                edge = self._edges.get(child)
-                if edge is None or edge.parent != parent:
-                    edge = self._edges[child] = _Edge(parent, f"transforms from {parent} to {child}")
+                edge = self._edges.get((child, parent))
+                if edge is None:
+                    edge = self._edges[child, parent] = _Edge(f"transforms from {parent} to {child}")
+                    self._beside[child].append(parent)
+                    self._beside[parent].append(child)
                 edge.stamps_ns.append(nanoseconds(one.header.stamp))
                 name, transform = f"transforms: from {parent} to {child}", one.transform
                 edge.transforms.append(matrix_of(name, transform.rotation, transform.translation))
@@ -104,8 +107,7 @@ class TransformTree:
                 f"transforms: nothing connects the lidar's frame {source!r} and the camera's {target!r}; found "
                 f"{self._chains() or 'none'}; pass T_camera_lidar"
             )
-        up_source, up_target = (self._to_root(frame, lambda edge: edge.at(stamp_ns)) for frame in (source, target))
-        return np.linalg.inv(up_target) @ up_source
+        return self._along(source, target, lambda edge: edge.at(stamp_ns))
 
     def pose(self, world: str, source: str, stamp_ns: int) -> Floats:
         """(4, 4) from coordinates in the frame `source` to coordinates in `world`, between the times there are.
@@ -114,9 +116,7 @@ class TransformTree:
             PoseError: Nothing connects the frames, or a transform on the way has a gap then, or jumps at any time.
         """
         self.check_world(world, source)
-        world, source = plain(world), plain(source)
-        up_source, up_world = (self._to_root(frame, lambda edge: edge.between(stamp_ns)) for frame in (source, world))
-        return inverse(up_world) @ up_source
+        return self._along(plain(source), plain(world), lambda edge: edge.between(stamp_ns))
 
     def check_world(self, world: str, source: str) -> None:
         """Refuse a world that nothing connects with the frame `source`.
@@ -138,9 +138,7 @@ class TransformTree:
         Raises:
             PoseError: The poses jump.
         """
-        # those above both of them cancel out
-        names = set(self._ancestors(plain(source))) ^ set(self._ancestors(plain(world)))
-        moments = [self._edges[name].stamps_between(from_ns, to_ns) for name in names if name in self._edges]
+        moments = [edge.stamps_between(from_ns, to_ns) for edge, _ in self._path(plain(source), plain(world)) or ()]
         stamps, poses = [], []
         for stamp_ns in sorted(set().union(*moments)):
             with suppress(PoseError):
@@ -150,43 +148,63 @@ class TransformTree:
 
     def connects(self, one: str, other: str) -> bool:
         """True for connected frames; moving transforms are read where static ones do not connect them."""
-        one, other = plain(one), plain(other)
+        return self._path(plain(one), plain(other)) is not None
+
+    def _path(self, source: str, target: str) -> list[tuple[_Edge, bool]] | None:
+        """The transforms on the way from one frame to another, and True for each that leads from child to parent."""
         with self._lock:  # until all are there, for whoever else asks
-            if not self._connected(one, other) and self._moving is not None:
+            path = self._shortest(source, target)
+            if path is None and self._moving is not None:
                 moving, self._moving = self._moving, None
                 self._add(moving())
-            return self._connected(one, other)
+                path = self._shortest(source, target)
+            return path
 
-    def _ancestors(self, frame: str) -> list[str]:
-        return ancestors(frame, lambda name: self._edges[name].parent if name in self._edges else None)
+    def _shortest(self, source: str, target: str) -> list[tuple[_Edge, bool]] | None:
+        after = {target: target}
+        frames = [target]
+        for frame in frames:
+            new = [other for other in self._beside.get(frame, ()) if other not in after]
+            after |= dict.fromkeys(new, frame)
+            frames += new
+        if source not in after:
+            return None
+        path = []
+        while source != target:
+            up = self._edges.get((source, after[source]))
+            path.append((up or self._edges[after[source], source], up is not None))
+            source = after[source]
+        return path
 
-    def _connected(self, one: str, other: str) -> bool:
-        return one == other or self._ancestors(one)[-1] == self._ancestors(other)[-1]
-
-    def _to_root(self, frame: str, at: Callable[[_Edge], Floats]) -> Floats:
+    def _along(self, source: str, target: str, at: Callable[[_Edge], Floats]) -> Floats:
         transform = np.eye(4)
-        for name in self._ancestors(frame)[:-1]:
-            transform = at(self._edges[name]) @ transform
+        for edge, up in self._path(source, target) or ():
+            transform = (at(edge) if up else inverse(at(edge))) @ transform
         return transform
 
     def _chains(self) -> str:
-        """Every frame that is no parent, and the way up from it."""
-        parents = {edge.parent for edge in self._edges.values()}
-        chains = [" <- ".join(reversed(self._ancestors(frame))) for frame in sorted(self._edges.keys() - parents)]
-        return "; ".join(chains)
+        """Every frame that is no parent, and the way up from it; then further parents."""
+        first = {child: [parent] for child, parent in reversed(self._edges)}
+        chains = [ancestors(frame, first) for frame in sorted(first.keys() - {parent for _, parent in self._edges})]
+        chains += [[child, parent] for child, parent in self._edges if parent not in first[child]]
+        return "; ".join(" <- ".join(reversed(chain)) for chain in chains)
 
 
-def ancestors(frame: str, parent_of: Callable[[str], str | None]) -> list[str]:
+def ancestors(frame: str, parents_of: Mapping[str, Iterable[str]]) -> list[str]:
     """A frame and those above it, the nearest first."""
-    chain = [frame]
-    while (parent := parent_of(chain[-1])) is not None and parent not in chain:
-        chain.append(parent)
-    return chain
+    found = [frame]
+    for each in found:
+        found += [parent for parent in parents_of.get(each, ()) if parent not in found]
+    return found
 
 
-def parents(messages: Iterable[Message]) -> dict[str, str]:
-    """The parent of each frame that transforms name, whatever else they say."""
-    return {plain(one.child_frame_id): plain(one.header.frame_id) for each in messages for one in each.transforms}
+def parents(messages: Iterable[Message]) -> dict[str, list[str]]:
+    """The parents of each frame that transforms name, whatever else they say."""
+    edges = [(plain(one.child_frame_id), plain(one.header.frame_id)) for each in messages for one in each.transforms]
+    found: dict[str, list[str]] = {}
+    for child, parent in dict.fromkeys(edges):
+        found.setdefault(child, []).append(parent)
+    return found
 
 
 def plain(frame_id: str) -> str:

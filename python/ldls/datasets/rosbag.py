@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from itertools import islice
+from itertools import chain, islice
 from os import PathLike
 from pathlib import Path
 from typing import Self
@@ -179,9 +179,9 @@ class RosBag(Source):
             CorruptFileError: A message cannot be read.
         """
         cloud = plain(self._sweeps[0].header.frame_id)
-        static = parents(self._transforms(STATIC_TRANSFORMS))
-        moving = parents(islice(self._transforms(MOVING_TRANSFORMS), FIRST_TRANSFORMS))
-        fixed, above = (ancestors(cloud, known.get) for known in (static, static | moving))
+        static = list(self._transforms(STATIC_TRANSFORMS))
+        moving = islice(self._transforms(MOVING_TRANSFORMS), FIRST_TRANSFORMS)
+        fixed, above = (ancestors(cloud, parents(known)) for known in (static, chain(static, moving)))
         return [frame for frame in above if frame not in fixed] + odometry_topics(self._bag)
 
     @property
