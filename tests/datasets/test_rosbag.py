@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from datasets.ros_samples import START_NS, STEP_NS, Recording, picture, storage
+from datasets.ros_samples import START_NS, STEP_NS, Recording, picture, storage, transforms
 from ldls.datasets import RosBag, open_source
 from ldls.errors import (
     CalibrationError,
@@ -23,6 +23,9 @@ from ldls.errors import (
     UnsupportedFormatError,
 )
 from ldls.io.ros.bags import open_bag
+from ldls.io.ros.messages import POINTS, TRANSFORMS, Header, Topic
+from ldls.io.ros.point_cloud2 import encode
+from ldls.io.ros.writer import BagWriter
 from ldls.stages import project
 
 KINDS = ("rosbag1", "rosbag2", "mcap")
@@ -107,6 +110,42 @@ def test_moving_frames_are_looked_up_at_the_nearest_time(tmp_path):
     path = written(tmp_path, edges=(("base", "lidar"), ("head", "camera")), moving=(("base", "head"),))
     heights = [frame.images[0].camera.T_camera_lidar[1, 3] for frame in RosBag(path)]
     np.testing.assert_allclose(heights, [-1, 0, 1], atol=1e-9)
+
+
+def robots(tmp_path, points_topic, heights):
+    """A bag of one cloud; under each prefix the lidar is so high above the base."""
+    path = tmp_path / "robots.bag"
+    with BagWriter(path, "rosbag1") as bag:
+        bag.add_topic(Topic(points_topic, POINTS, 0))
+        for prefix, height in heights.items():
+            bag.add_topic(Topic(f"{prefix}/tf_static", TRANSFORMS, 0, latched=True))
+            message = transforms(bag.types, [("base", "lidar")], START_NS, height=height - 1.0)
+            bag.write_message(f"{prefix}/tf_static", message, START_NS)
+        bag.write_message(points_topic, encode(bag.types, Recording().cloud(0), Header(START_NS, "lidar")), START_NS)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("points_topic", "heights", "expected"),
+    [
+        pytest.param("/r1/lidar/points", {"/r2": 2, "": 3, "/r1": 4}, 4, id="its own"),
+        pytest.param("/r1/points", {"/r1": 2, "/r2": 3, "/r11": 4}, 2, id="the first"),
+        pytest.param("/r11/points", {"/r1": 2, "/r11": 3}, 3, id="a longer name"),
+        pytest.param("/points", {"/r1": 2, "": 3, "/r2": 4}, 3, id="without a prefix"),
+        pytest.param("/points", {"/r1": 2}, 2, id="another's, where there is no other"),
+        pytest.param("/points", {"/r1": 2, "/r2": 2}, 2, id="the same from two"),
+    ],
+)
+def test_of_several_robots_the_transforms_are_those_of_the_clouds_prefix(tmp_path, points_topic, heights, expected):
+    bag = RosBag(robots(tmp_path, points_topic, heights), image_topics=(), world="base")
+    assert bag[0].pose[2, 3] == expected
+
+
+def test_robots_that_contradict_each_other_are_named(tmp_path):
+    path = robots(tmp_path, "/points", {"/r1": 2, "/r2": 3})
+    assert RosBag(path, image_topics=()).worlds() == []
+    with pytest.raises(CalibrationError, match="/r1/tf_static and /r2/tf_static differ in that from base to lidar"):
+        RosBag(path, image_topics=(), world="base")
 
 
 @pytest.mark.parametrize("as_file", [False, True], ids=["array", "text file"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,6 +18,9 @@ from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic, as_extrinsic
 from ldls.io.ros.messages import NANOSECONDS, Message, nanoseconds
 from ldls.sequences import Trajectory
+
+SAME = 1e-6
+"""Largest difference between numbers, metres or of a rotation, of two transforms that are the same."""
 
 
 @dataclass
@@ -85,15 +88,14 @@ class TransformTree:
     def _add(self, messages: Iterable[Message]) -> None:
         for message in messages:
             for one in message.transforms:
-                child, parent = plain(one.child_frame_id), plain(one.header.frame_id)
+                child, parent, transform = _parts(one)
                 edge = self._edges.get((child, parent))
                 if edge is None:
                     edge = self._edges[child, parent] = _Edge(f"transforms from {parent} to {child}")
                     self._beside[child].append(parent)
                     self._beside[parent].append(child)
                 edge.stamps_ns.append(nanoseconds(one.header.stamp))
-                name, transform = f"transforms: from {parent} to {child}", one.transform
-                edge.transforms.append(matrix_of(name, transform.rotation, transform.translation))
+                edge.transforms.append(transform)
 
     def lookup(self, target: str, source: str, stamp_ns: int) -> Floats:
         """(4, 4) from coordinates in the frame `source` to coordinates in `target`, at the nearest times there are.
@@ -190,6 +192,26 @@ class TransformTree:
         return "; ".join(" <- ".join(reversed(chain)) for chain in chains)
 
 
+def agreeing(messages: Iterable[tuple[str, Message]]) -> Iterator[Message]:
+    """The messages of topics of static transforms, given with their topic.
+
+    Raises:
+        CalibrationError: Two topics contradict each other.
+    """
+    told: dict[tuple[str, str], tuple[str, Floats]] = {}
+    for topic, message in messages:
+        for one in message.transforms:
+            child, parent, transform = _parts(one)
+            other, before = told.setdefault((child, parent), (topic, transform))
+            if other != topic and not np.allclose(before, transform, rtol=0, atol=SAME):
+                raise CalibrationError(
+                    f"transforms: {other} and {topic} differ in that from {parent} to {child}, and the topic of the "
+                    "clouds has the prefix of neither; leave the topic of the other robot out of the bag, or pass "
+                    "T_camera_lidar and no world"
+                )
+        yield message
+
+
 def ancestors(frame: str, parents_of: Mapping[str, Iterable[str]]) -> list[str]:
     """A frame and those above it, the nearest first."""
     found = [frame]
@@ -205,6 +227,13 @@ def parents(messages: Iterable[Message]) -> dict[str, list[str]]:
     for child, parent in dict.fromkeys(edges):
         found.setdefault(child, []).append(parent)
     return found
+
+
+def _parts(one: Message) -> tuple[str, str, Floats]:
+    """Child, parent and (4, 4) of a TransformStamped."""
+    child, parent = plain(one.child_frame_id), plain(one.header.frame_id)
+    name = f"transforms: from {parent} to {child}"
+    return child, parent, matrix_of(name, one.transform.rotation, one.transform.translation)
 
 
 def plain(frame_id: str) -> str:

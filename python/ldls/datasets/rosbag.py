@@ -19,7 +19,7 @@ from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame, Source
 from ldls.datasets.ros_odometry import Odometry, odometry_topics, read_odometry
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
 from ldls.datasets.ros_topics import choose_topics
-from ldls.datasets.ros_transforms import TransformTree, ancestors, given_transforms, parents, plain
+from ldls.datasets.ros_transforms import TransformTree, agreeing, ancestors, given_transforms, parents, plain
 from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
@@ -58,9 +58,9 @@ class RosBag(Source):
 
     Coordinates are those of the cloud's frame, cameras those of the image's, which is optical in ROS (x right, y down,
     z forward). Transforms between the two come from /tf_static, or where that does not connect them from /tf at the
-    time nearest to the image. Points have the times of the field `time`, `t`, `offset_time`, `time_offset` or
-    `timestamp` of their cloud. How the robot moves during a sweep, and between it and the images, is left in;
-    `Frame.deskewed` takes it out.
+    time nearest to the image; in a bag of several robots from those under the prefix of the cloud's topic. Points have
+    the times of the field `time`, `t`, `offset_time`, `time_offset` or `timestamp` of their cloud. How the robot moves
+    during a sweep, and between it and the images, is left in; `Frame.deskewed` takes it out.
 
     Attributes:
         kind: "rosbag".
@@ -118,6 +118,7 @@ class RosBag(Source):
             InputError: A topic is missing or cannot be guessed, or no image is near any sweep in time.
             PoseError: Nothing connects the world and the cloud's frame, poses of Odometry are no way of a robot, or
                 several topics have such poses.
+            CalibrationError: There is a world, and topics of static transforms contradict each other.
             ParameterError: `max_offset_s` is negative, or a key of `fields` or `T_camera_lidar` is unknown.
             FileNotFoundError: There is no such file.
             ImportError: The extra `ros` is not installed.
@@ -179,8 +180,8 @@ class RosBag(Source):
             CorruptFileError: A message cannot be read.
         """
         cloud = plain(self._sweeps[0].header.frame_id)
-        static = list(self._transforms(STATIC_TRANSFORMS))
-        moving = islice(self._transforms(MOVING_TRANSFORMS), FIRST_TRANSFORMS)
+        static = [message for _, message in self._transforms(STATIC_TRANSFORMS)]
+        moving = islice((message for _, message in self._transforms(MOVING_TRANSFORMS)), FIRST_TRANSFORMS)
         fixed, above = (ancestors(cloud, parents(known)) for known in (static, chain(static, moving)))
         return [frame for frame in above if frame not in fixed] + odometry_topics(self._bag)
 
@@ -238,7 +239,8 @@ class RosBag(Source):
         Raises:
             IndexError: There is no such frame.
             FileFormatError: The cloud cannot be read.
-            CalibrationError: A camera is not calibrated, or nothing connects its frame and the cloud's.
+            CalibrationError: A camera is not calibrated, nothing connects its frame and the cloud's, or topics of
+                static transforms contradict each other.
             PoseError: Transforms or poses of Odometry have a gap then, or jump, or nothing connects the robot's frame
                 and the cloud's.
         """
@@ -321,18 +323,23 @@ class RosBag(Source):
 
     @cached_property
     def _tree(self) -> TransformTree:
-        return TransformTree(self._transforms(STATIC_TRANSFORMS), partial(self._transforms, MOVING_TRANSFORMS))
+        static = agreeing(self._transforms(STATIC_TRANSFORMS))
+        return TransformTree(static, lambda: (message for _, message in self._transforms(MOVING_TRANSFORMS)))
 
     @cached_property
     def _odometry(self) -> Odometry | None:
         return None if self.world is None else read_odometry(self._bag, self.world)
 
-    def _transforms(self, name: str) -> Iterator[Message]:
-        """The messages of a topic of transforms, under any robot's prefix."""
+    def _transforms(self, name: str) -> Iterator[tuple[str, Message]]:
+        """The messages of a topic of transforms, with the topic.
+
+        Of several it is that of the longest prefix that the topic of the clouds has too; without any such all count.
+        """
         kinds = (TRANSFORMS, OLD_TRANSFORMS)
         topics = [t.name for t in self._bag.topics.values() if t.type in kinds and t.name.endswith(name)]
-        for message in self._bag.read_all(topics):
-            yield self._bag.decode(message.topic, message.raw)
+        own = [topic for topic in topics if self.topics.points.startswith(topic.removesuffix(name) + "/")]
+        for message in self._bag.read_all([max(own, key=len)] if own else topics):
+            yield message.topic, self._bag.decode(message.topic, message.raw)
 
     def _pixels(self, image: StampedMessage, image_size: tuple[int, int] | None) -> NDArray[np.uint8]:
         compressed = self._bag.topics[image.topic].type == COMPRESSED_IMAGE
