@@ -80,16 +80,23 @@ class Table:
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     def rich(self) -> RichTable:
-        """The table for a terminal."""
+        """The table for a terminal; `print(..., crop=False)` where that may be narrower than its words and numbers."""
         from rich.table import Table as RichTable
         from rich.text import Text
 
         grid = RichTable(title=self.title, caption=self.note or None)
         for c, column in enumerate(self.columns):
             is_number = self._is_number(c)
-            # heads and names fold where the terminal is narrow, numbers stay whole
-            widest = max(len(_shown(row[c])) for row in self.rows) if is_number else None
-            grid.add_column(Text(column), justify="right" if is_number else "left", overflow="fold", min_width=widest)
+            words = [word for row in self.rows for word in _shown(row[c]).split()]
+            # heads of numbers, and names where the terminal is narrow, fold between words
+            widest = max(map(len, [*words, *column.split()]))
+            grid.add_column(
+                Text(column),
+                justify="right" if is_number else "left",
+                overflow="fold",
+                min_width=widest,
+                max_width=widest if is_number else None,
+            )
         for row in self.rows:
             grid.add_row(*(Text(_shown(cell)) for cell in row))
         return grid
