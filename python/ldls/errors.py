@@ -144,7 +144,7 @@ class NoUsablePoints(LdlsWarning):
 
 
 class UprightWarning(LdlsWarning):
-    """What is up to the lidar does not point up in an image."""
+    """What is up to the lidar does not point up in an image, or in the world of its poses."""
 
 
 class ImageSizeWarning(LdlsWarning):

@@ -1,6 +1,7 @@
 """Several sweeps in one graph: against plain double precision, and what each sweep gets back."""
 
 import re
+import warnings
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,11 +12,11 @@ from scipy.spatial.transform import Rotation
 import ldls
 import oracle
 from ldls.camera.rigid import from_parts, inverse
-from ldls.errors import NothingInView, NoUsablePoints, ScaleWarning
+from ldls.errors import NothingInView, NoUsablePoints, ScaleWarning, UprightWarning
 from ldls.io.labels.kitti_objects import read_kitti_objects
 from ring_samples import random_ring
 
-turned = pytest.mark.filterwarnings("ignore:T_camera_lidar:ldls.errors.UprightWarning")
+turned = pytest.mark.filterwarnings("ignore::ldls.errors.UprightWarning")
 """Of lidars that were turned over."""
 PLAIN = {"neighbors": 6, "sigma": 0.3, "pixel_weight": 0.01, "iterations": 40}
 
@@ -212,6 +213,29 @@ def test_a_sweep_without_images_is_labelled_by_those_of_others():
     assert results[1].views == ()
 
 
+@pytest.mark.parametrize(
+    ("world", "doubtful"),
+    [
+        pytest.param(Rotation.identity(), False, id="z up"),
+        pytest.param(Rotation.from_euler("zy", [170, 55], degrees=True), False, id="a steep ramp"),
+        pytest.param(Rotation.from_euler("x", 180, degrees=True), True, id="north, east, down"),
+        pytest.param(Rotation.from_matrix([[0, -1, 0], [0, 0, -1], [1, 0, 0]]), True, id="a camera's"),
+    ],
+)
+def test_a_world_whose_z_is_not_up_is_warned_of_once(world, doubtful):
+    stream = ldls.LabelDiffusion(before=0)
+    pose = from_parts(world.as_matrix())
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        for stamp in range(3):
+            ldls.Sweep(np.zeros((0, 3)), (), pose, float(stamp))
+        assert [one.category for one in caught] == [UprightWarning] * doubtful
+        stream.segment(np.ones((1, 3)), [], pose=pose, stamp=0.0)
+        stream.segment(np.ones((1, 3)), [], pose=pose, stamp=0.1)
+    assert len(caught) == 2 * doubtful
+    assert all("z of the lidar does not point up along z of the world" in str(one.message) for one in caught)
+
+
 def test_what_was_labelled_with_other_sweeps_is_not_explained_by_itself_alone(tmp_path):
     sweeps = sweeps_of(7)
     (alone,) = ldls.segment_sweeps(sweeps[:1])
@@ -226,6 +250,7 @@ def test_what_was_labelled_with_other_sweeps_is_not_explained_by_itself_alone(tm
             ldls.explain(each, int(each.in_view[0]))
 
 
+@turned
 def test_missing_returns_stay_missing():
     sweeps = sweeps_of(5, world_from_lidar=poses(5))
     points = sweeps[0].points.copy()

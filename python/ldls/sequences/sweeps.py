@@ -9,6 +9,7 @@ still nearly all of them do, and of what moves enough from one sweep to the next
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -22,7 +23,7 @@ from ldls.checks import checked
 from ldls.checks.values import as_seconds
 from ldls.cloud import Points, as_points
 from ldls.doubts import warn_of
-from ldls.errors import InputError, ShapeError
+from ldls.errors import InputError, ShapeError, UprightWarning
 from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
@@ -39,6 +40,13 @@ SHARE_OF_NEIGHBORS = 0.5
 times, and only farther ones join lines."""
 MOST_NEIGHBORS = 255
 """Neighbours of a point that the core takes."""
+LEAST_UPRIGHT = 0.5
+"""Cosine of the angle from z of the world to z of the lidar below which z of one of them is not up: of 60 degrees."""
+NOT_UPRIGHT = (
+    "pose: z of the lidar does not point up along z of the world, but tracks, velocities and maps are of what is seen "
+    "along z; multiply all poses from the left by the inverse of the first one, or by another turn after which z is up"
+)
+"""The same for all sweeps of a drive, so that it is said once."""
 
 
 @checked
@@ -50,7 +58,8 @@ class Sweep:
         points: (N, >= 3) float32 or float64, x y z first, in metres in the lidar frame. The array itself is kept: give
             a copy where a buffer is used again.
         views: Masks and camera of each image; cameras from the lidar at this sweep.
-        pose: (4, 4) T_world_lidar: from the lidar frame of this sweep to one that all sweeps share.
+        pose: (4, 4) T_world_lidar: from the lidar frame of this sweep to one that all sweeps share, whose z is up.
+            Where z of the lidar leans by more than 60 degrees there, an `UprightWarning` says so.
         stamp: Time of the sweep in seconds.
 
     Raises:
@@ -69,6 +78,8 @@ class Sweep:
         _check_coordinates(self.points)
         object.__setattr__(self, "views", tuple(self.views))
         object.__setattr__(self, "pose", rigid("pose", as_transform("pose", self.pose)))
+        if self.pose[2, 2] < LEAST_UPRIGHT:
+            warnings.warn(NOT_UPRIGHT, UprightWarning, stacklevel=4)
         as_seconds("stamp", self.stamp)
         check_names(self.views)
 

@@ -37,7 +37,8 @@ class Trajectory:
         stamps: (n,) float64 seconds, strictly ascending, of the clock of the sweeps; since 1970 they resolve 0.24
             microseconds.
         poses: (n, 4, 4) float64 `T_world_lidar` at each stamp: rigid transforms from lidar coordinates, in metres, to
-            those of a frame that stays where it is. Translations lose digits far from its origin.
+            those of a frame that stays where it is, and whose z is up for tracks and maps. Translations lose digits far
+            from its origin.
 
     Raises:
         PoseError: There is no pose, stamps are not in seconds or do not ascend, a pose is no rigid transform, or two

@@ -34,6 +34,10 @@ def read_poses(
 ) -> Trajectory:
     """Trajectory of the lidar over a drive.
 
+    Poses of a "tum" file keep its world, whose z is to be up for tracks and maps: that of visual SLAM is the frame of
+    its first camera, that of others north, east and down. Poses multiplied from the left by the inverse of the first of
+    them are in the lidar's frame at first.
+
     Args:
         path: KITTI's `poses.txt` (12 numbers a line: the pose of camera 0 in its first frame), a file in TUM's format
             (`stamp tx ty tz qx qy qz qw` a line), or the folder `oxts` of a drive of KITTI raw, with
