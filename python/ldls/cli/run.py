@@ -83,8 +83,8 @@ def run(
         str | None,
         typer.Option(
             metavar="FILE|kiss-icp",
-            help="Poses of the lidar (TUM) or of camera 0 (KITTI, a line a frame) instead of those of the source; "
-            "kiss-icp finds them from the sweeps (extra odometry).",
+            help="Poses instead of the source's: of the lidar (TUM), or of camera 0 (KITTI: 12 numbers a line, a "
+            "line a frame; a lidar's own are given as TUM); kiss-icp finds them from the sweeps (extra odometry).",
             show_default="those of the source",
         ),
     ] = None,
