@@ -112,7 +112,7 @@ impl<'a> Images<'a> {
         };
         let shown = asked.par_iter().enumerate().map(show);
         let shown: Vec<Shown> = shown.collect::<Result<_>>()?;
-        self.objects = same_objects(views, &shown, same_object);
+        self.objects = same_objects(views, &shown, same_object, cancel)?;
         self.labels = labels_of(views, &self.objects);
         if of_moments {
             let moments = Moments {

@@ -2,8 +2,9 @@
 
 use super::shown::Shown;
 use super::view::View;
+use crate::memory::{push, with_room};
+use crate::{Cancel, Result};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 /// The instances that object l = 1, 2, ... consists of, at position l - 1: image and instance, the latter from 1.
 pub type Objects = Vec<Vec<(usize, u32)>>;
@@ -13,7 +14,15 @@ pub type Objects = Vec<Vec<(usize, u32)>>;
 const SAME_OBJECT_OF_OTHER_CATEGORY: f64 = 0.5;
 
 /// The instances of all views, those that show one object together.
-pub(super) fn same_objects(views: &[View], shown: &[Shown], same_object: f64) -> Objects {
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`] and [`crate::Error::Cancelled`].
+pub(super) fn same_objects(
+    views: &[View],
+    shown: &[Shown],
+    same_object: f64,
+    cancel: &Cancel,
+) -> Result<Objects> {
     let mut groups: Objects = Vec::new();
     let mut group_of: Vec<Vec<usize>> = Vec::new();
     for (image, view) in views.iter().enumerate() {
@@ -21,7 +30,7 @@ pub(super) fn same_objects(views: &[View], shown: &[Shown], same_object: f64) ->
         groups.extend((1..=view.masks.len() as u32).map(|m| vec![(image, m)]));
         group_of.push((first..groups.len()).collect());
     }
-    for pair in best_first(agreements(views, shown), same_object) {
+    for pair in best_first(agreements(views, shown, cancel)?, same_object) {
         let mut pair = pair.map(|(image, m)| group_of[image][m as usize - 1]);
         pair.sort_unstable();
         let [kept, joined] = pair;
@@ -38,7 +47,7 @@ pub(super) fn same_objects(views: &[View], shown: &[Shown], same_object: f64) ->
         groups[kept].sort_unstable();
     }
     groups.retain(|group| !group.is_empty());
-    groups
+    Ok(groups)
 }
 
 /// Numbers of points on which two instances agree, and in all.
@@ -55,7 +64,7 @@ struct Agreement {
 type Pair = [(usize, u32); 2];
 
 /// Pairs that agree well enough, those of one category before others and the best first.
-fn best_first(agreements: BTreeMap<Pair, Agreement>, same_object: f64) -> Vec<Pair> {
+fn best_first(agreements: Vec<(Pair, Agreement)>, same_object: f64) -> Vec<Pair> {
     let agree = |agreement: &Agreement| {
         let least = if agreement.other_category {
             same_object.max(SAME_OBJECT_OF_OTHER_CATEGORY)
@@ -66,22 +75,24 @@ fn best_first(agreements: BTreeMap<Pair, Agreement>, same_object: f64) -> Vec<Pa
     };
     let pairs = agreements.into_iter();
     let mut pairs: Vec<(Pair, Agreement)> = pairs.filter(|(_, found)| agree(found)).collect();
-    // a / b > c / d where a d > c b; the order of the map among equals
-    pairs.sort_by(|(_, a), (_, b)| {
+    // a / b > c / d where a d > c b; the order of images and instances among equals
+    pairs.sort_unstable_by(|(pair, a), (other, b)| {
         let better = (b.both * a.either).cmp(&(a.both * b.either));
-        a.other_category.cmp(&b.other_category).then(better)
+        let by_category = a.other_category.cmp(&b.other_category);
+        by_category.then(better).then(pair.cmp(other))
     });
     pairs.into_iter().map(|(pair, _)| pair).collect()
 }
 
 /// Agreement of each two instances in two images on which a point falls that both images see; those of two categories
 /// in images of two moments alone.
-fn agreements(views: &[View], shown: &[Shown]) -> BTreeMap<Pair, Agreement> {
+fn agreements(views: &[View], shown: &[Shown], cancel: &Cancel) -> Result<Vec<(Pair, Agreement)>> {
     let images = 0..views.len();
     let pairs = images.flat_map(|one| (one + 1..views.len()).map(move |other| [one, other]));
     let pairs = pairs.collect::<Vec<_>>().into_par_iter();
-    let of_pair = |pair| agreements_of(views, shown, pair);
-    pairs.flat_map_iter(of_pair).collect()
+    let of_pair = |pair| agreements_of(views, shown, pair, cancel);
+    let found: Vec<Vec<_>> = pairs.map(of_pair).collect::<Result<_>>()?;
+    Ok(found.into_iter().flatten().collect())
 }
 
 /// Those of the instances of two images.
@@ -89,7 +100,9 @@ fn agreements_of(
     views: &[View],
     shown: &[Shown],
     [one, other]: [usize; 2],
-) -> Vec<(Pair, Agreement)> {
+    cancel: &Cancel,
+) -> Result<Vec<(Pair, Agreement)>> {
+    cancel.check()?;
     let common = |image: usize, other: usize| {
         let mut counts = vec![0_usize; views[image].masks.len() + 1];
         let marks = shown[image].marks.iter();
@@ -98,23 +111,25 @@ fn agreements_of(
         counts
     };
     let (here, there) = (common(one, other), common(other, one));
-    let width = there.len();
-    let mut both = vec![0; here.len() * width];
+    // instances that meet, not all that there are: of images of thousands each meets few
+    let mut met: Vec<(u32, u32)> = with_room(shown[one].marks.len().min(shown[other].marks.len()))?;
     let mut marks = &shown[other].marks[..];
     for &(point, m) in &shown[one].marks {
         marks = &marks[marks.iter().take_while(|(at, _)| *at < point).count()..];
         for &(_, k) in marks.iter().take_while(|(at, _)| *at == point) {
-            both[m as usize * width + k as usize] += 1;
+            push(&mut met, (m, k))?;
         }
     }
-    let met = both.into_iter().enumerate().filter(|(_, both)| *both > 0);
-    let agreement = |(at, both)| {
-        let (m, k) = (at / width, at % width);
-        let other_category = views[one].categories[m - 1] != views[other].categories[k - 1];
+    met.sort_unstable();
+    let agreement = |same: &[(u32, u32)]| {
+        let (m, k) = same[0];
+        let (at, there_at) = (m as usize, k as usize);
+        let other_category = views[one].categories[at - 1] != views[other].categories[there_at - 1];
         let compared = !other_category || views[one].rows != views[other].rows;
         compared.then(|| {
-            let either = here[m] + there[k] - both;
-            let pair = [(one, m as u32), (other, k as u32)];
+            let both = same.len();
+            let either = here[at] + there[there_at] - both;
+            let pair = [(one, m), (other, k)];
             (
                 pair,
                 Agreement {
@@ -125,7 +140,7 @@ fn agreements_of(
             )
         })
     };
-    met.filter_map(agreement).collect()
+    Ok(met.chunk_by(PartialEq::eq).filter_map(agreement).collect())
 }
 
 #[cfg(test)]
@@ -192,7 +207,11 @@ mod tests {
         let shown = painted
             .each_ref()
             .map(|image| Shown::new(&sighting, slots, image, None, never).unwrap());
-        let objects = |same_object| same_objects(&views, &shown, same_object).len();
+        let objects = |same_object| {
+            same_objects(&views, &shown, same_object, never)
+                .unwrap()
+                .len()
+        };
         assert_eq!((objects(0.5), objects(0.5_f64.next_up())), (1, 2));
     }
 
@@ -222,7 +241,11 @@ mod tests {
         };
         let shown = [None, Some(&depths)]
             .map(|depths| Shown::new(&sighting, slots, &painted, depths, never).unwrap());
-        let objects = |same_object| same_objects(&[view; 2], &shown, same_object).len();
+        let objects = |same_object| {
+            same_objects(&[view; 2], &shown, same_object, never)
+                .unwrap()
+                .len()
+        };
         assert_eq!((objects(0.5), objects(0.5_f64.next_up())), (1, 2));
     }
 
