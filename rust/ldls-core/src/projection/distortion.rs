@@ -2,7 +2,7 @@
 //! and ROS.
 
 use crate::{Error, Result};
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Rotation3, Vector3};
 
 /// The departure of a lens from a pinhole.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,7 +71,7 @@ impl Lens {
     pub(crate) fn bend(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let r2 = x * x + y * y;
         // written so that NaN fails
-        let holds = r2 < self.limit_squared;
+        let holds = r2 < self.limit_squared && !self.is_folded([x, y]);
         holds.then(|| match &self.distortion {
             Distortion::None => [x, y],
             Distortion::Rational { k, p, s, .. } => {
@@ -98,6 +98,29 @@ impl Lens {
             }
         })
     }
+
+    /// True where tangential parts and prism turn the image over, which [`fold`] does not know of.
+    #[inline]
+    fn is_folded(&self, [x, y]: [f64; 2]) -> bool {
+        let Distortion::Rational { k, p, s, .. } = &self.distortion else {
+            return false;
+        };
+        if *p == [0.0; 2] && *s == [0.0; 4] {
+            return false;
+        }
+        let r2 = x * x + y * y;
+        let (radial, slope) = (rational(k, r2), rational_slope(k, r2));
+        let prism = [s[0] + 2.0 * s[1] * r2, s[2] + 2.0 * s[3] * r2];
+        let mixed = 2.0 * (x * y * slope + p[0] * x + p[1] * y);
+        let derivatives = Matrix2::new(
+            radial + 2.0 * (x * x * slope + p[0] * y + 3.0 * p[1] * x + x * prism[0]),
+            mixed + 2.0 * y * prism[0],
+            mixed + 2.0 * x * prism[1],
+            radial + 2.0 * (y * y * slope + 3.0 * p[0] * y + p[1] * x + y * prism[1]),
+        );
+        // written so that NaN is folded
+        !(derivatives.determinant() > 0.0 && derivatives.trace() > 0.0)
+    }
 }
 
 /// The tilted sensor of `distortion`: what falls on an upright one goes on along its ray, and is then turned upright.
@@ -122,13 +145,21 @@ fn rational(k: &[f64; 6], r2: f64) -> f64 {
     polynomial(k[0], k[1], k[2]) / polynomial(k[3], k[4], k[5])
 }
 
+/// Derivative of [`rational`] by r2.
+fn rational_slope(k: &[f64; 6], r2: f64) -> f64 {
+    let polynomial = |a: f64, b: f64, c: f64| 1.0 + r2 * (a + r2 * (b + r2 * c));
+    let slope = |a: f64, b: f64, c: f64| a + r2 * (2.0 * b + r2 * 3.0 * c);
+    let below = polynomial(k[3], k[4], k[5]);
+    (slope(k[0], k[1], k[2]) - rational(k, r2) * slope(k[3], k[4], k[5])) / below
+}
+
 fn fisheye(k: &[f64; 4], angle: f64) -> f64 {
     let s = angle * angle;
     angle * (1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3]))))
 }
 
 /// Distance from the axis on the plane z = 1 at which the distorted distance stops growing; infinite where it never
-/// does. Tangential parts, prisms and tilts, which are small, are left out.
+/// does. Tangential parts and prisms, which differ from side to side, and tilts are left out.
 fn fold(distortion: &Distortion) -> f64 {
     let distance = |angle: f64| match distortion {
         Distortion::None => angle,
@@ -202,6 +233,20 @@ mod tests {
                 .bend([f64::NAN, 0.0])
                 .is_none()
         );
+    }
+
+    #[test]
+    fn a_prism_folds_on_one_side() {
+        let lens = Lens::new(Distortion::Rational {
+            k: [0.0; 6],
+            p: [0.0; 2],
+            s: [0.1, 0.0, 0.0, 0.0],
+            tau: [0.0; 2],
+        });
+        let lens = lens.unwrap();
+        // d/dx (x + 0.1 (x^2 + y^2)) = 1 + 0.2 x
+        let seen = [-5.1, -4.9, 5.1].map(|x| lens.bend([x, 0.0]).is_some());
+        assert_eq!(seen, [false, true, true]);
     }
 
     #[test]
