@@ -16,9 +16,9 @@ from ldls.segmentation import Segmentation
 def bound_labels(result: Segmentation, truth: Labeling, classes: ClassSet) -> NDArray[np.int32]:
     """Labels (N,) in which every true object wholly has the label of the mask that overlaps it best.
 
-    A mask labels one object, of its own class; true points of a class without an instance are one object. Pairs are taken from the largest IoU down, between the points of the
-    object and those that fall on the mask, and of equals the first; points that do not count are in neither. An object
-    without a mask is background.
+    A mask labels one object, of its own class; true points of a class without an instance are one object. Pairs are
+    taken from the largest IoU down, between the points of the object and those that fall on the mask, and of equals the
+    first; points that do not count are in neither. An object without a mask is background.
 
     Args:
         result: Any result from the masks; only its points, masks and cameras matter.

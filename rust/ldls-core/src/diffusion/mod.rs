@@ -291,6 +291,15 @@ mod tests {
     }
 
     #[test]
+    fn small_seeds_have_not_converged_where_a_product_changes_as_much_as_they() {
+        let (points, seen) = strip();
+        let (a, b) = system::<f32>(&points, 10, &seen, 1e-7);
+        let (_, convergence) = likelihoods(&a, &b, 10, None, Cancel::never()).unwrap();
+        assert!(convergence.residual.unwrap() < 1e-5);
+        assert!(!convergence.converged() && convergence.sweeps > 10_000);
+    }
+
+    #[test]
     fn endlessly_many_products_are_taken_in_legs_where_their_series_would_grow() {
         let (points, seen) = strip();
         let (a, b) = system::<f32>(&points, 10, &seen, 1e-3);

@@ -1,6 +1,6 @@
 //! One pass over the graph: the values of some labels at all points.
 
-use super::convergence::{CONVERGED, Convergence, MOST_SWEEPS};
+use super::convergence::{Convergence, MOST_SWEEPS, enough};
 use super::lanes::{Lane, Lanes};
 use super::plan::PROBE_GROUP;
 use super::schedule::{Activity, ROWS_A_TASK, Schedule};
@@ -57,7 +57,8 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
                 pass.advance(&vec![Step::product(); products.saturating_sub(1)], cancel)?;
             }
             (None, None) => {
-                while pass.largest_change() > CONVERGED && pass.taken + 1 < MOST_SWEEPS {
+                let enough = enough(seeds.largest);
+                while pass.largest_change() > enough && pass.taken + 1 < MOST_SWEEPS {
                     pass.advance(&[Step::product()], cancel)?;
                 }
             }
@@ -177,6 +178,7 @@ impl<'a, T: Lane<WIDTH>, const WIDTH: usize> Pass<'a, T, WIDTH> {
     fn measure_residual(&mut self, cancel: &Cancel) -> Result<()> {
         self.advance(&[Step::product()], cancel)?;
         self.convergence.residual = Some(self.largest_change());
+        self.convergence.enough = Some(enough(self.seeds.largest));
         std::mem::swap(&mut self.z, &mut self.previous);
         Ok(())
     }

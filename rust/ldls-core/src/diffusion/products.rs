@@ -4,7 +4,7 @@
 //! all points, in double precision: the rounding of hundreds of products then is lost in that of the single precision
 //! in which likelihoods are handed out.
 
-use super::convergence::{CONVERGED, MOST_SWEEPS};
+use super::convergence::{MOST_SWEEPS, enough};
 use super::schedule::ROWS_A_TASK;
 use crate::graph::PointGraph;
 use crate::masks::PixelLabels;
@@ -25,6 +25,8 @@ pub struct Products {
     /// What the next product is written to.
     next: Vec<f64>,
     done: usize,
+    /// Largest change by a product after which none follows.
+    enough: f64,
     converged: bool,
 }
 
@@ -51,6 +53,7 @@ impl Products {
             next: zeros(likelihoods, cancel)?,
             z: zeros(likelihoods, cancel)?,
             done: 0,
+            enough: 0.0,
             converged: false,
         })
     }
@@ -70,7 +73,7 @@ impl Products {
     }
 
     /// True if all products asked for are done; without a number, if the last changed no likelihood by more
-    /// than 1e-5 or 20,000 are done.
+    /// than 1e-5 and a hundredth of the largest seed or 20,000 are done.
     pub fn is_finished(&self) -> bool {
         match self.iterations {
             Some(iterations) => self.done >= iterations,
@@ -112,7 +115,12 @@ impl Products {
         std::mem::swap(&mut self.z, &mut self.next);
         self.done += 1;
         if self.iterations.is_none() {
-            self.converged = self.last_change() <= CONVERGED;
+            let change = self.last_change();
+            if self.done == 1 {
+                // the first product yields the seeds
+                self.enough = enough(change);
+            }
+            self.converged = change <= self.enough;
         }
         Ok(())
     }

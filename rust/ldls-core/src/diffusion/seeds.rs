@@ -36,6 +36,8 @@ pub(super) struct Seeds<T> {
     others: Others<T>,
     /// Seeds of the probe, where the pass has it.
     pub(super) probe: Vec<[T; PROBE_LANES]>,
+    /// The largest seed of all labels.
+    pub(super) largest: f64,
     /// Values up to this magnitude are too small to matter.
     pub(super) least: T,
 }
@@ -127,6 +129,7 @@ impl<T: Real> Seeds<T> {
             in_common,
             others,
             probe,
+            largest,
             least: T::from_f64(T::NEGLIGIBLE * largest),
         })
     }
