@@ -162,6 +162,20 @@ def test_masks_alone_are_drawn_in_the_same_colours(small_scene) -> None:
     np.testing.assert_allclose(middle, 0.72 * grey + 0.28 * colour, atol=2)
 
 
+@pytest.mark.parametrize("width", [640, 1920, 3840])
+def test_masks_are_outlined_and_their_boxes_are_not_filled(width) -> None:
+    x, y = np.meshgrid(np.linspace(-1.5, 1.5, width), np.linspace(-1.5, 1.5, width // 4))
+    image = np.full((*x.shape, 3), 90, np.uint8)
+    ellipse = ldls.InstanceMasks.from_array([x**2 + y**2 < 1], categories=[3])
+    drawn, empty = (np.asarray(masks_overlay(each, image)).astype(int) for each in (ellipse, ellipse.select([])))
+    changed = np.abs(drawn - empty).max(axis=2)
+    from_middle = np.hypot(*np.meshgrid(*(np.linspace(-1.5, 1.5, n) for n in changed.shape[::-1])))
+    assert not changed[(from_middle > 1.05) & (np.arange(len(changed)) > 150)[:, None]].any()
+    inside = np.median(changed[from_middle < 0.9])
+    on_edge = changed[len(changed) // 2, np.abs(from_middle[len(changed) // 2] - 1) < 0.01]
+    assert on_edge.max() > 3 * inside > 0
+
+
 @pytest.fixture
 def drawn(monkeypatch):
     """The tags that pictures have."""

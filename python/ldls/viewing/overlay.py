@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -184,13 +185,16 @@ def _subdued(image: NDArray[np.uint8], scale: float) -> Image.Image:
 def _draw_mask(
     picture: Image.Image, crop: NDArray[np.bool_], colour: Colour, corner: tuple[int, int], scale: float
 ) -> None:
-    margin = 3  # for the outline
+    half_line_px = 0.6 * _pen_px(picture) + 0.5
+    # as wide as pixels of the image, and wide enough that the way to the edge is known as far as the line goes
+    blur_px = max(scale, half_line_px / 1.25)
+    margin = math.ceil(3 * blur_px / scale)
     small = Image.fromarray(np.pad(crop, margin).astype(np.uint8) * 255)
     large = small.resize(_scaled(small.size, scale), Image.Resampling.BILINEAR)
-    inside = np.asarray(large.filter(ImageFilter.GaussianBlur(scale))) / 255
+    inside = np.asarray(large.filter(ImageFilter.GaussianBlur(blur_px))) / 255
     # A blurred edge rises by 1 / (sqrt(2 pi) radius) a pixel, which gives the way to it in pixels.
-    to_edge_px = np.abs(inside - 0.5) * 2.5 * scale
-    outline = (0.6 * _pen_px(picture) + 0.5 - to_edge_px).clip(0, 1)
+    to_edge_px = np.abs(inside - 0.5) * 2.5 * blur_px
+    outline = (half_line_px - to_edge_px).clip(0, 1)
     at_px = (round((corner[0] - margin) * scale), round((corner[1] - margin) * scale))
     opacity = np.maximum(outline, 0.28 * (inside > 0.5))
     picture.paste(colour, at_px, Image.fromarray((opacity * 255).round().astype(np.uint8)))
