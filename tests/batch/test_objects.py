@@ -9,6 +9,7 @@ import pytest
 import ldls
 from batch import runs
 from command import command
+from datasets import layouts
 from ldls import batch
 from ldls.datasets import open_source
 from ldls.errors import UnsupportedFormatError
@@ -108,6 +109,14 @@ def test_boxes_of_kitti_are_a_format(few, tmp_path):
     assert outcome.exit_code == 0, outcome.output
     ldls.save(ldls.read_result(tmp_path / "out/000001.npz"), tmp_path / "expected.txt")
     assert (tmp_path / "out/000001.txt").read_bytes() == (tmp_path / "expected.txt").read_bytes() != b""
+
+
+def test_boxes_of_kitti_are_of_one_camera(tmp_path):
+    source = layouts.nuscenes(tmp_path / "source")
+    outcome = command(*runs.arguments(source, tmp_path / "out", "--formats", "npz,kitti-boxes"))
+    assert outcome.exit_code == 1 and not (tmp_path / "out").exists()
+    said = " ".join(outcome.output.split())
+    assert "--formats: kitti-boxes are of one camera, the source has 6; leave them out, and give --objects, a" in said
 
 
 def test_a_format_that_is_added_changes_nothing_of_the_table(few, settings, expected, tmp_path):

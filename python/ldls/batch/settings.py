@@ -86,15 +86,20 @@ class RunSettings:
         return usual if self.same_object is None else self.same_object
 
     def check_images(self, n_frames: int, n_cameras: int) -> None:
-        """Refuse a file of one image where there are several, which would all get its masks.
+        """Refuse a format of one camera, and a file of one image, where there are several that would all get its masks.
 
         Args:
             n_frames: Number of frames that are to be done.
             n_cameras: Number of images of each.
 
         Raises:
-            ParameterError: The place of masks or boxes does not tell frames or cameras apart.
+            ParameterError: The place of masks or boxes does not tell frames or cameras apart, or a format cannot.
         """
+        if "kitti-boxes" in self.formats and n_cameras > 1:
+            raise ParameterError(
+                f"formats: kitti-boxes are of one camera, the source has {n_cameras}; leave them out, and give "
+                "objects=, a .csv or .json file for a table of all objects"
+            )
         name, place = "masks", None if self.masks is None else fspath(self.masks)
         if self.segmenter is not None and self.segmenter.partition(":")[0] in OF_ONE_IMAGE:
             name, place = "segmenter", self.segmenter
