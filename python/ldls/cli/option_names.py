@@ -64,12 +64,14 @@ def _by_options(mend: str, options: Mapping[str, str]) -> str:
 
 
 def _with_value(found: re.Match[str], options: Mapping[str, str]) -> str:
-    words = _words(found[0], options) or _words(found[1], options) or found[1]
+    if whole := _words(found[0], options):
+        return whole
+    words = _words(found[1], options) or found[1]
     value = (found[2] or "...").replace("True", "true")
     if words.startswith("--option"):
         return f"{words}={value}"
-    # words say what a value means, but not a path
-    return f"{words} {value}" if any(mark in value for mark in "/\\") else words
+    # words say what a value means, but not a path or a number
+    return f"{words} {value}" if value.isdecimal() or any(mark in value for mark in "/\\") else words
 
 
 def _words(argument: str, options: Mapping[str, str]) -> str | None:
