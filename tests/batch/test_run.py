@@ -520,6 +520,13 @@ def test_a_log_has_lines_meanwhile(few, tmp_path):
     assert first < last < next(at for at, line in enumerate(lines) if "objects found" in line)
 
 
+def test_a_log_that_nobody_reads_stops_nothing(few, tmp_path):
+    with runs.started(runs.arguments(few, tmp_path / "out")) as running:
+        running.stdout.close()
+        running.wait()
+    assert len(list((tmp_path / "out").glob("*.npz"))) == 12
+
+
 def test_quiet_prints_nothing(few, tmp_path):
     outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--quiet")
     assert (outcome.exit_code, outcome.output) == (0, "")

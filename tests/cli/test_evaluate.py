@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 import ldls
+from batch import runs
 from command import command
 from ldls.io.labels import write_annotations, write_labeling
 from ldls.labeling import Labeling
@@ -54,6 +55,15 @@ def test_tables_are_printed_and_written(frames):
     }
     row = scores(frames / "new/tables")
     assert (row["Car precision"], row["Car recall"], row["Pedestrian recall"]) == (100.0, 75.0, 0.0)
+
+
+def test_tables_are_written_where_nobody_reads_what_is_printed(frames):
+    (frames / "mine/2.npz").unlink()
+    words = ["evaluate", frames / "mine", frames / "truth", "--missing", "skip", "--out", frames / "tables"]
+    with runs.started(words) as running:
+        running.stdout.close()
+        running.wait()
+    assert scores(frames / "tables")["Car recall"] == 100
 
 
 @pytest.mark.parametrize(

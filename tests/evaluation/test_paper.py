@@ -5,6 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import ldls
 from batch import runs
@@ -133,8 +134,14 @@ def test_on_real_frames_each_step_of_the_method_gains(data_folder):
         assert iou[CLUSTERING] < iou[PAPER]
 
 
-def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
-    out = tmp_path / "out"
+def test_the_command_writes_and_prints_tables_and_figures(folder, tmp_path, monkeypatch):
+    out, show, there = tmp_path / "out", Console.print, []
+
+    def look_and_show(*args, **options):
+        there.append({path.name for path in out.iterdir()})
+        show(*args, **options)
+
+    monkeypatch.setattr(Console, "print", look_and_show)
     ran = command("reproduce", folder, "--out", out)
     assert ran.exit_code == 0, ran.output
     for title in (
@@ -149,9 +156,13 @@ def test_the_command_prints_and_writes_tables_and_figures(folder, tmp_path):
         assert title in ran.output
     written = {path.name for path in out.iterdir()}
     stems = ("comparison", "instances", "panoptic", "ablation", "reliability", "coverage", "range", "iterations")
-    assert written == {f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")} | {
-        f"{stem}.png" for stem in ("range", "objects", "iterations", "reliability", "coverage")
-    }
+    # whoever looks at the first line alone ends the command
+    assert (
+        there[0]
+        == written
+        == {f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")}
+        | {f"{stem}.png" for stem in ("range", "objects", "iterations", "reliability", "coverage")}
+    )
     assert "nan" not in ran.output.lower()
 
 

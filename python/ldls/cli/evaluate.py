@@ -154,13 +154,13 @@ def evaluate(
     if track:
         _check_tracked(path for path, _ in places.values())
     true_path, true_format = parse_place(truth)
-    files = {}
+    files, notes = {}, []
     for method, (path, format) in places.items():
         files[method], lacking = pair_files(
             path, true_path, prediction_format=format, truth_format=true_format, missing=missing.value
         )
         if lacking:
-            console().print(f"{method}: left out for want of their pair: {_frames(len(lacking))}")
+            notes.append(f"{method}: left out for want of their pair: {_frames(len(lacking))}")
     if track and any(frame.truth.format == BOXES for own in files.values() for frame in own):
         raise ParameterError(
             f"--track: TRUTH is {BOXES}, which numbers the objects of each frame anew; expected a format whose numbers "
@@ -185,13 +185,12 @@ def evaluate(
     if whole is not None and BOUND not in by_method:
         bounds = read_bounds(whole, counting, classes=scored, joined=joined)
         by_method[BOUND] = score(progress(bounds, len(whole), "bound"))
-    _show(by_method, counting.by, out)
     if joined:
-        console().print(
+        notes.append(
             f"{BOUND}: of the masks of each sweep alone; labels of {_frames(len(joined))} come from those of other "
-            "sweeps, too, and may go beyond it",
-            soft_wrap=True,
+            "sweeps, too, and may go beyond it"
         )
+    _show(by_method, counting.by, notes, out)
 
 
 def _are_nuscenes(categories: Sequence[str]) -> bool:
@@ -263,7 +262,7 @@ def _check_out(out: Path, files: Iterable[LabelFiles], folders: FrameFolders) ->
     check_outputs({"--out": written}, read, made=out)
 
 
-def _show(by_method: dict[str, Evaluation], left_out_by: set[str], out: Path | None) -> None:
+def _show(by_method: dict[str, Evaluation], left_out_by: set[str], notes: Sequence[str], out: Path | None) -> None:
     from ldls.evaluation import tables
 
     shown = {
@@ -286,6 +285,8 @@ def _show(by_method: dict[str, Evaluation], left_out_by: set[str], out: Path | N
     for table in shown.values():
         screen.print(table.rich())
     _say_what_counted(by_method, left_out_by)
+    for note in notes:
+        screen.print(note, soft_wrap=True)
     if out:
         written = [f"{', '.join(shown)} and frames as .md, .csv and .json", *(path.name for path in figures)]
         screen.print(f"wrote {', '.join(written)} to {out}", soft_wrap=True)

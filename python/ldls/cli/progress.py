@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TypeVar
 
 import typer
@@ -46,7 +46,9 @@ def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
             said = now
             rate = finished / max(now - start, 1e-9)
             failures = f", {failed:,} failed" if failed else ""
-            typer.echo(f"{title}: {finished:,} of {total:,} frames{failures}, {rate:.1f} a second")
+            # whoever reads the log may end before, as `head -1` does
+            with suppress(BrokenPipeError):
+                typer.echo(f"{title}: {finished:,} of {total:,} frames{failures}, {rate:.1f} a second")
 
         yield update
 

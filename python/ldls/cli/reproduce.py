@@ -83,12 +83,13 @@ def reproduce(
     every = (side for one in pairs for pair in one.methods.values() for side in (pair.truth, pair.prediction))
     scored.check_occur(name for side in every for name in side.names)
     experiment = score(pairs, classes=scored)
-    screen = console()
     tables = _tables(experiment)
     for stem, table in tables.items():
         table.write(out, stem)
-        screen.print(table.rich())
     figures = _draw(experiment, out) + draw_reliability(experiment.methods, out)
+    screen = console()
+    for table in tables.values():
+        screen.print(table.rich())
     screen.print(f"{len(frames)} frames; wrote {', '.join(tables)} as .md, .csv and .json")
     screen.print(f"and {', '.join(path.name for path in figures)} to {out}", soft_wrap=True)
 
