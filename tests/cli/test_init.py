@@ -128,6 +128,44 @@ def test_the_camera_is_found_and_the_folder_is_a_source(rig, sample, calibrate):
     assert done.exit_code == 0, done.output
 
 
+def write_masks_of_all(path, images):
+    """COCO's data set with one mask of each of these images."""
+    mask = {"category_id": 3, "segmentation": [[100, 100, 200, 100, 200, 200]], "iscrowd": 0}
+    records = [{"id": k, "file_name": name, "height": 375, "width": 1242} for k, name in enumerate(images)]
+    annotations = [mask | {"id": k, "image_id": k} for k in range(len(images))]
+    write(path, json.dumps({"images": records, "annotations": annotations, "categories": [{"id": 3, "name": "car"}]}))
+
+
+@pytest.mark.parametrize(
+    ("place", "images", "expected"),
+    [
+        pytest.param("all.json", [f"{name}.png" for name in NAMES], "all.json", id="beside the folders"),
+        pytest.param("a/instances_2.json", [f"x/{name}.jpg" for name in NAMES], "a/instances_2.json", id="in a folder"),
+        pytest.param("all.json", ["1.png"], None, id="of other images"),
+    ],
+)  # fmt: skip
+def test_one_file_with_the_masks_of_all_images_is_found(rig, sample, place, images, expected):
+    in_kitti_files(rig, sample.images[0].camera)
+    shutil.rmtree(rig / "labels")
+    write_masks_of_all(rig / place, images)
+    assert command("init", rig).exit_code == 0
+    assert described(rig)["cameras"]["front"].get("masks") == expected
+    assert expected is None or len(open_source(rig)[0].images[0].masks) == 1
+
+
+def test_masks_of_cameras_are_of_those_that_they_name(rig, sample):
+    write_rig(rig, sample, ("back_left", "left", "rear"))
+    write(rig / f"masks/back_left/{NAMES[0]}.txt", b"2 0.1 0.4 0.2 0.4 0.2 0.6 0.1 0.6\n")
+    write_masks_of_all(rig / "all.json", [f"left/{name}.png" for name in NAMES])
+    assert command("init", rig).exit_code == 0
+    found = {name: camera.get("masks") for name, camera in described(rig)["cameras"].items()}
+    assert found == {
+        "images_back_left": "masks/back_left/{frame}.txt",
+        "images_left": "all.json",
+        "images_rear": None,
+    }
+
+
 def test_what_was_guessed_is_a_question(rig, sample):
     in_a_matrix_the_other_way_round(rig, sample.images[0].camera)
     assert command("init", rig).exit_code == 0

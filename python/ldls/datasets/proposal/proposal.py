@@ -31,6 +31,7 @@ from ldls.io import read_masks, read_points
 from ldls.io.cameras.field_file import MAX_BYTES
 from ldls.io.images import read_image_size
 from ldls.io.labels import read_labeling
+from ldls.io.masks.data_set import MaskDataSet
 from ldls.io.masks.formats import READERS as MASK_READERS
 from ldls.io.points import READERS as POINT_READERS
 from ldls.io.points.float_rows import likeliest_columns
@@ -173,29 +174,48 @@ def _add_camera(
     count = f"{_count(picture, 'image')} of {size[0]} x {size[1]} (height x width), {len(common):,} with a sweep"
     made.found.append(f"{picture.text}: {count}")
     own = [pattern for pattern in patterns if pattern not in (picture, sweeps)]
-    _add_masks(made, picture, own, size, alone=len(cameras) == 1)
+    _add_masks(made, picture, cameras, own, size)
     _add_calibration(made, picture, cameras, sweeps, own, points, size)
 
 
 def _add_masks(
-    made: Proposal, picture: Pattern, others: Iterable[Pattern], size: tuple[int, int], *, alone: bool
+    made: Proposal, picture: Pattern, cameras: Sequence[Pattern], others: Sequence[Pattern], size: tuple[int, int]
 ) -> None:
-    place = _place(picture).name
     fitting = []
     for other in others:
         common = other.shared(picture)
         if other.suffix not in MASK_READERS or not common or (other.suffix in IMAGE_SUFFIXES and _is_picture(other)):
             continue
-        with suppress(LdlsError, ImportError, ValueError):
-            read_masks(other.files[min(common)], image_size=size)
-            fitting.append((alone or place in other.text, len(common), other))
-    if not fitting or not max(fitting, key=lambda each: each[:2])[0]:
+        if len(cameras) == 1 or _owner(other, cameras) is picture:
+            with suppress(LdlsError, ImportError, ValueError):
+                read_masks(other.files[min(common)], image_size=size)
+                fitting.append((len(common), other.text))
+    found = fitting or _data_sets_of(picture, cameras, others, size)
+    n_common, place = max(found, key=lambda each: each[0], default=(0, ""))
+    if not n_common:
         made.lines.append(f'# masks = "masks/{FRAME}.json"')
         made.ask("no masks were found: any format of docs/masks.md, or `ldls run --segmenter`")
         return
-    _, n_common, masks = max(fitting, key=lambda each: each[:2])
-    made.lines.append(f"masks = {quoted(masks.text)}")
-    made.found.append(f"{masks.text}: masks of {_number(n_common, 'image')}")
+    made.lines.append(f"masks = {quoted(place)}")
+    made.found.append(f"{place}: masks of {_number(n_common, 'image')}")
+
+
+def _data_sets_of(
+    picture: Pattern, cameras: Sequence[Pattern], others: Iterable[Pattern], size: tuple[int, int]
+) -> list[tuple[int, str]]:
+    """The JSON files with the masks of many images, each after the number of the images of the camera that it names."""
+    few = [other for other in others if other.suffix == ".json" and len(other.files) <= MOST_CAMERAS]
+    found = []
+    for text, path in ((other.text.replace(FRAME, name), path) for other in few for name, path in other.files.items()):
+        with suppress(LdlsError):
+            data_set = MaskDataSet(path)
+            images = sorted(picture.files.items())
+            named = [frame for frame, image in images if data_set.has(frame) or data_set.has(image)]
+            if named:
+                paths = {_name(camera): camera.files.get(named[0]) for camera in cameras}
+                data_set.masks(data_set.find(named[0], _name(picture), paths), size)
+                found.append((len(named), text))
+    return found
 
 
 def _add_calibration(
