@@ -281,6 +281,19 @@ def test_a_transform_of_the_camera_goes_before_one_that_shows_more_points(rig, s
     assert asked == (0 if has_own else 1)
 
 
+def test_links_that_lead_out_are_warned_of_with_what_allows_them(rig, sample, tmp_path_factory):
+    in_kitti_files(rig, sample.images[0].camera)
+    for path in (rig / "lidar").iterdir():
+        path.symlink_to(shutil.move(path, tmp_path_factory.mktemp("elsewhere") / path.name))
+    outcome = command("init", rig)
+    assert outcome.exit_code == 0, outcome.output
+    assert f"warning: {rig}: links lead out of it; copy their files there, or give each command" in outcome.stderr
+    allowed = ("--option", "allow_outside=true")
+    assert " ".join(allowed) in outcome.stdout and command("info", rig, *allowed).exit_code == 0
+    refused = command("info", rig)
+    assert refused.stderr.rstrip().endswith(f"; copy it there, or pass {' '.join(allowed)}"), refused.output
+
+
 def test_names_that_are_times(tmp_path, sample):
     camera = sample.images[0].camera
     for stamp in ("1547131046.353", "1547131046.453", "1547131046.553", "1547131047.653"):

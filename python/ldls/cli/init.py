@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.errors import InputError
+from ldls.errors import InputError, LdlsWarning, UnsafePathError
 
 
 @speaks_plainly
@@ -62,5 +63,12 @@ def init(
         say(f"next: add what is missing to {path}, then: ldls info {folder} --picture check.png")
         raise typer.Exit(1)
     # what is written must open
-    open_source(folder)
-    say(f"next: ldls info {folder} --picture check.png; do the colours change where objects end?")
+    allowed = ""
+    try:
+        open_source(folder)
+    except UnsafePathError:
+        allowed = " --option allow_outside=true"
+        message = f"{folder}: links lead out of it; copy their files there, or give each command{allowed}"
+        warnings.warn(message, LdlsWarning, stacklevel=2)
+        open_source(folder, allow_outside=True)
+    say(f"next: ldls info {folder} --picture check.png{allowed}; do the colours change where objects end?")

@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 
 OF_SOURCES = (
-    "camera", "drive", "image_topics", "info_topics", "lidar", "max_offset_s", "poses", "recover", "scene", "sequence",
-    "split", "truth", "version", "world",
+    "allow_outside", "camera", "drive", "image_topics", "info_topics", "lidar", "max_offset_s", "poses", "recover",
+    "scene", "sequence", "split", "truth", "version", "world",
 )  # fmt: skip
 """Arguments of sources, which --option takes."""
 CONVERGED = "None for the converged solution"

@@ -18,7 +18,7 @@ from ldls.datasets.file_source import FileSource, described_in, image_from_file
 from ldls.datasets.folder_description import FILE, TEMPLATE, read_description
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.stored_masks import FRAME
-from ldls.errors import CorruptFileError, ParameterError, SourceError, within
+from ldls.errors import CorruptFileError, ParameterError, SourceError, UnsafePathError, within
 from ldls.io import read_camera, read_masks
 from ldls.io.cameras.extrinsic_file import as_extrinsic
 from ldls.io.cameras.kitti import RAW_FILES
@@ -180,7 +180,12 @@ class FolderSource(FileSource):
         return self._safe(pattern.replace(FRAME, name))
 
     def _safe(self, name: str) -> Path:
-        return self.path / name if self._allow_outside else strictly_below(self.path, name, place=str(self._file))
+        if self._allow_outside:
+            return self.path / name
+        try:
+            return strictly_below(self.path, name, place=str(self._file))
+        except UnsafePathError as error:
+            raise UnsafePathError(f"{error}, or pass allow_outside=True") from None
 
 
 def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:

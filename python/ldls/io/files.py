@@ -375,5 +375,7 @@ def strictly_below(folder: Path, name: str, *, place: str) -> Path:
     """
     path = below(folder, name, place=place)
     if not path.resolve().is_relative_to(folder.resolve()):
-        raise UnsafePathError(f"{place}: path {name!r} leads by a link to {path.resolve()}, out of {folder}")
+        raise UnsafePathError(
+            f"{place}: path {name!r} leads by a link to {path.resolve()}, out of {folder}; copy it there"
+        )
     return path
