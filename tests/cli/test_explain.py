@@ -350,6 +350,7 @@ def test_a_pixel_of_a_picture_of_ldls(frame, ring, tmp_path, rings):
     outcome = command("explain", f"{x:.2f},{y:.2f}", path, "--on", tmp_path / "a.png")
     assert outcome.exit_code == 0, outcome.output
     assert outcome.output.startswith(f"Point {row} is ")
+    assert (" of c: " in outcome.output) == rings
 
 
 @pytest.mark.parametrize(
@@ -371,12 +372,15 @@ def test_misuse_of_pictures_is_one_line(ring, tmp_path, words, message):
     assert message in outcome.stderr
 
 
-def test_a_point_far_from_the_pixel_or_place_is_not_taken(frame):
+def test_a_point_far_from_the_pixel_or_place_is_not_taken(frame, tmp_path):
     path = frame[1]
     corner = command("explain", "79.4,0", path)
     assert corner.exit_code == 1
     assert "POINT: no point is near. Point " in corner.stderr
-    assert "pixels away. Give " in corner.stderr
+    assert "pixels away. Give " in corner.stderr and corner.stderr.endswith("needs --on PICTURE\n")
+    save_picture(tmp_path / "a.png", overlay(frame[0]))
+    on_picture = command("explain", "1797,11", path, "--on", tmp_path / "a.png")
+    assert "POINT: no point is near. Point " in on_picture.stderr and "--on" not in on_picture.stderr
     nowhere = command("explain", "0,0,40", path)
     assert nowhere.exit_code == 1
     assert " m away. Give " in nowhere.stderr

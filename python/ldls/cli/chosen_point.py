@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.errors import InputError, ParameterError, within
 from ldls.segmentation import Segmentation
-from ldls.view import SeenView, camera_names
+from ldls.view import camera_names
 
 FAR_SHARE = 0.015
 """Share of the image's width beyond which the nearest point is not the one that was meant: half the gap of 16 beams."""
@@ -53,11 +53,12 @@ def chosen_point(
         if camera is not None:
             raise ParameterError(f"--camera: got {camera!r} beside --on, whose pixels tell their camera; leave it out")
         number, u, v = _on_picture(result, picture, (numbers[0], numbers[1]))
-        return _nearest_to_pixel(result, result.views[number], np.array((u, v)))
+        return _nearest_to_pixel(result, number, np.array((u, v)), mend="")
     if picture is not None:
         raise ParameterError(f"--on: got {picture} beside {word!r}; only a pixel U,V lies on a picture")
     if len(numbers) == 2:
-        return _nearest_to_pixel(result, _view_of(result, camera), np.array(numbers))
+        drawn = "; a pixel of a picture that ldls drew needs --on PICTURE"
+        return _nearest_to_pixel(result, _view_of(result, camera), np.array(numbers), mend=drawn)
     if camera is not None:
         _view_of(result, camera)
         if len(result.views) > 1:
@@ -84,19 +85,19 @@ def _row(word: str) -> int:
         raise ParameterError(f"POINT: got {word!r}, expected {EXPECTED}") from None
 
 
-def _view_of(result: Segmentation, camera: str | None) -> SeenView:
+def _view_of(result: Segmentation, camera: str | None) -> int:
     if not result.views:
         raise InputError("POINT: got a pixel, and there is no camera; give a row number or X,Y,Z")
     names = camera_names(result.views)
     if camera is None and len(names) == 1:
-        return result.views[0]
+        return 0
     listed = ", ".join(f"{number} ({name})" for number, name in enumerate(names))
     if camera is None:
         raise ParameterError(f"--camera: missing, and a pixel of which picture? Expected one of {listed}")
     if camera in names:
-        return result.views[names.index(camera)]
+        return names.index(camera)
     if camera.isdecimal() and int(camera) < len(names):
-        return result.views[int(camera)]
+        return int(camera)
     raise ParameterError(f"--camera: got {camera!r}, expected one of {listed}")
 
 
@@ -108,7 +109,8 @@ def _on_picture(result: Segmentation, picture: Path, at_px: tuple[float, float])
         return pixel_of(result, read_image_size(picture), at_px)
 
 
-def _nearest_to_pixel(result: Segmentation, seen: SeenView, uv_px: NDArray[np.float64]) -> ChosenPoint:
+def _nearest_to_pixel(result: Segmentation, number: int, uv_px: NDArray[np.float64], *, mend: str) -> ChosenPoint:
+    seen = result.views[number]
     if not len(seen.in_view):
         raise InputError("POINT: no point is in view of the camera; give a row number or X,Y,Z")
     distances = np.linalg.norm(seen.pixels - uv_px, axis=1)
@@ -117,12 +119,12 @@ def _nearest_to_pixel(result: Segmentation, seen: SeenView, uv_px: NDArray[np.fl
     nearest = int(np.lexsort((ranges_m, distances))[0])
     row = int(seen.in_view[nearest])
     u, v = uv_px.round(1).tolist()
-    how = f"Point {row} is the one in view nearest to pixel {u:g},{v:g}: {distances[nearest]:.1f} pixels away."
+    of_camera = f" of {camera_names(result.views)[number]}" if len(result.views) > 1 else ""
+    how = (
+        f"Point {row} is the one in view nearest to pixel {u:g},{v:g}{of_camera}: {distances[nearest]:.1f} pixels away."
+    )
     if distances[nearest] > FAR_SHARE * seen.view.masks.width:
-        raise InputError(
-            f"POINT: no point is near. {how} Give {row} to have that one explained; a pixel of a picture that ldls "
-            "drew needs --on PICTURE"
-        )
+        raise InputError(f"POINT: no point is near. {how} Give {row} to have that one explained{mend}")
     return ChosenPoint(row=row, how=how)
 
 
