@@ -154,6 +154,17 @@ def test_boxes_of_each_frame(few, tmp_path):
     assert "label_2/000003.txt, of which frame 000003 was made, was changed since" in outcome.output
 
 
+def test_boxes_that_a_frame_lacks_are_named(few, tmp_path):
+    lacking, empty = few / "label_2/000001.txt", few / "label_2/000002.txt"
+    lacking.unlink()
+    empty.write_text("")
+    words = ("--segmenter", f"boxes:{few}/label_2/{{frame}}.txt", "--out", tmp_path / "out", "--frames", ":3")
+    outcome = command("run", few, *words)
+    assert f"000001 failed (masks): --segmenter: there is no {lacking}; make it, empty where" in outcome.output
+    (failure,) = map(json.loads, (tmp_path / "out/failures.jsonl").read_text().splitlines())
+    assert (failure["frame"], failure["code"]) == ("000001", "input")
+
+
 ONE_IMAGE = [
     pytest.param("segmenter", "boxes:{source}/label_2/000000.txt", 3, 1, "frame", id="boxes"),
     pytest.param("segmenter", "grabcut:{source}/label_2/000000.txt", 3, 1, "frame", id="grabcut"),

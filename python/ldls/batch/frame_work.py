@@ -309,12 +309,22 @@ def _segmenters(
     """
     if FRAME in spec or "{camera}" in spec:
         names = OF_ONE_IMAGE.get(spec.partition(":")[0], {})
-        return lambda frame, image: open_segmenter(fill(spec, frame, image.name), min_score=min_score), (names,)
+        return lambda frame, image: _of_one_image(fill(spec, frame, image.name), min_score), (names,)
     # every worker runs it, each on a core of its own
     options = {"threads": 1} if spec.startswith("onnx:") else {}
     opened = open_segmenter(spec, min_score=min_score, **options)
     # segmenters of others may have no such attribute
     return lambda frame, image: opened, (getattr(opened, "names", None) or {},)
+
+
+def _of_one_image(spec: str, min_score: float | None) -> Segmenter:
+    try:
+        return open_segmenter(spec, min_score=min_score)
+    except FileNotFoundError as error:
+        raise InputError(
+            f"segmenter: there is no {error.filename}; make it, empty where the image shows no object, or leave the "
+            "frame out"
+        ) from None
 
 
 def _inputs(work: Work) -> dict[str, State]:
