@@ -83,6 +83,8 @@ def files(tmp_path, small_scene, monkeypatch):
     (tmp_path / "labels").mkdir()
     np.full(9, 10, np.uint32).tofile(tmp_path / "labels/0.label")
     layouts.kitti_object(tmp_path / "kitti")
+    for place in ("label_2", "masks"):
+        (tmp_path / "kitti" / place).mkdir()
     (tmp_path / "kitti/velodyne/000001.bin").write_bytes(bytes(108))
     monkeypatch.chdir(tmp_path)
 
@@ -106,6 +108,11 @@ FRAME = "segment --points points.npy --calib camera.yml --masks masks.npz --out 
         pytest.param("view kitti --dataset foo", "--dataset: got 'foo'", id="kind of view"),
         pytest.param("masks convert overlapping.npz a.png", "; .json and .npz hold masks that overlap; --resolve score "
                      "leaves it to one", id="overlaps"),
+        pytest.param("masks convert overlapping.npz a.png", "masks of labels 1 and 2 share pixel (0, 0)", id="labels"),
+        pytest.param("reproduce kitti --out out", "no folder annotations, but label_2; take it by --truth kitti-boxes",
+                     id="truth"),
+        pytest.param("simulate out --layout kitti-raw --rig ring", "--rig: got 'ring', expected kitti or robot",
+                     id="rig"),
         pytest.param("masks convert masks.npz a.npy", "or pass --variant pixels", id="pixels only"),
         pytest.param(f"{FRAME} --extrinsic lidar.txt --iterations 0", "--iterations: got 0, expected 1 to 100000, or "
                      "--converge until nothing changes", id="iterations"),

@@ -317,6 +317,8 @@ def test_truth_of_kitti_is_its_annotations_before_its_boxes(tmp_path):
     box = "Car 0 0 0 0 0 80 60 4 5 5 0 2 10 0\n"
     layouts.write_text(folder / "label_2/000000.txt", box)
     assert open_source(folder)[0].truth.counts()["Car"] > 40
+    with pytest.raises(ldls.SourceError, match="no folder annotations, but label_2; take it by truth=kitti-boxes$"):
+        open_source(folder, truth="annotations")
     layouts.write_text(folder / "annotations/000000.txt", "1 Pedestrian\n" * 100)
     assert open_source(folder)[0].truth.counts()["Pedestrian"] == 100
     assert open_source(folder)[1].truth is None

@@ -26,8 +26,11 @@ WORDS: Mapping[str, Mapping[str, str]] = {
     "ranges_m": {"--points": "--points"},
     "resolve_overlaps": {"--resolve": "--resolve score"},
     "threads": {"--cores": "--cores"},
+    "truth=annotations": {"--truth": "--truth annotations"},
+    "truth=kitti-boxes": {"--truth": "--truth kitti-boxes"},
     "workers": {"--cores": "--cores"},
     **{name: {"--option": f"--option {name}"} for name in OF_SOURCES},
+    "camera": {"--option": "--option camera", "--rig": "--rig"},
 }
 """Words for arguments that go by another name on the command line, by the option that the command must have."""
 PYTHON = "in Python"

@@ -13,7 +13,7 @@ from pathlib import Path
 from ldls.checks import checked
 from ldls.datasets.file_source import FileSource, choose, find_files, find_images, find_points, image_from_file
 from ldls.datasets.frame import CameraImage
-from ldls.errors import ParameterError
+from ldls.errors import ParameterError, SourceError
 from ldls.io import read_camera, read_masks
 from ldls.io.cameras.kitti import camera_numbers
 from ldls.io.images import read_image_size
@@ -82,9 +82,7 @@ class KittiObjectSource(FileSource):
         else:
             raise ParameterError(f"masks: got {masks!r} for {len(self._numbers)} cameras, expected one camera")
         if isinstance(truth, str):
-            if truth not in TRUTHS:
-                raise ParameterError(f"truth: got {truth!r}, expected true, false, {' or '.join(TRUTHS)}")
-            folder, _ = TRUTHS[truth]
+            folder = _truth_folder(path, truth)
             parts[folder] = find_files(path / folder, (".txt",))
         self._truths = [TRUTHS[truth]] if isinstance(truth, str) else [*TRUTHS.values()]
         super().__init__(path, parts, self._numbers, truth=bool(truth))
@@ -104,6 +102,23 @@ class KittiObjectSource(FileSource):
 
     def _truth_files(self, name: str) -> Iterable[tuple[Path, str]]:
         return [(self.path / folder / f"{name}.txt", format) for folder, format in self._truths]
+
+
+def _truth_folder(path: Path, truth: str) -> str:
+    """The folder of one kind of truth.
+
+    Raises:
+        ParameterError: There is no such kind.
+        SourceError: The frames have another kind alone.
+    """
+    if truth not in TRUTHS:
+        raise ParameterError(f"truth: got {truth!r}, expected true, false, {' or '.join(TRUTHS)}")
+    there = {word: folder for word, (folder, _) in TRUTHS.items() if (path / folder).is_dir()}
+    folder, _ = TRUTHS[truth]
+    if there and truth not in there:
+        word, other = next(iter(there.items()))
+        raise SourceError(f"{path}: has no folder {folder}, but {other}; take it by truth={word}")
+    return folder
 
 
 def _is_frames(path: Path) -> bool:

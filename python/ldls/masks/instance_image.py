@@ -128,8 +128,8 @@ def _refuse_overlaps(spans: NDArray[np.int64], owners: NDArray[np.int64], height
     if overlap.any():
         at = int(overlap.argmax())
         column, row = divmod(int(spans[at + 1, 0]), height)
-        first, second = sorted(owners[at : at + 2].tolist())
+        first, second = sorted((owners[at : at + 2] + 1).tolist())
         raise MaskError(
-            f"masks {first} and {second} share pixel ({row}, {column}), and an instance image gives each pixel to one; "
-            ".json and .npz hold masks that overlap; resolve_overlaps() leaves it to one"
+            f"masks of labels {first} and {second} share pixel ({row}, {column}), and an instance image gives each to "
+            "one; .json and .npz hold masks that overlap; resolve_overlaps() leaves it to one"
         )

@@ -185,7 +185,9 @@ def test_a_large_image_within_the_limit_warns_of_nothing(tmp_path):
 
 def test_overlaps_are_refused_with_the_mend(tmp_path):
     masks = random_masks(5)
-    with pytest.raises(ldls.MaskError, match=r"masks \d and \d share pixel \(\d+, \d+\).*resolve_overlaps"):
+    with pytest.raises(
+        ldls.MaskError, match=r"masks of labels [1-9] and [1-9] share pixel \(\d+, \d+\).*resolve_overlaps"
+    ):
         ldls.save(masks, tmp_path / "masks.png")
     assert list(tmp_path.iterdir()) == []
     ldls.save(masks.resolve_overlaps(), tmp_path / "masks.png")
