@@ -47,7 +47,7 @@ def after(function):
 
 def half_a_line(self, records):
     if next(COUNT) == N:
-        self._file.write(journal._line(next(iter(records)))[:40])
+        self._file.write(journal.line_of(next(iter(records)))[:40])
         die()
     return WRITE_LINES(self, records)
 

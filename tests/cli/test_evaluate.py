@@ -298,7 +298,7 @@ def test_a_method_of_another_number_of_points_is_refused(seen):
         pytest.param("other", "expected NAME=PATH, or NAME=FORMAT:PATH", id="no name"),
         pytest.param("=mine", "expected NAME=PATH, or NAME=FORMAT:PATH", id="an empty name"),
         pytest.param("other=nowhere", "nowhere: no such file or folder; expected PATH, or FORMAT:PATH", id="no path"),
-        pytest.param("other=cvat:mine", "FORMAT:PATH with one of lidarseg, panoptic, npz, label", id="no such format"),
+        pytest.param("other=cvat:mine", "FORMAT:PATH with one of npz, panoptic, label, lidarseg", id="no such format"),
         pytest.param("mine=mine", "'mine' is the name of another method; give each its own (--name)", id="twice"),
     ],
 )
