@@ -222,16 +222,20 @@ def ancestors(frame: str, parents_of: Mapping[str, Iterable[str]]) -> list[str]:
 
 def parents(messages: Iterable[Message]) -> dict[str, list[str]]:
     """The parents of each frame that transforms name, whatever else they say."""
-    edges = [(plain(one.child_frame_id), plain(one.header.frame_id)) for each in messages for one in each.transforms]
     found: dict[str, list[str]] = {}
-    for child, parent in dict.fromkeys(edges):
+    for child, parent in dict.fromkeys(frames_of(one) for each in messages for one in each.transforms):
         found.setdefault(child, []).append(parent)
     return found
 
 
+def frames_of(one: Message) -> tuple[str, str]:
+    """Child and parent of a TransformStamped."""
+    return plain(one.child_frame_id), plain(one.header.frame_id)
+
+
 def _parts(one: Message) -> tuple[str, str, Floats]:
     """Child, parent and (4, 4) of a TransformStamped."""
-    child, parent = plain(one.child_frame_id), plain(one.header.frame_id)
+    child, parent = frames_of(one)
     name = f"transforms: from {parent} to {child}"
     return child, parent, matrix_of(name, one.transform.rotation, one.transform.translation)
 

@@ -19,7 +19,7 @@ from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage, Frame, Source
 from ldls.datasets.ros_odometry import Odometry, odometry_topics, read_odometry
 from ldls.datasets.ros_stamps import StampedMessage, check_clock, nearest, nearest_images, offset_s, read_stamps
 from ldls.datasets.ros_topics import choose_topics
-from ldls.datasets.ros_transforms import TransformTree, agreeing, ancestors, given_transforms, parents, plain
+from ldls.datasets.ros_transforms import TransformTree, agreeing, ancestors, frames_of, given_transforms, parents, plain
 from ldls.errors import CalibrationError, ParameterError, PoseError, within
 from ldls.io.cameras.extrinsic_file import Extrinsic
 from ldls.io.ros.bags import SUFFIXES, open_bag, storage_files
@@ -333,13 +333,22 @@ class RosBag(Source):
     def _transforms(self, name: str) -> Iterator[tuple[str, Message]]:
         """The messages of a topic of transforms, with the topic.
 
-        Of several it is that of the longest prefix that the topic of the clouds has too; without any such all count.
+        Of several those count whose prefix the topic of the clouds has too, and between two frames the longest of them;
+        without any such all count.
         """
         kinds = (TRANSFORMS, OLD_TRANSFORMS)
         topics = [t.name for t in self._bag.topics.values() if t.type in kinds and t.name.endswith(name)]
         own = [topic for topic in topics if self.topics.points.startswith(topic.removesuffix(name) + "/")]
-        for message in self._bag.read_all([max(own, key=len)] if own else topics):
-            yield message.topic, self._bag.decode(message.topic, message.raw)
+        told: dict[tuple[str, str], str] = {}
+        for together in [[topic] for topic in sorted(own, key=len, reverse=True)] or [topics]:
+            for message in self._bag.read_all(together):
+                decoded = self._bag.decode(message.topic, message.raw)
+                if own:
+                    pairs = [(frames_of(one), one) for one in decoded.transforms]
+                    decoded.transforms = [
+                        one for at, one in pairs if told.setdefault(at, message.topic) == message.topic
+                    ]
+                yield message.topic, decoded
 
     def _pixels(self, image: StampedMessage, image_size: tuple[int, int] | None) -> NDArray[np.uint8]:
         compressed = self._bag.topics[image.topic].type == COMPRESSED_IMAGE
