@@ -52,7 +52,7 @@ SYNONYMS: tuple[tuple[str, ...], ...] = (
 def folded(name: str) -> str:
     """What names of classes are compared by: `name` without capitals and outer blanks, and with a blank for `_`."""
     # KITTI's files, whose fields blanks separate, hold traffic_light
-    return " ".join(name.lower().split()).replace("_", " ")
+    return " ".join(name.lower().replace("_", " ").split())
 
 
 NO_OBJECTS = frozenset(map(folded, ("background", "_background_", "__background__", "__ignore__")))

@@ -141,18 +141,19 @@ def test_of_several_robots_the_transforms_are_those_of_the_clouds_prefix(tmp_pat
     assert bag[0].pose[2, 3] == expected
 
 
-def test_transforms_of_no_prefix_are_those_of_each_robot_too(tmp_path):
+@pytest.mark.parametrize(("own", "other"), [("/r1", ""), ("", "/camera")])
+def test_transforms_that_other_topics_alone_have_count_too(tmp_path, own, other):
     path = tmp_path / "robot.bag"
     with BagWriter(path, "rosbag1") as bag:
-        bag.add_topic(Topic("/r1/points", POINTS, 0))
+        bag.add_topic(Topic(f"{own}/points", POINTS, 0))
         for topic, edges in {
-            "/tf_static": [("base", "lidar"), ("mast", "base")],
-            "/r1/tf_static": [("base", "lidar")],
+            f"{other}/tf_static": [("base", "lidar"), ("mast", "base")],
+            f"{own}/tf_static": [("base", "lidar")],
         }.items():
             bag.add_topic(Topic(topic, TRANSFORMS, 0, latched=True))
             height = float(len(edges))
             bag.write_message(topic, transforms(bag.types, edges, START_NS, height=height), START_NS)
-        bag.write_message("/r1/points", encode(bag.types, Recording().cloud(0), Header(START_NS, "lidar")), START_NS)
+        bag.write_message(f"{own}/points", encode(bag.types, Recording().cloud(0), Header(START_NS, "lidar")), START_NS)
     base, mast = (RosBag(path, image_topics=(), world=world)[0].pose[2, 3] for world in ("base", "mast"))
     assert (base, mast) == (2, 4)
 

@@ -321,6 +321,8 @@ def _of_one_image(spec: str, min_score: float | None) -> Segmenter:
     try:
         return open_segmenter(spec, min_score=min_score)
     except FileNotFoundError as error:
+        if spec.partition(":")[0] not in OF_ONE_IMAGE:
+            raise
         raise InputError(
             f"segmenter: there is no {error.filename}; make it, empty where the image shows no object, or leave the "
             "frame out"

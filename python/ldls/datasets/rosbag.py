@@ -333,21 +333,19 @@ class RosBag(Source):
     def _transforms(self, name: str) -> Iterator[tuple[str, Message]]:
         """The messages of a topic of transforms, with the topic.
 
-        Of several those count whose prefix the topic of the clouds has too, and between two frames the longest of them;
-        without any such all count.
+        Between two frames the topic counts whose prefix that of the clouds has too, of several the longest, and where
+        there is none all others.
         """
         kinds = (TRANSFORMS, OLD_TRANSFORMS)
         topics = [t.name for t in self._bag.topics.values() if t.type in kinds and t.name.endswith(name)]
         own = [topic for topic in topics if self.topics.points.startswith(topic.removesuffix(name) + "/")]
-        told: dict[tuple[str, str], str] = {}
-        for together in [[topic] for topic in sorted(own, key=len, reverse=True)] or [topics]:
+        others = [topic for topic in topics if topic not in own]
+        told: dict[tuple[str, str], int] = {}
+        for rank, together in enumerate([*([topic] for topic in sorted(own, key=len, reverse=True)), others]):
             for message in self._bag.read_all(together):
                 decoded = self._bag.decode(message.topic, message.raw)
-                if own:
-                    pairs = [(frames_of(one), one) for one in decoded.transforms]
-                    decoded.transforms = [
-                        one for at, one in pairs if told.setdefault(at, message.topic) == message.topic
-                    ]
+                pairs = [(frames_of(one), one) for one in decoded.transforms]
+                decoded.transforms = [one for frames, one in pairs if told.setdefault(frames, rank) == rank]
                 yield message.topic, decoded
 
     def _pixels(self, image: StampedMessage, image_size: tuple[int, int] | None) -> NDArray[np.uint8]:

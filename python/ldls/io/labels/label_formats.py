@@ -208,7 +208,11 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
     entries = [entry for entry in sorted(path.iterdir()) if entry.is_file() and not entry.name.startswith(".")]
     for ending in endings:
         # of a_panoptic.npz the frame is a, in whatever format labels are wanted
-        new = {entry.name[: -len(ending)]: entry for entry in entries if _ending(entry.name) == ending}
+        new = {
+            entry.name[: -len(ending)]: entry
+            for entry in entries
+            if _ending(entry.name) == ending != entry.name.lower()
+        }
         if not new.keys() - files.keys():
             continue
         try:
