@@ -44,8 +44,8 @@ LEAST_UPRIGHT = 0.5
 """Cosine of the angle from z of the world to z of the lidar below which z of one of them is not up: of 60 degrees."""
 NOT_UPRIGHT = (
     "pose: z of the lidar does not point up along z of the world, but tracks, velocities and maps are of what is seen "
-    "along z; where z of the world is not up, multiply all poses from the left by the inverse of the first one; where z "
-    "of the lidar is not, turn points, T_camera_lidar and poses until it is"
+    "along z; where z of the world is not up, multiply all poses from the left by the inverse of the first one; where "
+    "z of the lidar is not, turn points, T_camera_lidar and poses until it is"
 )
 """The same for all sweeps of a drive, so that it is said once."""
 
