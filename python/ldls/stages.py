@@ -333,8 +333,9 @@ def diffuse(
     Args:
         A: (n, n) of `normalize_rows`.
         b: (n, M + 1) of `normalize_rows`.
-        iterations: Number of products. None with `every`: until one more changes no likelihood by more than 1e-5, at
-            most 20,000. On real frames the last is then within 1e-4 of the largest likelihood of the fixed point.
+        iterations: Number of products. None with `every`: until one more changes no likelihood by more than 1e-5 and a
+            hundredth of the largest of b, at most 20,000. On real frames the last is then within 1e-4 of the largest
+            likelihood of the fixed point.
         every: Products from one array to the next, 1 or more.
         threads: As in `Params`. Results do not depend on it.
     """

@@ -189,6 +189,13 @@ def test_an_extrinsic_in_the_projection_is_that_of_the_camera(mirror, rotation):
     assert pickle.loads(pickle.dumps(camera)).T_camera_lidar.tolist() == camera.T_camera_lidar.tolist()
 
 
+@pytest.mark.parametrize("turn", [(-1.0, -1, 1), (1, -1, -1), (-1, 1, -1)])
+def test_half_a_turn_in_the_projection_is_that_of_the_camera(turn):
+    camera = ldls.Camera(projection=pinhole().projection[:, :3] @ np.diag(turn))
+    np.testing.assert_allclose(camera.projection, pinhole().projection, atol=1e-12)
+    np.testing.assert_allclose(camera.T_camera_lidar, np.diag([*turn, 1]), atol=1e-12)
+
+
 def test_up_is_the_same_for_a_camera_of_one_matrix():
     points = np.random.default_rng(7).uniform([3, -4, -1.8], [30, 4, 1], (400, 3))
     points[:300, 2] = -1.8

@@ -43,7 +43,7 @@ def _taken_apart(projection: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     intrinsic, rotation = np.triu(U.T[::-1, ::-1]), Q.T[::-1]
     signs = np.where(np.diag(intrinsic) < 0, -1.0, 1.0)
     # a mirror stays in K
-    signs[0] *= np.linalg.det(rotation) * signs.prod()
+    signs[0] *= np.sign(np.linalg.det(rotation)) * signs.prod()
     intrinsic, rotation = intrinsic * signs, signs[:, None] * rotation
     translation = np.linalg.solve(intrinsic, projection[:, 3])
     return np.column_stack([intrinsic, np.zeros(3)]), from_parts(rotation, translation)
@@ -100,7 +100,8 @@ class Camera:
                 f"projection: the last column is {projection[:, 3].tolist()}, expected zeros beside a distortion; pass "
                 "the intrinsic matrix K of the raw image, or leave the distortion out for a rectified one"
             )
-        if np.tril(projection[:, :3], -1).any():
+        # two axes turned round are half a turn; one is a mirror
+        if np.tril(projection[:, :3], -1).any() or np.count_nonzero(np.diag(projection) < 0) == 2:
             # up, and how far away points are, go by the camera's own frame
             projection, extrinsic = _taken_apart(projection)
             self._hold(projection, extrinsic @ transform)

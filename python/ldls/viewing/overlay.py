@@ -191,7 +191,9 @@ def _draw_mask(
     margin = math.ceil(3 * blur_px / scale)
     small = Image.fromarray(np.pad(crop, margin).astype(np.uint8) * 255)
     large = small.resize(_scaled(small.size, scale), Image.Resampling.BILINEAR)
-    inside = np.asarray(large.filter(ImageFilter.GaussianBlur(blur_px))) / 255
+    blurred = np.asarray(large.filter(ImageFilter.GaussianBlur(blur_px)))
+    # what is thinner than the blur would nowhere come to a half
+    inside = blurred / max(blurred.max(), 1)
     # A blurred edge rises by 1 / (sqrt(2 pi) radius) a pixel, which gives the way to it in pixels.
     to_edge_px = np.abs(inside - 0.5) * 2.5 * blur_px
     outline = (half_line_px - to_edge_px).clip(0, 1)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.camera import Camera
-from ldls.camera.rigid import inverse
 from ldls.errors import InputError
 from ldls.view import SeenView
 from ldls.viewing.recording.stream import Entity, rerun
@@ -34,7 +33,7 @@ def pinhole_of(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]
     T_pinhole_camera = np.eye(4)
     T_pinhole_camera[:3, 3] = np.linalg.solve(camera.projection[:, :3], camera.projection[:, 3])
     K[:2] += PIXEL_CENTRE * K[2]
-    return K, inverse(T_pinhole_camera @ camera.T_camera_lidar)
+    return K, np.asarray(np.linalg.inv(T_pinhole_camera @ camera.T_camera_lidar), np.float64)
 
 
 def log_camera(entity: Entity, camera: Camera, image_size: tuple[int, int]) -> None:
