@@ -176,17 +176,6 @@ def test_masks_are_outlined_and_their_boxes_are_not_filled(width) -> None:
     assert on_edge.max() > 3 * inside > 0
 
 
-@pytest.mark.parametrize("width", [1920, 3840])
-def test_masks_thinner_than_the_line_are_seen(width) -> None:
-    mask = np.zeros((width // 4, width), bool)
-    mask[width // 8 :, width // 2 :][:2, :2] = True
-    small = ldls.InstanceMasks.from_array([mask], categories=[3])
-    image = np.full((*mask.shape, 3), 90, np.uint8)
-    drawn, empty = (np.asarray(masks_overlay(each, image)).astype(int) for each in (small, small.select([])))
-    middle = [slice(size // 2 - 1, size // 2 + 3) for size in drawn.shape[:2]]
-    assert np.abs(drawn - empty)[*middle].max() > 60
-
-
 @pytest.fixture
 def drawn(monkeypatch):
     """The tags that pictures have."""
@@ -195,6 +184,17 @@ def drawn(monkeypatch):
     module = importlib.import_module("ldls.viewing.overlay")
     monkeypatch.setattr(module, "draw_tags", lambda picture, of_picture, *_: tags.extend(of_picture))
     return tags
+
+
+@pytest.mark.parametrize("width", [1920, 3840])
+def test_masks_thinner_than_the_line_are_seen(width, drawn) -> None:
+    mask = np.zeros((width // 4, width), bool)
+    mask[width // 8 :, width // 2 :][:2, :2] = True
+    small = ldls.InstanceMasks.from_array([mask], categories=[3])
+    image = np.full((*mask.shape, 3), 90, np.uint8)
+    shown, empty = (np.asarray(masks_overlay(each, image)).astype(int) for each in (small, small.select([])))
+    middle = [slice(size // 2 - 1, size // 2 + 3) for size in shown.shape[:2]]
+    assert np.abs(shown - empty)[*middle].max() > 60
 
 
 def test_only_objects_with_points_are_named(small_scene, drawn) -> None:

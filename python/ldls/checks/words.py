@@ -26,5 +26,5 @@ def choice(name: str, value: _Word, known: Collection[str]) -> _Word:
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """The end of a message: "; did you mean 'label'?", of those `known` the nearest; empty where none is near."""
     spelt = {each.lower(): each for each in known}
-    near = get_close_matches(word.lower(), spelt, n=1, cutoff=0.6)
+    near = get_close_matches(word.lower(), spelt, n=1, cutoff=0.5)
     return f"; did you mean {spelt[near[0]]!r}?" if near else ""
