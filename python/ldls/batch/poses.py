@@ -195,7 +195,7 @@ class Poses:
             return
         first, last = float(trajectory.stamps[0]), float(trajectory.stamps[-1])
         stamps = [stamp for stamp in self.stamps if stamp is not None]
-        are_own = any(stamp is not None for stamp in self._source.stamps)
+        are_own = any(stamp is not None for stamp in _own_stamps(self._source))
         times = (
             f"are from {min(stamps):.6f} to {max(stamps):.6f} s"
             if are_own
@@ -221,9 +221,15 @@ class Poses:
 
 
 def _stamps(source: Source, settings: RunSettings) -> tuple[float | None, ...]:
-    if settings.poses is None or any(stamp is not None for stamp in source.stamps):
-        return source.stamps
+    stamps = _own_stamps(source)
+    if settings.poses is None or any(stamp is not None for stamp in stamps):
+        return stamps
     return tuple(PERIOD_S * number for number in range(len(source)))
+
+
+def _own_stamps(source: Source) -> tuple[float | None, ...]:
+    # sources of others may have no such attribute
+    return tuple(getattr(source, "stamps", (None,) * len(source)))
 
 
 def _trajectory(path: Path, source: Source, times: tuple[float | None, ...]) -> Trajectory:
