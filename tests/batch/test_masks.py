@@ -133,6 +133,8 @@ def test_masks_that_are_a_folder_of_pictures(folder, tmp_path, given, change):
     layouts.write_text(folder / "ldls.toml", text.replace("masks/{frame}.json", "masks/{frame}"))
     place = f"{folder}/masks/{{frame}}" if given else None
     assert run(folder, tmp_path / "out", place).n_done == 2
+    (folder / "masks/b/.DS_Store").touch()
+    (folder / "masks/b/._0.png").write_bytes(b"of a file manager")
     assert run(folder, tmp_path / "out", place).n_earlier == 2
     first = folder / "masks/b/0.png"
     if change == "another":

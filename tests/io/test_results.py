@@ -56,7 +56,9 @@ def test_ply_files_hold_points_labels_and_colours(result, tmp_path):
 
 @pytest.mark.parametrize("name", [".npz", ".PLY", ".laz"])
 def test_a_name_that_is_an_ending_is_refused(result, tmp_path, name):
-    with pytest.raises(ldls.UnsupportedFormatError, match=f"{name}: cannot write '' results, expected a name and .npz"):
+    with pytest.raises(
+        ldls.UnsupportedFormatError, match=f"{name}: cannot write results without a name, expected .npz"
+    ):
         ldls.save(result, tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 

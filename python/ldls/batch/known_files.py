@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ldls.io.files import digest_of
+from ldls.io.names import is_hidden
 
 LARGEST_DIGESTED_BYTES = 1 << 26
 """Larger inputs hold many frames, as bags do, and are known by size and time of change alone."""
@@ -73,4 +74,7 @@ def _digest(path: Path, seen: Look) -> str:
 
 
 def _files(path: Path) -> list[Path]:
-    return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+    """The file, or those of the folder but what file managers leave in it."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if file.is_file() and not is_hidden(file.name))

@@ -18,7 +18,7 @@ from ldls.datasets.frame import LEAVE_POSES_OUT, CameraImage, Frame, Source
 from ldls.errors import InputError, LeftOutWarning, PoseError, SourceError, some, within
 from ldls.io import read_image, read_points
 from ldls.io.labels import read_labeling
-from ldls.io.names import name_order
+from ldls.io.names import is_hidden, name_order
 from ldls.labeling import Labeling
 from ldls.masks import InstanceMasks
 from ldls.sequences import Trajectory
@@ -134,7 +134,7 @@ def find_files(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
         SourceError: There is no such folder; the message says what is there.
     """
     check_folders(folder.parent, [folder.name])
-    files = (path for path in folder.iterdir() if path.suffix in suffixes and not path.name.startswith("."))
+    files = (path for path in folder.iterdir() if path.suffix in suffixes and not is_hidden(path.name))
     return {path.name.removesuffix(path.suffix): path for path in sorted(files, key=lambda path: name_order(path.name))}
 
 

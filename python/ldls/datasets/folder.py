@@ -185,7 +185,8 @@ class FolderSource(FileSource):
         try:
             return strictly_below(self.path, name, place=str(self._file))
         except UnsafePathError as error:
-            raise UnsafePathError(f"{error}, or pass allow_outside=True") from None
+            mend = "" if "\0" in name else ", or pass allow_outside=True"
+            raise UnsafePathError(f"{error}{mend}") from None
 
 
 def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:

@@ -359,10 +359,12 @@ def below(folder: Path, name: str, *, place: str) -> Path:
         place: Where the name was read, for messages.
 
     Raises:
-        UnsafePathError: The path is absolute, climbs out with `..`, or holds a NUL.
+        UnsafePathError: The path is absolute, climbs out with `..`, holds a NUL, or is empty.
     """
     absolute = PurePosixPath(name).is_absolute() or PureWindowsPath(name).is_absolute() or PureWindowsPath(name).drive
-    if absolute or ".." in PureWindowsPath(name).parts or "\0" in name or not name:
+    if not name or "\0" in name:
+        raise UnsafePathError(f"{place}: path {name!r} names no file; expected a path below {folder}")
+    if absolute or ".." in PureWindowsPath(name).parts:
         raise UnsafePathError(f"{place}: path {name!r} leads out of {folder}; expected a path below it")
     return folder / name
 

@@ -1,4 +1,4 @@
-"""The order of the names of files and frames."""
+"""The names of files and frames: their order, and which are hidden."""
 
 from __future__ import annotations
 
@@ -14,3 +14,8 @@ def name_order(name: str) -> tuple[str, str]:
     Names with leading zeros keep the order of text, and so do decimals, as those of seconds: 1.25 is before 1.5.
     """
     return NUMBER.sub(lambda number: f"{len(number[1]):03}{number[1]}", name), name
+
+
+def is_hidden(name: str) -> bool:
+    """Whether a file is one that people do not see, as file managers leave them: .DS_Store, ._0.png, Thumbs.db."""
+    return name.startswith(".") or name in ("Thumbs.db", "desktop.ini")

@@ -29,8 +29,9 @@ def of_ending(path: str | PathLike[str], known: Mapping[str, _Function], verb: s
     path = Path(path)
     endings = [ending for ending in known if path.suffix and path.name.lower().endswith(ending)]
     if not endings:
-        expected = f"expected {'' if path.suffix else 'a name and '}{', '.join(known)}"
-        raise UnsupportedFormatError(f"{path}: cannot {verb} {path.suffix!r} {what}, {expected}")
+        lacking = "a name" if path.name.startswith(".") else "an ending"
+        found = f"{path.suffix!r} {what}" if path.suffix else f"{what} without {lacking}"
+        raise UnsupportedFormatError(f"{path}: cannot {verb} {found}, expected {', '.join(known)}")
     return known[max(endings, key=len)]
 
 

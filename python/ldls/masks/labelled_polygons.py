@@ -56,7 +56,10 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
             own = (folded(label), ("alone", i) if group is None else group)
             corners = _corners(shape.get("shape_type") or "polygon", _points("points", shape))
             parts.setdefault(own, (label, []))[1].append(corners)
-    rles = [_ldls.Rle.from_polygons(*size, part) for _, part in parts.values()]
+    rles = []
+    for label, polygons in parts.values():
+        with within(f"shape {label!r}"):
+            rles.append(_ldls.Rle.from_polygons(*size, polygons))
     return _arguments(size, [label for label, _ in parts.values()], rles, names)
 
 

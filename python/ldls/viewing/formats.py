@@ -46,8 +46,8 @@ def check_formats(formats: Sequence[str], *, of_run: bool = False) -> None:
         if word == BAG and not of_run:
             raise ParameterError(f"formats: {BAG} is of a whole run; label the ROS bag with `ldls run`")
         if word not in known:
-            hint = did_you_mean(word, known) or f"; expected some of {', '.join(known)}"
-            raise ParameterError(f"formats: {word!r} is unknown{hint}")
+            expected = f"expected some of {', '.join(known)}{did_you_mean(word, known)}"
+            raise ParameterError(f"formats: {word!r} is unknown; {expected}")
 
 
 def file_name(frame: str, word: str) -> str:

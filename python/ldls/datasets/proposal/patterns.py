@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from ldls.datasets.stored_masks import FRAME
+from ldls.io.names import is_hidden
 
 DEEPEST = 4
 """Folders within folders that are looked into."""
@@ -68,9 +69,9 @@ def _files(folder: Path) -> Iterator[Path]:
     count = 0
     for place, folders, names in os.walk(folder):
         depth = len(Path(place).relative_to(folder).parts)
-        folders[:] = sorted(name for name in folders if not name.startswith(".") and depth < DEEPEST)
+        folders[:] = sorted(name for name in folders if not is_hidden(name) and depth < DEEPEST)
         for name in sorted(names):
-            if not name.startswith("."):
+            if not is_hidden(name):
                 yield Path(place, name)
                 count += 1
         if count > MOST_FILES:

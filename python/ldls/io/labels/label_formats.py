@@ -20,7 +20,7 @@ from ldls.io.labels.labeling_npz import read_labeling_npz
 from ldls.io.labels.nuscenes_labels import read_lidarseg, read_panoptic
 from ldls.io.labels.semantic_kitti import read_semantic_kitti
 from ldls.io.labels.squeezeseg import read_squeezeseg
-from ldls.io.names import name_order
+from ldls.io.names import is_hidden, name_order
 from ldls.labeling import Labeling
 
 
@@ -205,7 +205,7 @@ def label_files(path: str | PathLike[str], format: str | None = None) -> dict[st
         name = path.name[: -len(ending)] if ending in endings else path.stem
         return {name: LabelFile(path, format or guess_format(path))}
     files: dict[str, LabelFile] = {}
-    entries = [entry for entry in sorted(path.iterdir()) if entry.is_file() and not entry.name.startswith(".")]
+    entries = [entry for entry in sorted(path.iterdir()) if entry.is_file() and not is_hidden(entry.name)]
     for ending in endings:
         # of a_panoptic.npz the frame is a, in whatever format labels are wanted
         new = {

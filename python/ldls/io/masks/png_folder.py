@@ -14,7 +14,7 @@ from ldls.checks.values import number_of
 from ldls.errors import MaskError, within
 from ldls.io.files import open_file
 from ldls.io.images import read_image
-from ldls.io.names import name_order
+from ldls.io.names import is_hidden, name_order
 from ldls.masks import InstanceMasks
 
 METADATA = "metadata.csv"
@@ -39,7 +39,8 @@ def read(
     Raises:
         MaskError: There is no PNG, or they are of different sizes or no masks, or metadata.csv is of others.
     """
-    files = sorted(Path(path).glob("*.png"), key=lambda file: name_order(file.stem))
+    found = (file for file in Path(path).glob("*.png") if not is_hidden(file.name))
+    files = sorted(found, key=lambda file: name_order(file.stem))
     if not files:
         raise MaskError(f"{path}: a folder without .png, expected one an instance")
     if scores is None and (Path(path) / METADATA).is_file():

@@ -19,7 +19,7 @@ from ldls.errors import CorruptFileError, UnsupportedFormatError, within
 from ldls.io.cameras.kitti import read_raw_transform
 from ldls.io.files import open_file
 from ldls.io.kitti_stamps import CLOCK_EXAMPLE, clock_seconds, read_stamps
-from ldls.io.names import name_order
+from ldls.io.names import is_hidden, name_order
 from ldls.io.poses.pose_rows import check_ascending, read_pose_rows
 from ldls.sequences import Trajectory
 
@@ -48,7 +48,7 @@ def read(path: Path) -> Trajectory:
         FileNotFoundError: The stamps, or the calibration of the day, are missing.
     """
     found = sorted((path / "data").glob("*.txt"), key=lambda file: name_order(file.name))
-    files = {file.stem: file for file in found if not file.name.startswith(".")}
+    files = {file.stem: file for file in found if not is_hidden(file.name)}
     if not files:
         raise UnsupportedFormatError(f"{path}: no folder of poses, expected KITTI's oxts with data/*.txt")
     calibration = path.absolute().parents[1] / CALIBRATION

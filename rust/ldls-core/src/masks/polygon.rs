@@ -35,7 +35,7 @@ fn check(polygon: &[f64]) -> Result<()> {
     let problem = if polygon.len() % 2 == 1 || polygon.len() < 6 {
         format!("{} numbers", polygon.len())
     } else if let Some(at) = polygon.iter().position(|c| !(c.abs() <= FARTHEST)) {
-        format!("number {at} is {}", polygon[at])
+        format!("number {at} is {:?}", polygon[at])
     } else {
         return Ok(());
     };
