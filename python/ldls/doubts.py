@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ldls.camera import Camera
-from ldls.camera.rigid import doubt_of_distance, inverse, transformed
+from ldls.camera.rigid import ALONG_Z, doubt_of_distance, inverse, is_leaning, transformed
 from ldls.cloud import Points, doubt_of_scale, finite_rows
 from ldls.errors import (
     DuplicateWarning,
@@ -29,8 +29,6 @@ COARSEST_STEP_M = 0.01
 """Step between single-precision coordinates from which on distances between neighbours suffer."""
 EXPECTED_ON_MASKS = 20.0
 """Points that masks of this area would have on them by chance, from which on none at all is no chance."""
-ALONG_Z = 0.7
-"""Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
 STEEPEST = 0.97
 """The same up to which a camera may look up, where a leaning wall in the image passes for ground."""
 RESIZED = 1.5
@@ -161,14 +159,14 @@ def _is_own_frame(seen: SeenView) -> bool:
 
 
 def _leans(seen: SeenView, result: Segmentation) -> bool:
-    """True if z of the lidar points down or to the side in an image, by over 60 degrees.
+    """True if z of the lidar points down or to the side in an image.
 
     Where the camera looks along it, the ground must tell: what a drone sees lies below z, and in other frames below
     what is up in the image.
     """
-    x, y, z = seen.view.camera.T_camera_lidar[:3, 2]
+    z = seen.view.camera.T_camera_lidar[2, 2]
     if abs(z) < ALONG_Z:
-        return bool(-y < 0.5 * np.hypot(x, y))
+        return is_leaning(seen.view.camera.T_camera_lidar)
     if ALONG_Z <= z < STEEPEST or _is_own_frame(seen):
         return False
     rows = seen.in_view[:: max(1, len(seen.in_view) // ENOUGH_FOR_GROUND)]

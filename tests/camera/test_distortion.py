@@ -79,6 +79,10 @@ def test_models_have_many_names(model, coefficients, known_as):
     ("model", "coefficients", "message"),
     [
         pytest.param("omni", (1, 2), "'omni' is unknown, expected one of none, plumb_bob", id="unknown"),
+        pytest.param(
+            "", (-0.3, 0.1, 0, 0, 0), "model '' has no coefficients, got .* name one of plumb_bob", id="no name"
+        ),
+        pytest.param("pinhole", (-0.3, 0.1, 0, 0), "model 'pinhole' has no coefficients", id="pinhole"),
         pytest.param("plumb_bob", (1, 2, 3), "plumb_bob has 4 or 5 coefficients, got 3", id="three"),
         pytest.param("equidistant", (1, 2, 3, np.nan), "finite", id="NaN"),
         pytest.param("equidistant", ("a",), "expected a list of finite numbers", id="text"),

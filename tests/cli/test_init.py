@@ -97,6 +97,11 @@ def in_rows_of_numbers(folder, camera):
     write(folder / "T.txt", rows(camera.T_camera_lidar))
 
 
+def in_rows_of_numbers_the_other_way_round(folder, camera):
+    write(folder / "front.yaml", intrinsics(camera))
+    write(folder / "T.txt", rows(np.linalg.inv(camera.T_camera_lidar)))
+
+
 @pytest.mark.parametrize(
     "calibrate",
     [
@@ -106,6 +111,7 @@ def in_rows_of_numbers(folder, camera):
         in_parts_that_leave_it_open,
         in_angles_that_leave_it_open,
         in_rows_of_numbers,
+        in_rows_of_numbers_the_other_way_round,
     ],
     ids=lambda each: each.__name__,
 )
@@ -341,7 +347,7 @@ def test_a_name_that_is_no_text_is_named(rig):
     assert not (rig / "ldls.toml").exists()
 
 
-NO_TRANSFORM = "where the lidar is, for front: found no transform, none of 1 tried shows a point"
+NO_TRANSFORM = "where the lidar is, for front: found no transform, none of 2 tried shows a point"
 
 
 def _with_a_transform_in_millimetres(rig):

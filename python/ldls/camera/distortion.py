@@ -58,6 +58,11 @@ class Distortion:
             model = "none"
         if model == "plumb_bob" and len(values) in MODELS["rational_polynomial"]:
             model = "rational_polynomial"  # as OpenCV, which has one model of as many coefficients as there are
+        if model == "none" and any(values):
+            raise CalibrationError(
+                f"distortion: model {self.model!r} has no coefficients, got {values}; name one of "
+                f"{', '.join(list(MODELS)[1:])}, or leave them out where the image is undistorted"
+            )
         if model != "none" and len(values) not in MODELS[model]:
             expected = " or ".join(map(str, MODELS[model]))
             raise CalibrationError(f"distortion: {model} has {expected} coefficients, got {len(values)}")

@@ -15,6 +15,8 @@ from ldls.errors import CalibrationError, LdlsError
 
 ROTATION_LIMIT = 1e-3
 """Largest deviation of a rotation from orthonormal; calibration files round to 7 digits."""
+ALONG_Z = 0.7
+"""Share of z of the lidar along a camera's axis from which on it has no direction in the image."""
 FARTHEST_CAMERA_M = 20.0
 """A camera farther from its lidar is hardly on the same rig: most translations that are in millimetres lead there."""
 
@@ -79,6 +81,15 @@ def doubt_of_distance(T_camera_lidar: Floats) -> str | None:
         f"T_camera_lidar: the lidar is {distance_m:,.0f} m from the camera; is its translation in metres? Divide "
         "millimetres by 1000"
     )
+
+
+def is_leaning(T_camera_lidar: Floats) -> bool:
+    """True if z of the lidar points down or to the side in the image, by over 60 degrees.
+
+    False where it lies along the camera's axis, and has no direction in the image.
+    """
+    x, y, z = T_camera_lidar[:3, 2]
+    return bool(abs(z) < ALONG_Z and -y < 0.5 * np.hypot(x, y))
 
 
 def inverse(matrix: Floats) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.camera import Camera
-from ldls.camera.rigid import doubt_of_distance
+from ldls.camera.rigid import doubt_of_distance, is_leaning
 from ldls.cloud import doubt_of_scale, is_finite
 from ldls.datasets.frame import CameraImage, Frame, Source
 from ldls.errors import LdlsError
@@ -92,7 +92,7 @@ def inspect(source: Source, index: int) -> FrameFacts:
         findings=(
             *_of_cloud(frame),
             *(finding for image in frame.images for finding in _of_image(frame, image)),
-            *_of_distances(frame),
+            *_of_places(frame),
             *_of_views(name, shares if len(frame.points) else {}),
             *_of_offsets(name, offsets),
         ),
@@ -175,9 +175,16 @@ def _of_image(frame: Frame, image: CameraImage) -> list[Finding]:
     return []
 
 
-def _of_distances(frame: Frame) -> list[Finding]:
-    doubts = ((image.name, doubt_of_distance(image.camera.T_camera_lidar)) for image in frame.images)
-    return [Finding(frame.name, f"{camera}: {doubt}", broken=False) for camera, doubt in doubts if doubt is not None]
+def _of_places(frame: Frame) -> list[Finding]:
+    findings = []
+    for image in frame.images:
+        distance = doubt_of_distance(image.camera.T_camera_lidar)
+        leaning = "T_camera_lidar: z of the lidar does not point up in the image; is it the inverse?"
+        doubts = (distance, leaning if is_leaning(image.camera.T_camera_lidar) else None)
+        findings += [
+            Finding(frame.name, f"{image.name}: {doubt}", broken=False) for doubt in doubts if doubt is not None
+        ]
+    return findings
 
 
 def _of_views(name: str, shares: Mapping[str, float]) -> list[Finding]:

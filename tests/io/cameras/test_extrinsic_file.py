@@ -18,6 +18,8 @@ NAMED = {key: value for key, value in ROS.items() if key != "rotation"}
 FILES = [
     pytest.param("a.txt", f"# lidar to camera\n{ROWS}\n", id="sixteen numbers"),
     pytest.param("a.txt", ROWS.rsplit("\n", 1)[0].replace(" ", ", "), id="twelve numbers with commas"),
+    pytest.param("a.txt", f"{T}\n", id="as NumPy prints it"),
+    pytest.param("a.json", json.dumps(T.tolist()), id="JSON of the matrix"),
     pytest.param("a.json", json.dumps(PARTS), id="JSON"),
     pytest.param("a.json", json.dumps({"T_lidar_camera": BACK.tolist()}), id="the matrix back"),
     pytest.param(
@@ -55,6 +57,8 @@ def test_a_transform_is_read_from_a_file(tmp_path, name, text):
         pytest.param(
             "a.json", json.dumps(PARTS | {"quat": 1}), "unknown key 'quat', expected T_camera_lidar", id="key"
         ),
+        pytest.param("a.json", json.dumps({"T_lidar_camera": BACK.tolist(), "optical": False}),
+                     "found T_lidar_camera and 'optical' beside it; give the matrix alone", id="matrix and part"),
         pytest.param("a.json", json.dumps({"R": 1}), "unknown key 'R'.*; name the parts, as translation: ", id="none"),
         pytest.param("a.json", '{"pose_of": "camera"}', "'translation' missing; .*; name the parts, as", id="no part"),
         pytest.param("a.json", json.dumps(ROS | {"translation": {"a": 1}}),

@@ -79,6 +79,13 @@ def test_spellings_of_a_camera(write, text):
     assert camera.image_size == (720, 1280)
 
 
+def test_another_size_than_that_of_the_file_is_refused(write):
+    path = write(OPENCV)
+    assert ldls.read_camera(path, T_camera_lidar=TURNED, image_size=(720, 1280)).image_size == (720, 1280)
+    with pytest.raises(ldls.CalibrationError, match=r"image_size: got \(100, 90\), the file says \(720, 1280\)"):
+        ldls.read_camera(path, T_camera_lidar=TURNED, image_size=(100, 90))
+
+
 def test_what_opencv_writes(tmp_path):
     cv2 = pytest.importorskip("cv2", reason="opencv-python-headless is the oracle")
     path = tmp_path / "camera.yml"

@@ -180,6 +180,11 @@ def test_zeros_that_make_a_page_with_the_header_are_padding(tmp_path):
         ldls.read_points(path)
 
 
+def test_early_versions_call_fields_columns(tmp_path):
+    content = header().replace(b"FIELDS", b"COLUMNS")
+    np.testing.assert_array_equal(ldls.read_points(write(tmp_path, content + ROWS.tobytes())), ROWS)
+
+
 def test_text_with_commas_and_the_digits_of_utm(tmp_path):
     head = "VERSION .7\nFIELDS x y z i\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 2\nWIDTH 2\nPOINTS 2\nDATA ascii\n"
     path = tmp_path / "a.pcd"

@@ -102,10 +102,14 @@ def camera_in(path: Path, pattern: str, hint: str) -> FoundCamera | None:
 
 def transforms_in(path: Path, pattern: str) -> list[FoundTransform]:
     """The transforms of a file, in all ways in which it can be read; none where it has none."""
+    tables = _tables(path)
     try:
-        return [FoundTransform(as_extrinsic(path), f"T_camera_lidar = {quoted(pattern)}", pattern, pattern, True)]
+        matrix = as_extrinsic(path)
     except (LdlsError, ImportError, ValueError):
-        return [each for name, table in _tables(path) for each in _of_table(name, table, pattern)]
+        return [each for name, table in tables for each in _of_table(name, table, pattern)]
+    found = [FoundTransform(matrix, f"T_camera_lidar = {quoted(pattern)}", pattern, pattern, True)]
+    # numbers alone do not say of what they are
+    return found if tables else [*found, _found(inverse(matrix), pattern, f"{pattern}, turned round")]
 
 
 def plausible_transforms(

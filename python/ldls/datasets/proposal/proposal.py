@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Iterable, Sequence, Set
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -267,7 +267,7 @@ def _add_calibration(
         made.lines.append("# T_camera_lidar = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]")
         made.ask("no file says where the lidar is")
         return
-    chosen, share = plausible[0]
+    chosen, _ = plausible[0]
     made.lines.append(chosen.line)
     made.found.append(f"{chosen.how}: where the lidar is, for {name}")
     if len(cameras) > 1 and chosen.file not in own_files:
@@ -277,7 +277,8 @@ def _add_calibration(
         for another, also in plausible[1 : 1 + MOST_OTHERS]:
             made.ask(f"it shows {also:.0%} of the points if it is {another.how}:")
             made.lines.append(f"# {another.line}")
-    _judge(made, name, share, chosen.matrix)
+    upright, share = view_of(replace(found.camera, T_camera_lidar=chosen.matrix), points, size)
+    _judge(made, name, share, chosen.matrix, upright=upright)
 
 
 def _by_frame_or_camera(pattern: Pattern, frames: Set[str], cameras: Sequence[Pattern]) -> Sequence[Pattern]:
@@ -301,9 +302,7 @@ def _file(pattern: Pattern, sweeps: Pattern) -> Path:
     return pattern.files[min(common)] if len(pattern.files) > 1 and common else pattern.first[1]
 
 
-def _judge(
-    made: Proposal, name: str, share: float, T_camera_lidar: NDArray[np.float64], *, upright: bool = True
-) -> None:
+def _judge(made: Proposal, name: str, share: float, T_camera_lidar: NDArray[np.float64], *, upright: bool) -> None:
     made.ask(f"{share:.0%} of the first sweep's points are in view of {name}; look: ldls info . --picture check.png")
     if not upright:
         made.ask("but z of the lidar does not point up in the image: is the transform turned round?")

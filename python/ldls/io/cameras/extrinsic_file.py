@@ -21,6 +21,8 @@ from ldls.io.cameras.field_file import fields_of
 from ldls.io.files import open_file
 
 MAX_BYTES = 1 << 16
+BETWEEN = str.maketrans("[],;", "    ")
+"""What may stand between the numbers of a matrix, as JSON, NumPy and MATLAB write it."""
 PARTS = ("translation", "pose_of", "quaternion_wxyz", "quaternion_xyzw", "roll_pitch_yaw_deg", "rotation", "optical")
 WORDS = ("pose_of", "optical")
 AXES = {"translation": "xyz", "quaternion_wxyz": "wxyz", "quaternion_xyzw": "xyzw", "rotation": "xyzw"}
@@ -37,8 +39,8 @@ def as_extrinsic(given: Extrinsic, place: str = "T_camera_lidar") -> NDArray[np.
 
     Args:
         given: A matrix; a table with `T_camera_lidar` or `T_lidar_camera`, or with the arguments of `ldls.extrinsic`;
-            or a file with the 12 or 16 numbers of `T_camera_lidar` by rows, where # begins a comment, or with such a
-            table in YAML, JSON or TOML.
+            or a file with the 12 or 16 numbers of `T_camera_lidar` by rows, where # begins a comment and brackets,
+            commas and semicolons count as blanks, or with such a table in YAML, JSON or TOML.
         place: What to call it in errors.
 
     Raises:
@@ -55,7 +57,7 @@ def as_extrinsic(given: Extrinsic, place: str = "T_camera_lidar") -> NDArray[np.
 def _read(path: Path) -> NDArray[np.float64]:
     with open_file(path, "transform", limit=MAX_BYTES) as file:
         text = file.text()
-        words = [word for line in text.splitlines() for word in line.partition("#")[0].replace(",", " ").split()]
+        words = [word for line in text.splitlines() for word in line.partition("#")[0].translate(BETWEEN).split()]
         numbers = _numbers(words)
         if numbers is not None:
             return _from_numbers(str(path), numbers)
@@ -96,10 +98,14 @@ def _from_numbers(place: str, numbers: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def _from_table(fields: Fields) -> NDArray[np.float64]:
-    matrices = [name for name in MATRICES if fields.find(name) is not None]
-    if matrices:
-        matrix = rigid(f"{fields.place}: {matrices[0]}", fields.matrix((4, 4), matrices[0]))
-        return inverse(matrix) if matrices[0] == "T_lidar_camera" else matrix
+    for name in MATRICES:
+        if fields.find(name) is None:
+            continue
+        others = [str(key) for key in fields.entries if key != name]
+        if others:
+            raise CalibrationError(f"{fields.place}: found {name} and {others[0]!r} beside it; give the matrix alone")
+        matrix = rigid(f"{fields.place}: {name}", fields.matrix((4, 4), name))
+        return inverse(matrix) if name == "T_lidar_camera" else matrix
     unknown = [str(key) for key in fields.entries if key not in PARTS]
     if unknown:
         raise CalibrationError(

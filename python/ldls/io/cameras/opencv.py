@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Camera, Distortion
 from ldls.camera.fields import Fields
-from ldls.errors import ParameterError, within
+from ldls.errors import CalibrationError, ParameterError, within
 
 MATRIX = ("camera_matrix", "K", "cameraMatrix")
 COEFFICIENTS = ("distortion_coefficients", "D", "distCoeffs", "dist_coeffs", "dist_coeff")
@@ -37,7 +37,7 @@ def camera_of(
         image_size: (height, width) in pixels, where the file does not say.
 
     Raises:
-        CalibrationError: A key is missing, or a value cannot be a camera's.
+        CalibrationError: A key is missing, or a value cannot be a camera's, or the file has another `image_size`.
     """
     matrix: tuple[str, ...] = MATRIX
     coefficients: tuple[str, ...] = COEFFICIENTS
@@ -48,13 +48,15 @@ def camera_of(
     elif camera is not None:
         raise ParameterError(f"camera: got {camera!r}, but {fields.place} is of one camera; leave it out")
     projection, distortion = fields.matrix((3, 3), *matrix), _distortion(fields, coefficients, fisheye)
-    image_size = fields.image_size() or image_size
+    own_size = fields.image_size()
     with within(fields.place):
+        if own_size is not None and image_size is not None and tuple(image_size) != own_size:
+            raise CalibrationError(f"image_size: got {tuple(image_size)}, the file says {own_size}; leave it out")
         return Camera(
             projection=projection,
             T_camera_lidar=T_camera_lidar,
             distortion=distortion,
-            image_size=image_size,
+            image_size=own_size or image_size,
         )
 
 

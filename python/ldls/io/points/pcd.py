@@ -213,7 +213,8 @@ def _n_points(entries: dict[str, list[str]]) -> int:
 
 
 def _fields(entries: dict[str, list[str]]) -> list[Field]:
-    names = entries.get("FIELDS", [])
+    # early versions have COLUMNS, and PCL reads them still
+    names = entries.get("FIELDS") or entries.get("COLUMNS", [])
     entries = {"SIZE": [], "TYPE": [], "COUNT": ["1"] * len(names)} | entries
     for key in ("SIZE", "TYPE", "COUNT"):
         if len(entries[key]) != len(names):
