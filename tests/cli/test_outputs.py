@@ -53,12 +53,19 @@ def test_a_command_writes_over_no_input(folder, words, option, output):
     assert outcome.stderr.endswith("; give another\n")
 
 
+def test_the_image_of_the_sweep_s_name_is_kept_where_it_is_no_input(folder):
+    outcome = command(*f"{SEGMENT} --out .".split(), COLUMNS="500")
+    assert outcome.exit_code == 1
+    expected = "error: --out: would write over points.png, which seems to be the camera's image; give another\n"
+    assert outcome.stderr == expected
+
+
 @pytest.mark.parametrize(
     ("words", "made"),
     [
         pytest.param(f"{SEGMENT} --out new --picture {{}}/a.png", "new", id="picture"),
         pytest.param(f"{SEGMENT} --out new --objects {{}}/a.json", "new", id="objects"),
-        pytest.param(f"{SEGMENT} --out new --save-masks {{}}/a.npz", None, id="masks saved"),
+        pytest.param(f"{SEGMENT} --out new --save-masks {{}}/a.npz", "new", id="masks saved"),
         pytest.param(f"{SEGMENT} --out new --rerun {{}}/a.rrd", "new", id="recording"),
         pytest.param("masks convert masks.npz {}/a.json", None, id="masks converted"),
         pytest.param("masks make image.png {}/a.json --segmenter boxes:none.txt", None, id="masks made"),

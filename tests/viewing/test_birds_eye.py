@@ -67,6 +67,17 @@ def test_without_a_view_all_points_are_shown_with_x_ahead() -> None:
     assert (picture > np.array(PAPER) + 10).all(axis=2).sum() > 4000
 
 
+def test_a_range_hides_no_object() -> None:
+    points = np.random.default_rng(4).uniform([14.8, -0.4, -1], [15.4, 0.4, 1], (500, 3)).astype(np.float32)
+    camera = ldls.Camera(projection=[[200, 0, 200], [0, 200, 80], [0, 0, 1]], T_camera_lidar=X_FORWARD)
+    masks = ldls.InstanceMasks.from_boxes([[180, 50, 220, 110]], (160, 400), categories=[3])
+    result = ldls.segment(points, masks, camera)
+    picture = np.asarray(birds_eye_view(result, boxes=False)).astype(int)
+    x, y = ground_of(result).at(np.array([[15.1, 0]]))[0].round().astype(int)
+    around = picture[y - 5 : y + 6, x - 5 : x + 6]
+    assert (np.abs(around - instance_colours([3])[0]).max(axis=2) <= 3).mean() > 0.9
+
+
 def test_rings_stand_at_their_ranges() -> None:
     result = street(X_FORWARD)
     picture = np.asarray(birds_eye_view(result)).astype(int)

@@ -69,6 +69,14 @@ def test_pictures_have_the_width_asked_for(small_scene, size, width_px) -> None:
     assert picture.height == round(size[0] * picture.width / size[1])
 
 
+def test_pictures_of_high_images_are_narrower(small_scene) -> None:
+    points, _, camera = small_scene
+    masks = ldls.InstanceMasks.from_boxes([[1, 1, 9, 9]], (400, 16), categories=[3])
+    result = ldls.segment(points, masks, camera)
+    assert overlay(result).size == (144, 3600)
+    assert comparison(result).height < 5000
+
+
 def test_background_points_leave_the_image_visible(small_scene) -> None:
     points, masks, camera = small_scene
     nothing = masks.select([])

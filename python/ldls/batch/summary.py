@@ -39,7 +39,7 @@ class Summary:
         n_frames: Frames wanted.
         n_done: Frames whose files are written.
         n_earlier: Of these, those of earlier runs that were interrupted.
-        n_nothing_in_view: Of those done, frames without a finite point, one in view, or one on a mask.
+        n_nothing_in_view: Of those done, frames whose returns are not finite, out of view, or on no mask.
         failures: Frames that failed, in their order.
         objects: Objects with points of the frames wanted, each counted in every frame, by category name; where objects
             are numbered over the drive, those of the results with tracks.

@@ -36,6 +36,7 @@ from ldls.cli.recording_options import (
     record,
     recording_files,
 )
+from ldls.errors import LdlsError, ParameterError
 from ldls.params import Params
 
 
@@ -108,7 +109,7 @@ def segment(
     from ldls.segmenters.registry import segmenter_file
     from ldls.view import View, camera_names
     from ldls.viewing.files import check_picture, picture_files, save_pictures
-    from ldls.viewing.formats import check_formats, file_name, write_formats
+    from ldls.viewing.formats import PICTURE, check_formats, file_name, write_formats
 
     check_recording(rerun, diffusion)
     wanted = tuple(dict.fromkeys(words(formats)))
@@ -136,11 +137,14 @@ def segment(
         min_score=min_score,
         categories=categories,
     )
+    drawn = out / file_name(name, PICTURE)
+    if PICTURE in wanted and _is_photo(drawn, chosen.image_size):
+        raise ParameterError(f"--out: would write over {drawn}, which seems to be the camera's image; give another")
+    out.mkdir(parents=True, exist_ok=True)
     if save_masks is not None:
         save(chosen, save_masks)
     view = View(chosen, seen_by, called)
     result = label_points(read_points(points, columns=columns), [view], params=replace(params, threads=cores))
-    out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, name, wanted, [pixels])
     if write_objects is not None and objects is not None:
         write_objects([FrameObjects.of(name, result)])
@@ -159,3 +163,14 @@ def segment(
         pictures = None if pixels is None else {camera_names(result.views)[0]: pixels}
         said = record(result, rerun, name=name, images=pictures, diffusion=diffusion)
         screen.print(said, soft_wrap=True)
+
+
+def _is_photo(path: Path, image_size: tuple[int, int]) -> bool:
+    """True for the image of the camera, which often has the name of the sweep; those of ldls have a width."""
+    from ldls.io.images import read_image_size
+    from ldls.viewing.overlay import WIDTH_PX
+
+    try:
+        return read_image_size(path) == image_size and image_size[1] != WIDTH_PX
+    except (LdlsError, FileNotFoundError):
+        return False

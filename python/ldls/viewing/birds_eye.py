@@ -23,6 +23,8 @@ RINGS: Colour = (70, 70, 80)
 RANGES: Colour = (170, 170, 180)
 RIM_PX = 3
 """Paper left around the range of a ring."""
+ASIDE_DEG = (0, -4, 4, -8, 8, -12, 12, -16, 16, -20, 20, -25, 25, -30, 30)
+"""Bearings from straight ahead at which a range may stand."""
 OUT_OF_VIEW: Colour = (66, 66, 76)
 BACKGROUND: Colour = (135, 135, 140)
 DIM = 0.6
@@ -85,8 +87,9 @@ def birds_eye_of(shown: Shown, ground: Ground, canvas: Canvas, *, boxes: bool) -
             if (corners.max(axis=0) >= 0).all() and (corners.min(axis=0) < ground.size_px).all():
                 tags.append(Tag(shown.names[each.label - 1], colour, _around(corners)))
     picture = fine.reduce(FINE).convert("RGB")
-    written = _write_ranges(picture, ground, step_m)
-    draw_tags(picture, tags, _covered(picture, shown, ground), PEN_PX, aversion=AVERSION, taken=written)
+    covered = _covered(picture, shown, ground)
+    written = _write_ranges(picture, ground, step_m, covered)
+    draw_tags(picture, tags, covered, PEN_PX, aversion=AVERSION, taken=written)
     return picture
 
 
@@ -109,21 +112,39 @@ def _draw_rings(draw: ImageDraw.ImageDraw, ground: Ground, step_m: int) -> None:
     draw.polygon([(x, y - 1.6 * arm), (x - arm, y + arm), (x, y + 0.4 * arm), (x + arm, y + arm)], fill=INK)
 
 
-def _write_ranges(picture: Image.Image, ground: Ground, step_m: int) -> list[Box]:
-    """Write the range of each ring where it crosses the line ahead of the lidar, and return the places taken."""
+def _write_ranges(picture: Image.Image, ground: Ground, step_m: int, covered: NDArray[np.bool_]) -> list[Box]:
+    """Write the range of each ring ahead of the lidar, or aside where no object is, and return the places taken."""
     written = []
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(size=15)
     for range_m in _ranges(ground, step_m):
-        ((x, y),) = ground.at(range_m * ground.forward[None]).tolist()
         text = f"{range_m} m"
-        left, top, right, bottom = draw.textbbox((x, y), text, font, anchor="mm")
-        if top > RIM_PX:
-            box = (int(left) - RIM_PX, int(top) - RIM_PX, ceil(right) + RIM_PX, ceil(bottom) + RIM_PX)
-            draw.rectangle(box, PAPER)
-            draw.text((x, y), text, RANGES, font, anchor="mm")
-            written.append(box)
+        places = ground.at(range_m * _bearings(ground.forward)).tolist()
+        boxes = [_box_around(draw.textbbox(place, text, font, anchor="mm")) for place in places]
+        if boxes[0][1] <= 0:
+            continue
+        free = (
+            i
+            for i, (left, top, right, bottom) in enumerate(boxes)
+            if 0 < left < right < picture.width and not covered[top:bottom, left:right].any()
+        )
+        chosen = next(free, 0)
+        draw.rectangle(boxes[chosen], PAPER)
+        draw.text(places[chosen], text, RANGES, font, anchor="mm")
+        written.append(boxes[chosen])
     return written
+
+
+def _bearings(forward: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2) unit vectors: ahead, then more and more aside."""
+    angles = np.radians(ASIDE_DEG)
+    (x, y), cosines, sines = forward, np.cos(angles), np.sin(angles)
+    return np.stack([x * cosines - y * sines, x * sines + y * cosines], axis=1)
+
+
+def _box_around(text: tuple[float, float, float, float]) -> Box:
+    left, top, right, bottom = text
+    return int(left) - RIM_PX, int(top) - RIM_PX, ceil(right) + RIM_PX, ceil(bottom) + RIM_PX
 
 
 def _set_points(canvas: Canvas, shown: Shown, ground: Ground) -> None:

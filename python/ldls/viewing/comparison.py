@@ -13,7 +13,7 @@ from ldls.view import camera_names
 from ldls.viewing.birds_eye import birds_eye_of, surroundings
 from ldls.viewing.drawing import grid, half
 from ldls.viewing.ground import ground_of
-from ldls.viewing.overlay import WIDTH_PX, overlays_of
+from ldls.viewing.overlay import WIDTH_PX, overlays_of, usual_width_px
 from ldls.viewing.shown import Images, Shown, images_of
 
 WIDE = 2.0
@@ -53,7 +53,11 @@ def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]], captio
     stacked = len(views) == 1 and width > WIDE * height
     each_px = WIDTH_PX if stacked else half(WIDTH_PX)
     of_cameras = zip(views, images, strict=True)
-    tiles = [tile for seen, image in of_cameras for tile in overlays_of(pair, seen, image, each_px)]
+    tiles = [
+        tile
+        for seen, image in of_cameras
+        for tile in overlays_of(pair, seen, image, min(each_px, usual_width_px(image)))
+    ]
     return grid(tiles, captions, columns=1 if stacked else 2)
 
 
