@@ -24,16 +24,14 @@ LONGEST = 80
 """Characters of a value that a message shows."""
 
 
-def whole_number(
-    name: str, value: object, low: int, high: int = MAX_ROWS, error: type[InputError] = ParameterError
-) -> int:
+def whole_number(name: str, value: object, low: int, high: int = MAX_ROWS) -> int:
     """`value` as an int.
 
     Raises:
-        ParameterError: It is no whole number from `low` to `high`; or another `error`.
+        ParameterError: It is no whole number from `low` to `high`.
     """
     if not is_whole(value) or not low <= operator.index(value) <= high:  # type: ignore[arg-type]
-        raise error(f"{name}: got {shown(value)}, expected a whole number from {low} to {high}")
+        raise ParameterError(f"{name}: got {shown(value)}, expected a whole number from {low} to {high}")
     return operator.index(value)  # type: ignore[arg-type]
 
 

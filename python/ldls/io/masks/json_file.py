@@ -56,8 +56,11 @@ def write(
         file_name: Name of the image's file; without one there is none in the data set.
         results: Whether to write the bare list of results, which has no names and, without masks, no image size.
     """
-    own = coco.results(masks, masks.image_size, as_python(image_id))
-    content = own if results else masks.to_coco(image_id=image_id, file_name=file_name)
+    content: object = (
+        coco.results(masks, masks.image_size, as_python(image_id))
+        if results
+        else masks.to_coco(image_id=image_id, file_name=file_name)
+    )
     with whole_file(path) as file:
         file.write(json.dumps(content, separators=(",", ":")).encode())
 
