@@ -527,8 +527,11 @@ def test_targets_are_files_of_rerun_or_a_viewer(target):
         pytest.param({}, "win32", True, id="Windows"),
     ],
 )
-def test_displays_are_seen(environment, platform, expected):
-    assert viewer.has_display(environment, platform) is expected
+def test_displays_are_seen(environment, platform, expected, no_display, monkeypatch):
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "platform", platform)
+    assert viewer.has_display() is expected
 
 
 @pytest.fixture

@@ -29,7 +29,16 @@ class LabelledBag(BagWriter):
     Each cloud is a PointCloud2 message with all its points in their order and the fields x, y, z (float32, metres),
     intensity (float32), instance_id (uint32: 0 for background and out of view, m for instance m of the result),
     class_id (uint8: the category id, COCO's with COCO's masks; 0 for none), probability (float32: the confidence) and
-    rgb (float32 whose bits are 0x00RRGGBB, as viewers expect).
+    rgb (float32 whose bits are 0x00RRGGBB, as viewers expect). They are on /points_labelled.
+
+    Args:
+        path: A file for ROS 1, a folder for ROS 2.
+        kind: "rosbag1", "rosbag2" (SQLite) or "mcap".
+
+    Raises:
+        ParameterError: There is no such kind.
+        FileExistsError: There is something at `path` already.
+        ImportError: The extra `ros` is not installed.
 
     Examples:
         >>> source = RosBag("drive.bag")  # doctest: +SKIP
@@ -39,25 +48,9 @@ class LabelledBag(BagWriter):
         ...         bag.write(ldls.segment(frame.points, masks[index], camera), source.header(index))
     """
 
-    def __init__(self, path: str | PathLike[str], kind: str, *, topic: str = TOPIC) -> None:
-        """Prepare for a bag.
-
-        Args:
-            path: A file for ROS 1, a folder for ROS 2.
-            kind: "rosbag1", "rosbag2" (SQLite) or "mcap".
-            topic: Topic of the labelled clouds.
-
-        Raises:
-            ParameterError: There is no such kind.
-            FileExistsError: There is something at `path` already.
-            ImportError: The extra `ros` is not installed.
-        """
-        super().__init__(path, kind)
-        self.topic = topic
-
     def __enter__(self) -> Self:
         super().__enter__()
-        self.add_topic(Topic(self.topic, POINTS, 0))
+        self.add_topic(Topic(TOPIC, POINTS, 0))
         return self
 
     def write(self, result: Segmentation, header: Header, *, received_ns: int | None = None) -> None:
@@ -72,7 +65,7 @@ class LabelledBag(BagWriter):
             LimitError: A category id is beyond 255.
         """
         message = encode(self.types, labelled_columns(result), header)
-        self.write_message(self.topic, message, header.stamp_ns if received_ns is None else received_ns)
+        self.write_message(TOPIC, message, header.stamp_ns if received_ns is None else received_ns)
 
     def copy(
         self,

@@ -19,7 +19,7 @@ from ldls.checks import checked, hold_python_values
 from ldls.errors import ParameterError
 from ldls.simulation.error_model import SegmenterErrors, SensorErrors
 from ldls.simulation.ground import Ground
-from ldls.simulation.lidars import VLP_16, Lidar
+from ldls.simulation.lidars import VLP_16
 from ldls.simulation.plan import Plan
 from ldls.simulation.rigs import ROBOT_LENS, MountedCamera, Rig, make_rig
 from ldls.simulation.scanning import Motion
@@ -170,7 +170,6 @@ def robot_drive(
     frames: int,
     *,
     seed: int = 0,
-    rig: Rig = ROBOT,
     segmenter: SegmenterErrors | None = None,
     spinning: bool = False,
 ) -> Iterator[SimulatedFrame]:
@@ -181,7 +180,6 @@ def robot_drive(
     Args:
         frames: Number of frames.
         seed: Seed of the scene and its noise.
-        rig: Lidar and camera.
         segmenter: Errors of the masks; by default the usual ones, but for wrong categories.
         spinning: The lidar takes 0.1 s for a sweep while all moves, as in a `Drive`.
 
@@ -198,7 +196,7 @@ def robot_drive(
         yield take_frame(
             _from_the_robot(scene, taken),
             _from_the_robot(scene, swept),
-            rig,
+            ROBOT,
             name=f"{number:06d}",
             stamps=(taken, swept),
             sweep_noise=(seed, 0, number),
@@ -206,7 +204,7 @@ def robot_drive(
             drift=np.eye(4),
             pose=from_parts(np.eye(3), np.array([ROBOT_SPEED_M_S * swept, 0, 0])),
             segmenter=ROBOT_SEGMENTER if segmenter is None else segmenter,
-            motion=_robot_motion(scene, rig.lidar) if spinning else None,
+            motion=_robot_motion(scene) if spinning else None,
             moved=False,
         )
 
@@ -217,9 +215,9 @@ def _from_the_robot(scene: Scene, seconds: float) -> Scene:
     return scene.after(seconds).moved(-np.tile(way, (len(scene.objects) + 1, 1)))
 
 
-def _robot_motion(scene: Scene, lidar: Lidar) -> Motion:
+def _robot_motion(scene: Scene) -> Motion:
     """What moves on straight is the same in all turns."""
-    times = lidar.firing_times(PERIOD_S)
+    times = ROBOT.lidar.firing_times(PERIOD_S)
     rig = np.tile(np.eye(4), (len(times), 1, 1))
     rig[:, 0, 3] = ROBOT_SPEED_M_S * times
     ways = np.zeros((len(scene.objects), len(times), 3))

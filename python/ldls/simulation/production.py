@@ -1,4 +1,4 @@
-"""Many frames as files, two at a time, and the suite: frames by fixed seeds, with errors of fixed strengths."""
+"""Many frames as files, several at a time, and the suite: frames by fixed seeds, with errors of fixed strengths."""
 
 from __future__ import annotations
 
@@ -205,16 +205,14 @@ def suite_folder(part: str = "validation") -> Path:
     return folder / SUITE_VERSION / part
 
 
-def make_suite(
-    part: str = "validation", *, folder: str | PathLike[str] | None = None, processes: int = 2
-) -> Iterator[FrameSummary | None]:
-    """Make the frames of a part that are not there yet, in `folder` or the cache; yields as `make_frames` does.
+def make_suite(part: str = "validation", *, processes: int = 2) -> Iterator[FrameSummary | None]:
+    """Make the frames of a part that are not in the cache yet; yields as `make_frames` does.
 
     Raises:
         ParameterError: There is no such part.
         ImportError: `ldls[sim]` is not installed.
     """
-    return make_frames(suite_folder(part) if folder is None else folder, suite_orders(part), processes=processes)
+    return make_frames(suite_folder(part), suite_orders(part), processes=processes)
 
 
 def suite(part: str = "validation", *, processes: int = 2) -> Path:

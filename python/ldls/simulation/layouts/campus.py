@@ -27,7 +27,7 @@ def campus(rng: np.random.Generator) -> Plan:
         _racks(plan, across, rng)
         _greenery(plan, across, rng)
     _buildings(plan, right, left, rng)
-    pavement.cyclists(plan, (right + 0.6, left - 0.6), along_m=(6, 40), rng=rng)
+    pavement.cyclists(plan, (right + 0.6, left - 0.6), rng=rng)
     return plan
 
 

@@ -22,6 +22,7 @@ THINGS: tuple[tuple[int, Callable[[np.random.Generator], Shape], float], ...] = 
 """Category, shape, and how many there are on average to a pavement."""
 ONE_MORE_CYCLIST = 0.5
 """Chance that one more rides in a scene, where there is room."""
+CYCLISTS_ALONG_M: Range = (6, 40)
 
 
 def furnish(plan: Plan, across_m: Range, *, along_m: Range, rng: np.random.Generator) -> None:
@@ -63,10 +64,10 @@ def people(
             plan.put(PERSON, body, x + dx + rng.normal(0, 0.12), y + dy, yaw=turn, speed_m_s=speed)
 
 
-def cyclists(plan: Plan, across_m: Range, *, along_m: Range, rng: np.random.Generator) -> None:
+def cyclists(plan: Plan, across_m: Range, *, rng: np.random.Generator) -> None:
     """Put people on bicycles there, who ride along x and keep to the right."""
     while rng.random() < ONE_MORE_CYCLIST:
-        x, y = _place(across_m, along_m, rng)
+        x, y = _place(across_m, CYCLISTS_ALONG_M, rng)
         yaw = (0.0 if y < np.mean(across_m) else np.pi) + rng.normal(0, 0.05)
         bicycle = vehicles.bicycle(rng)
         body = figures.rider(bicycle, rng)

@@ -41,7 +41,7 @@ def street(rng: np.random.Generator) -> Plan:
         pavement.people(plan, (near - 0.4, far + 0.4), int(rng.integers(3, 9)), along_m=(4, 48), rng=rng)
     pavement.people(plan, (right + 0.8, left - 0.8), int(rng.integers(0, 4)), along_m=(7, 26), rng=rng, crossing=True)
     _houses(plan, across, rng)
-    pavement.cyclists(plan, (right + 0.6, left - 0.6), along_m=(6, 40), rng=rng)
+    pavement.cyclists(plan, (right + 0.6, left - 0.6), rng=rng)
     return plan
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import socket
 import sys
-from collections.abc import Mapping
 from typing import Any
 
 PORT = 9876
@@ -13,12 +12,11 @@ PORT = 9876
 ANSWER_S = 1.0
 
 
-def has_display(environment: Mapping[str, str] | None = None, platform: str | None = None) -> bool:
+def has_display() -> bool:
     """Return True if a window can be opened: on macOS and Windows always, on Linux where X or Wayland is named."""
-    if (platform or sys.platform) in ("darwin", "win32"):
+    if sys.platform in ("darwin", "win32"):
         return True
-    variables = os.environ if environment is None else environment
-    return any(variables.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def is_open() -> bool:
