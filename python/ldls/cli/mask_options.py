@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 SEGMENTER_HELP = (
     "What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt."
 )
-SegmenterOption = Annotated[str | None, typer.Option(metavar="NAME[:FILE]", help=SEGMENTER_HELP, show_default=False)]
 FrameSegmenterOption = Annotated[
     str | None,
     typer.Option(

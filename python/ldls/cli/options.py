@@ -23,10 +23,6 @@ FormatsOption = Annotated[
         "a run over a ROS bag also bag (one labelled bag).",
     ),
 ]
-FramesOption = Annotated[
-    str | None,
-    typer.Option(metavar="START:STOP:STEP", help="Which frames, from 0: 100:500:5.", show_default="all"),
-]
 CoresOption = Annotated[int | None, typer.Option(metavar="N", min=1, help="Cores to use.", show_default="all")]
 ObjectsOption = Annotated[
     Path | None,
@@ -46,9 +42,6 @@ PictureOption = Annotated[
         show_default=False,
         dir_okay=False,
     ),
-]
-ScoredOption = Annotated[
-    str, typer.Option("--categories", metavar="WORDS", help="Categories to score: Car,Pedestrian.")
 ]
 
 

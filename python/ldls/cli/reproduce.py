@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ldls.cli.messages import console, speaks_plainly
-from ldls.cli.options import CoresOption, OutOption, ScoredOption, SuitePart, words
+from ldls.cli.options import CoresOption, OutOption, SuitePart, words
 from ldls.cli.progress import progress
 from ldls.cli.reliability_files import RELIABILITY_FIGURES, draw_reliability
 from ldls.errors import ParameterError
@@ -52,7 +52,9 @@ def reproduce(
         Truth,
         typer.Option(metavar="|".join(Truth), help="Point annotations, or the 3D boxes of label_2, which are noisy."),
     ] = Truth.ANNOTATIONS,
-    categories: ScoredOption = "Car,Pedestrian",
+    categories: Annotated[
+        str, typer.Option(metavar="WORDS", help="Categories to score: Car,Pedestrian.")
+    ] = "Car,Pedestrian",
     cores: CoresOption = None,
 ) -> None:
     """Run the paper's experiments: from direct projection over clusters and the paper's method to ldls.
