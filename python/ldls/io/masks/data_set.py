@@ -12,20 +12,47 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PureWindowsPath
+from typing import Any, NamedTuple
 
 from ldls.errors import CorruptFileError, InputError, MaskError, UnsupportedFormatError, some, within
 from ldls.io.files import MAX_TEXT_BYTES, open_file, parsing
 from ldls.io.masks import json_file
-from ldls.io.masks.image_name import ImageName
 from ldls.masks import InstanceMasks
 from ldls.masks.coco import by_id, category_names
 from ldls.masks.pixels import check_same_size
 
+ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm")
+"""Those of images, which their names in the file may have or not."""
+EXPORTED = re.compile(r"_(png|jpe?g|bmp|tiff?|webp)\.rf\.\w+$", re.IGNORECASE)
+"""End that Roboflow gives the names of images: 000571_png.rf.0a1b2c.jpg."""
 BLANK = re.compile(r"[ \t\n\r]*")
 SHOWN = 3
 """Names that an error shows of those there are."""
+
+
+class ImageName(NamedTuple):
+    """The name of an image without its ending, and the folders before it, the nearest last."""
+
+    folders: tuple[str, ...]
+    stem: str
+
+    @classmethod
+    def of(cls, path: str | PathLike[str]) -> ImageName:
+        """The name of a path with slashes of any system."""
+        *folders, file = PureWindowsPath(path).parts or ("",)
+        suffix = PureWindowsPath(file).suffix
+        stem = file.removesuffix(suffix) if suffix.lower() in ENDINGS else file
+        return cls(tuple(folders), EXPORTED.sub("", stem))
+
+    def agreement(self, other: ImageName) -> tuple[int, int]:
+        """The number of folders before both that are the same, and of those of `self` that `other` has anywhere."""
+        near = 0
+        for own, its in zip(reversed(self.folders), reversed(other.folders), strict=False):
+            if own != its:
+                break
+            near += 1
+        return near, len(set(self.folders) & set(other.folders))
 
 
 class MaskDataSet:

@@ -10,18 +10,34 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ldls.checks import checked
-from ldls.errors import UnsupportedFormatError, within
-from ldls.io.masks import instance_png, json_file, npz, numpy_stack, png_folder, text
+from ldls.errors import MaskError, UnsupportedFormatError, within
+from ldls.io.files import read_lines
+from ldls.io.masks import instance_png, json_file, kitti_boxes, npz, numpy_stack, png_folder, yolo_txt
 from ldls.io.options import check_options, of_ending
 from ldls.masks import InstanceMasks
 from ldls.masks.pixels import check_same_size, checked_size
+
+
+def _read_txt(
+    path: str | PathLike[str], *, image_size: tuple[int, int] | None = None, names: Mapping[int, str] | None = None
+) -> InstanceMasks:
+    """The masks of a text file: lines of YOLO begin with numbers, those of KITTI's label_2 with names.
+
+    Raises:
+        MaskError: No image size, which the file does not say.
+    """
+    reader = yolo_txt.read if yolo_txt.is_yolo(read_lines(path, "mask file")) else kitti_boxes.read
+    if image_size is None:
+        raise MaskError(f"{path}: says nothing of the image's size; give its image_size=(height, width)")
+    return reader(path, image_size=image_size, names=names)
+
 
 READERS: dict[str, Callable[..., InstanceMasks]] = {
     ".json": json_file.read,
     ".png": instance_png.read,
     ".npz": npz.read,
     ".npy": numpy_stack.read,
-    ".txt": text.read,
+    ".txt": _read_txt,
 }
 
 WRITERS: dict[str, Callable[..., None]] = {

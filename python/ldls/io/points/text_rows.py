@@ -180,11 +180,8 @@ def _refuse_wrong_cell(rows: Sequence[Row], positions: Sequence[int], delimiter:
             error = TruncatedFileError if number == rows[-1][0] else CorruptFileError
             raise error(f"line {number}: expected at least {wanted} cells, got {len(cells)}: {line.strip()[:80]!r}")
         for position in positions:
-            _check_number(f"line {number}", position, cells[position])
-
-
-def _check_number(place: str, position: int, cell: str) -> None:
-    if not is_number(cell):
-        raise CorruptFileError(
-            f"{place}: expected a number with a decimal point in column {position + 1}, got {cell.strip()[:40]!r}"
-        )
+            if not is_number(cells[position]):
+                raise CorruptFileError(
+                    f"line {number}: expected a number with a decimal point in column {position + 1}, "
+                    f"got {cells[position].strip()[:40]!r}"
+                )
