@@ -9,7 +9,7 @@ from functools import partial
 import ldls._ldls as _ldls
 from ldls.batch.frame_work import FrameWork
 from ldls.batch.local import run_local
-from ldls.batch.ray_engine import RayCluster, run_ray
+from ldls.batch.ray_engine import run_ray
 from ldls.batch.window import Frames, Outcome
 from ldls.checks import choice
 from ldls.errors import ParameterError
@@ -53,7 +53,7 @@ def _local(options: EngineOptions) -> Engine:
 
 
 def _ray(options: EngineOptions) -> Engine:
-    return partial(run_ray, cluster=RayCluster(options.ray_address), workers=options.workers, gpus=options.gpus)
+    return partial(run_ray, address=options.ray_address, workers=options.workers, gpus=options.gpus)
 
 
 ENGINES: dict[str, Callable[[EngineOptions], Engine]] = {"local": _local, "ray": _ray}

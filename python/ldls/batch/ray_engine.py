@@ -17,7 +17,6 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,54 +40,10 @@ STARTING: Frames = ()
 """State of a worker that is starting."""
 
 
-@dataclass(frozen=True)
-class RayCluster:
-    """A running Ray.
-
-    Attributes:
-        address: Address of a cluster, "auto" for the one that this machine is part of; None starts one on this machine.
-    """
-
-    address: str | None = None
-
-    @contextmanager
-    def joined(self, cores: int) -> Iterator[Any]:
-        """The library, connected; whoever was connected before stays so. A cluster begun here has so many cores.
-
-        Raises:
-            ImportError: The extra `ray` is not installed.
-            BatchError: There is no cluster at the address.
-        """
-        ray = require("ray", extra="ray")
-        if ray.is_initialized():
-            yield ray
-            return
-        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
-        try:
-            if self.address is None:
-                ray.init(address="local", num_cpus=cores, include_dashboard=False, **quiet)
-            else:
-                _check_reachable(self.address)
-                ray.init(address=self.address, **quiet)
-        except (OSError, RuntimeError, ValueError) as error:
-            raise BatchError(f"ray_address: cannot join {self.address!r}: {error}") from error
-        try:
-            yield ray
-        finally:
-            ray.shutdown()
-
-
-def _check_reachable(address: str) -> None:
-    """Ray itself tries for minutes before it gives up."""
-    host, colon, port = address.removeprefix("ray://").rpartition(":")
-    if colon:
-        socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
-
-
 def run_ray(
     work: FrameWork,
     windows: Sequence[Frames],
-    cluster: RayCluster,
+    address: str | None,
     workers: int | None,
     gpus: float,
 ) -> Generator[Outcome]:
@@ -97,7 +52,7 @@ def run_ray(
     Args:
         work: What is done with a window; workers open it anew.
         windows: Number and name of each frame of each.
-        cluster: Where Ray runs.
+        address: Address of a cluster, "auto" for the one that this machine is part of; None starts one on this machine.
         workers: Processes; one a core, or one for each share of a GPU, by default.
         gpus: GPUs of each worker. With any, the cores are shared out among the workers too, and each does as many
             windows at a time: one segmenter a GPU, and a core for each cloud.
@@ -108,7 +63,7 @@ def run_ray(
     if not windows:
         return
     own_cores = _ldls.default_threads()
-    with cluster.joined(own_cores if gpus else workers or own_cores) as ray:
+    with _joined(address, own_cores if gpus else workers or own_cores) as ray:
         resources = ray.cluster_resources()
         cores = max(int(resources.get("CPU", 1)), 1)
         if resources.get("GPU", 0) < gpus:
@@ -128,6 +83,40 @@ def run_ray(
             yield from pool.outcomes(windows, wanted)
         finally:
             pool.dismiss()
+
+
+@contextmanager
+def _joined(address: str | None, cores: int) -> Iterator[Any]:
+    """The library, connected; whoever was connected before stays so. A cluster begun here has so many cores.
+
+    Raises:
+        ImportError: The extra `ray` is not installed.
+        BatchError: There is no cluster at the address.
+    """
+    ray = require("ray", extra="ray")
+    if ray.is_initialized():
+        yield ray
+        return
+    quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
+    try:
+        if address is None:
+            ray.init(address="local", num_cpus=cores, include_dashboard=False, **quiet)
+        else:
+            _check_reachable(address)
+            ray.init(address=address, **quiet)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise BatchError(f"ray_address: cannot join {address!r}: {error}") from error
+    try:
+        yield ray
+    finally:
+        ray.shutdown()
+
+
+def _check_reachable(address: str) -> None:
+    """Ray itself tries for minutes before it gives up."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if colon:
+        socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
 
 
 class _Pool:

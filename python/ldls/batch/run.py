@@ -24,7 +24,7 @@ from ldls.batch.plan import check_apart, check_names, check_places, chosen_of, w
 from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import NOTE, RunBag
 from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks, remove_tracks
-from ldls.batch.settings import RunSettings, source_record
+from ldls.batch.settings import RunSettings
 from ldls.batch.summary import (
     FAILURES_NAME,
     Summary,
@@ -157,7 +157,11 @@ def run(
         work = FrameWork(opened, settings, folder)
         header = {
             "settings": settings.record() | work.digests,
-            "source": source_record(opened.kind, str(Path(opened.path).resolve()), options),
+            "source": {
+                "kind": opened.kind,
+                "path": str(Path(opened.path).resolve()),
+                "options": {name: str(value) for name, value in sorted(options.items())},
+            },
         }
         journal = Journal(folder, header, (*settings.frame_formats, *([TRACKS] if settings.track else [])))
         try:

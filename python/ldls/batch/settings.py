@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
@@ -131,8 +130,3 @@ class RunSettings:
         settings["version"] = _ldls.__version__
         recorded: dict[str, Any] = json.loads(json.dumps(settings))
         return recorded
-
-
-def source_record(kind: str, path: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    """A source as a journal stores it: its path and the options that it was opened with."""
-    return {"kind": kind, "path": path, "options": {name: str(value) for name, value in sorted(options.items())}}
