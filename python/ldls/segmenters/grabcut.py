@@ -19,10 +19,8 @@ MIN_SHARE = 0.2
 ROUNDS = 5
 SEED = 0
 
-Bool = NDArray[np.bool_]
 
-
-def cut(image: NDArray[np.uint8], top: int, left: int, height: int, width: int) -> Bool:
+def cut(image: NDArray[np.uint8], top: int, left: int, height: int, width: int) -> NDArray[np.bool_]:
     """(height, width) pixels of the object in a box that lies within `image` (H, W, 3); the same every time.
 
     Rother, Kolmogorov and Blake, "GrabCut", 2004.
@@ -39,11 +37,11 @@ def cut(image: NDArray[np.uint8], top: int, left: int, height: int, width: int) 
     return foreground
 
 
-def ellipse(height: int, width: int) -> Bool:
+def ellipse(height: int, width: int) -> NDArray[np.bool_]:
     """(height, width) pixels whose centres lie in the ellipse that touches the box."""
     down = (np.arange(height) + 0.5) / height * 2 - 1
     across = (np.arange(width) + 0.5) / width * 2 - 1
-    inside: Bool = down[:, None] ** 2 + across**2 <= 1
+    inside: NDArray[np.bool_] = down[:, None] ** 2 + across**2 <= 1
     return inside
 
 
@@ -52,7 +50,7 @@ def _widened(start: int, length: int, limit: int) -> slice:
     return slice(max(start - margin, 0), min(start + length + margin, limit))
 
 
-def _foreground(surroundings: NDArray[np.uint8], box: tuple[int, int, int, int]) -> Bool:
+def _foreground(surroundings: NDArray[np.uint8], box: tuple[int, int, int, int]) -> NDArray[np.bool_]:
     cv2 = require("cv2", "grabcut")
     top, left, height, width = box
     scale = min(1.0, math.sqrt(MAX_PIXELS / (surroundings.shape[0] * surroundings.shape[1])))
@@ -71,5 +69,5 @@ def _foreground(surroundings: NDArray[np.uint8], box: tuple[int, int, int, int])
     cv2.grabCut(np.ascontiguousarray(small), marks, None, models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
     foreground = np.isin(marks, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.uint8)
     whole = cv2.resize(foreground, surroundings.shape[1::-1], interpolation=cv2.INTER_NEAREST)
-    inside: Bool = whole[top : top + height, left : left + width].astype(np.bool_)
+    inside: NDArray[np.bool_] = whole[top : top + height, left : left + width].astype(np.bool_)
     return inside

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.cloud import Ints
 from ldls.errors import CorruptFileError, FileFormatError, ParameterError, UnsupportedFormatError
 from ldls.masks import InstanceMasks
 from ldls.segmenters.classes import Classes, contiguous_coco_classes, named_classes
@@ -20,7 +21,6 @@ from ldls.segmenters.outputs import check_finite, check_scores, expect_shape
 from ldls.segmenters.resampling import F32
 from ldls.segmenters.suppression import suppress
 
-I64 = NDArray[np.int64]
 N_COCO = 80
 MAX_INSTANCES = 300
 MAX_END_TO_END_ROWS = 1000
@@ -34,7 +34,7 @@ class Candidates:
 
     boxes: F32
     scores: F32
-    classes: I64
+    classes: Ints
     coefficients: F32
 
 
@@ -177,7 +177,7 @@ def layout_of(sides: tuple[int, int], n_coefficients: int, n_classes: int | None
     return next(fits, None)
 
 
-def _best(candidates: Candidates, max_iou: float, min_score: float) -> I64:
+def _best(candidates: Candidates, max_iou: float, min_score: float) -> Ints:
     sure = np.flatnonzero(candidates.scores >= np.float32(min_score))
     boxes, scores, classes = candidates.boxes[sure], candidates.scores[sure], candidates.classes[sure]
     check_finite("box", boxes, sure)
@@ -194,7 +194,7 @@ def _check_prototypes(name: str, prototypes: F32) -> None:
 
 
 def _drawn(
-    candidates: Candidates, kept: I64, boxes: F32, prototypes: F32, letterbox: Letterbox, classes: Classes
+    candidates: Candidates, kept: Ints, boxes: F32, prototypes: F32, letterbox: Letterbox, classes: Classes
 ) -> Iterator[Crop]:
     """Masks within their boxes: a pixel belongs to a box from its first edge on and before its last."""
     if not len(kept):
@@ -215,7 +215,7 @@ def _corners(centred: F32) -> F32:
         return np.concatenate([middle - half, middle + half], axis=1)
 
 
-def _as_classes(numbers: F32) -> I64:
+def _as_classes(numbers: F32) -> Ints:
     return np.where(np.isfinite(numbers), numbers, -1).astype(np.int64)
 
 

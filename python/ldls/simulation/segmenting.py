@@ -14,7 +14,6 @@ from ldls.simulation.error_model import SegmenterErrors
 from ldls.simulation.photograph import PixelTruth
 from ldls.simulation.scene_object import BENCH, BICYCLE, BUS, CAR, CHAIR, DOG, MOTORCYCLE, PERSON, POTTED_PLANT, TRUCK
 
-Mask = NDArray[np.bool_]
 SMALLEST_PX = 40
 """Smaller silhouettes are never found."""
 MARGIN_PX = 12
@@ -46,7 +45,7 @@ class _Find:
     number: int
     part: int
     category: int
-    mask: Mask
+    mask: NDArray[np.bool_]
     visible: float
     score: float = 1.0
 
@@ -103,7 +102,7 @@ def _merged(found: list[_Find], errors: SegmenterErrors, rng: np.random.Generato
     return kept
 
 
-def _meet(one: Mask, other: Mask) -> bool:
+def _meet(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> bool:
     """True where the boxes of two masks overlap or touch."""
     pairs = zip(_window(one, 0), _window(other, 0), strict=True)
     return all(a.start <= b.stop + 1 and b.start <= a.stop + 1 for a, b in pairs)
@@ -136,7 +135,7 @@ def _invented(truth: PixelTruth, rng: np.random.Generator) -> _Find:
     return _Find(0, 0, categories[int(rng.integers(len(categories)))], blob, 1.0, float(rng.uniform(0.3, 0.65)))
 
 
-def _drawn(silhouette: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mask:
+def _drawn(silhouette: NDArray[np.bool_], errors: SegmenterErrors, rng: np.random.Generator) -> NDArray[np.bool_]:
     """(H, W) mask that a network draws of `silhouette`; the same where all strengths are 0."""
     window = _window(silhouette, MARGIN_PX + int(2 * _mean_bleed(silhouette, errors)))
     part = silhouette[window]
@@ -146,7 +145,7 @@ def _drawn(silhouette: Mask, errors: SegmenterErrors, rng: np.random.Generator) 
     return mask
 
 
-def _window(mask: Mask, margin_px: int) -> tuple[slice, slice]:
+def _window(mask: NDArray[np.bool_], margin_px: int) -> tuple[slice, slice]:
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return (
         slice(max(rows[0] - margin_px, 0), rows[-1] + 1 + margin_px),
@@ -154,7 +153,7 @@ def _window(mask: Mask, margin_px: int) -> tuple[slice, slice]:
     )
 
 
-def _on_cells(part: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mask:
+def _on_cells(part: NDArray[np.bool_], errors: SegmenterErrors, rng: np.random.Generator) -> NDArray[np.bool_]:
     """`part` sampled on the cells of a box that nearly fits, and enlarged again."""
     tight = _window(part, 0)
     slip = rng.normal(0, 1, (2, 2)) * errors.box_slip
@@ -174,7 +173,7 @@ def _slipped(extent: slice, slip: NDArray[np.float64], size: int) -> slice:
     return slice(low, high) if high > low else extent
 
 
-def _edged(part: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mask:
+def _edged(part: NDArray[np.bool_], errors: SegmenterErrors, rng: np.random.Generator) -> NDArray[np.bool_]:
     """`part` with its edge moved outwards by a bleed of its own, and wavering."""
     if not (errors.bleed_px or errors.bleed_cells or errors.ragged_px):
         return part
@@ -184,11 +183,11 @@ def _edged(part: Mask, errors: SegmenterErrors, rng: np.random.Generator) -> Mas
     wave = ndimage.gaussian_filter(rng.normal(size=part.shape), WAVE_PX / 2)
     # a sliver is not frayed away
     wave *= min(errors.ragged_px, 0.25 * float(inside.max())) / max(float(wave.std()), 1e-9)
-    grown: Mask = np.where(part, inside - 0.5, 0.5 - outside) + bleed + wave >= 0
+    grown: NDArray[np.bool_] = np.where(part, inside - 0.5, 0.5 - outside) + bleed + wave >= 0
     return grown if grown.any() else part
 
 
-def _mean_bleed(part: Mask, errors: SegmenterErrors) -> float:
+def _mean_bleed(part: NDArray[np.bool_], errors: SegmenterErrors) -> float:
     rows, columns = _window(part, 0)
     side_px = min(rows.stop - rows.start, columns.stop - columns.start)
     return float(errors.bleed_px + errors.bleed_cells * side_px / NETWORK_CELLS)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from ldls.cloud import Ints
 from ldls.palette import Colour
 from ldls.viewing.drawing import font_for, one_line
 
 I32 = NDArray[np.int32]
-I64 = NDArray[np.int64]
 AVERSION = 4.0
 """Heights of a tag that it goes aside rather than lie where it had better not be."""
 LONGEST = 20
@@ -116,7 +116,7 @@ def _best_place(
 
 
 def _covered_share(
-    cover: I32, picture: tuple[int, int], left: I64, top: I64, right: I64, bottom: I64
+    cover: I32, picture: tuple[int, int], left: Ints, top: Ints, right: Ints, bottom: Ints
 ) -> NDArray[np.float64]:
     """Share of each place that is covered, by sums of the cover over all that lies above and left of a pixel of it."""
     across, down = (cover.shape[1] - 1) / picture[0], (cover.shape[0] - 1) / picture[1]
