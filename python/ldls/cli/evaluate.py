@@ -13,7 +13,6 @@ import typer
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import refuse, words
 from ldls.cli.progress import progress
-from ldls.cli.reliability_files import RELIABILITY_FIGURES, draw_reliability
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -253,6 +252,7 @@ def _check_out(out: Path, files: Iterable[LabelFiles], folders: FrameFolders) ->
     Raises:
         InputError: One would be.
     """
+    from ldls.evaluation.figures import RELIABILITY_FIGURES
     from ldls.evaluation.tables import table_files
     from ldls.io.files import check_outputs
 
@@ -264,6 +264,7 @@ def _check_out(out: Path, files: Iterable[LabelFiles], folders: FrameFolders) ->
 
 def _show(by_method: dict[str, Evaluation], left_out_by: set[str], notes: Sequence[str], out: Path | None) -> None:
     from ldls.evaluation import tables
+    from ldls.evaluation.figures import draw_reliability
 
     shown = {
         "semantic": tables.semantic_table(by_method),

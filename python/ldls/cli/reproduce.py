@@ -11,7 +11,6 @@ import typer
 from ldls.cli.messages import console, speaks_plainly
 from ldls.cli.options import CoresOption, OutOption, SuitePart, words
 from ldls.cli.progress import progress
-from ldls.cli.reliability_files import RELIABILITY_FIGURES, draw_reliability
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 
 TABLES = ("comparison", "instances", "panoptic", "ablation", "reliability", "coverage", "range", "iterations")
-FIGURES = ("range.png", "iterations.png", "objects.png", *RELIABILITY_FIGURES)
+FIGURES = ("range.png", "iterations.png", "objects.png")
 
 
 class Truth(StrEnum):
@@ -71,6 +70,7 @@ def reproduce(
     """
     from ldls.datasets import KittiObjectSource
     from ldls.evaluation import ClassSet
+    from ldls.evaluation.figures import RELIABILITY_FIGURES, draw_reliability
     from ldls.evaluation.paper import label, score
     from ldls.evaluation.tables import table_files
     from ldls.io.files import check_outputs
@@ -78,7 +78,8 @@ def reproduce(
 
     frames = KittiObjectSource(_folder(folder, suite), masks="masks", truth=truth.value)
     scored = ClassSet.kitti(words(categories))
-    written = [path for stem in TABLES for path in table_files(out, stem)] + [out / name for name in FIGURES]
+    written = [path for stem in TABLES for path in table_files(out, stem)]
+    written += [out / name for name in (*FIGURES, *RELIABILITY_FIGURES)]
     check_outputs({"--out": written}, (path for k in range(len(frames)) for path in frames.files(k)), made=out)
     labelled = progress(label(frames, classes=scored, params=Params(threads=cores)), len(frames), "labelling")
     pairs = list(labelled)

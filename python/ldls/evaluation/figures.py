@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ldls._optional import require
 from ldls.checks import checked
 from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts
+from ldls.evaluation.evaluation import Evaluation
 from ldls.evaluation.reliability import Reliability
 from ldls.io.files import whole_file
 
@@ -27,6 +29,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 IOU_LABEL = "IoU (%)"
 LEAST_SHARE = 0.001
 """Share of the points from which on a bin is drawn."""
+RELIABILITY_FIGURES = ("reliability.png", "coverage.png")
+"""The files of `draw_reliability`."""
 
 
 @checked
@@ -154,6 +158,23 @@ def precision_against_coverage(reliabilities: Mapping[str, Reliability], path: s
     low = min(5 * math.floor(20 * least), 95)
     axes.set_ylim(low - 0.03 * (100 - low), 100 + 0.03 * (100 - low))
     _save(figure, path)
+
+
+@checked
+def draw_reliability(evaluations: Mapping[str, Evaluation], out: str | PathLike[str]) -> list[Path]:
+    """Draw how far confidence can be relied on; the files written: both if a method tells it and finds an object.
+
+    Args:
+        evaluations: Scores by method.
+        out: Folder of the figures.
+    """
+    told = {method: one.reliability for method, one in evaluations.items() if one.reliability}
+    if not any(each.objects.points.any() for each in told.values()):
+        return []
+    paths = [Path(out) / name for name in RELIABILITY_FIGURES]
+    right_against_confidence(told, paths[0])
+    precision_against_coverage(told, paths[1])
+    return paths
 
 
 def _figure(named: Mapping[str, Any], *, width: float) -> Any:  # noqa: ANN401
