@@ -38,7 +38,7 @@ def counting(folders):
 
 
 def test_boxes_take_points_calibration_and_the_size_of_the_image(boxes):
-    pair = read(boxes, points="velodyne", calib="calib", images="image_2")
+    pair = read(boxes, points="velodyne", calib="calib", image="image_2")
     assert pair.truth.names[pair.truth.classes[0]] == "Car"
     np.testing.assert_allclose(pair.ranges_m, np.linalg.norm(POINTS[:, :3], axis=1), rtol=1e-6)
     assert pair.truth.ignored.tolist() == [False, False, True]
@@ -47,18 +47,34 @@ def test_boxes_take_points_calibration_and_the_size_of_the_image(boxes):
         assert not read(boxes, points="velodyne", calib="calib").truth.ignored.any()
 
 
-@pytest.mark.parametrize("suffix", [".jpg", ".jpeg"])
+@pytest.mark.parametrize("ending", [".csv", ".txt", ".xyz", ".pcd.bin", ".NPY"])
+def test_points_may_be_of_any_format_that_is_read(boxes, ending):
+    (boxes / "velodyne/7.bin").unlink()
+    path = boxes / f"velodyne/7{ending}"
+    if ending == ".NPY":
+        with path.open("wb") as file:
+            np.save(file, POINTS)
+    elif ending == ".pcd.bin":
+        np.hstack([POINTS, np.zeros((3, 1), np.float32)]).tofile(path)
+    else:
+        np.savetxt(path, POINTS, delimiter="," if ending == ".csv" else " ")
+    pair = read(boxes, points="velodyne", calib="calib", image="image_2")
+    np.testing.assert_allclose(pair.ranges_m, np.linalg.norm(POINTS[:, :3], axis=1), rtol=1e-6)
+    assert FrameFolders(points=boxes / "velodyne").files("7") == [path]
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".PNG"])
 def test_images_may_be_jpeg(boxes, suffix):
     (boxes / "image_2/7.png").unlink()
     Image.new("RGB", (100, 80)).save(boxes / f"image_2/7{suffix}")
-    pair = read(boxes, points="velodyne", calib="calib", images="image_2")
+    pair = read(boxes, points="velodyne", calib="calib", image="image_2")
     assert pair.truth.ignored.tolist() == [False, False, True]
 
 
 def test_a_frame_without_an_image_in_the_folder_of_images_is_named(boxes):
     (boxes / "image_2/7.png").rename(boxes / "image_2/8.png")
     with pytest.raises(InputError, match=r"frame 7: has no image in .*image_2, expected 7 with \.png, \.jpg, \.jpeg"):
-        read(boxes, points="velodyne", calib="calib", images="image_2")
+        read(boxes, points="velodyne", calib="calib", image="image_2")
 
 
 def test_what_boxes_need_is_named(boxes):
@@ -66,11 +82,11 @@ def test_what_boxes_need_is_named(boxes):
         read(boxes)
     with pytest.raises(InputError, match="frame 7: needs its calibration; .*--calib"):
         read(boxes, points="velodyne")
-    with pytest.raises(FileNotFoundError, match=r"calib.7\.bin"):
-        read(boxes, points="calib", calib="calib")
+    with pytest.raises(FileNotFoundError, match=r"image_2.7\.bin"):
+        read(boxes, points="image_2", calib="calib")
     (boxes / "mine/7.txt").write_text("1 Car\n")
     with pytest.raises(ShapeError, match="frame 7: prediction has 1 points, truth 3"):
-        read(boxes, points="velodyne", calib="calib", images="image_2")
+        read(boxes, points="velodyne", calib="calib", image="image_2")
 
 
 def test_squeezeseg_brings_its_ranges(tmp_path):

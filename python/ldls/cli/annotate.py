@@ -48,7 +48,7 @@ def annotate(
 
     labels = label_paths(training)
     check_outputs({"OUT": [out / path.name for path in labels]}, labels, made=out)
-    folders = FrameFolders(points=training / "velodyne", calib=training / "calib", images=training / "image_2")
+    folders = FrameFolders(points=training / "velodyne", calib=training / "calib", image=training / "image_2")
     missing = [path for path in labels if not (out / path.name).exists()]
     out.mkdir(parents=True, exist_ok=True)
     n_objects: Counter[str] = Counter()

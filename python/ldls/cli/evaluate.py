@@ -165,7 +165,7 @@ def evaluate(
             f"--track: TRUTH is {BOXES}, which numbers the objects of each frame anew; expected a format whose numbers "
             "mean the same object in every sweep, such as label"
         )
-    folders = FrameFolders(points=points, calib=calib, images=image)
+    folders = FrameFolders(points=points, calib=calib, image=image)
     if out is not None:
         _check_out(out, (frame for own in files.values() for frame in own), folders)
     of_methods = {method: {each.name: each.prediction for each in own} for method, own in files.items()}

@@ -23,11 +23,12 @@ from ldls.io.labels.kitti_objects import IMAGE_SIZE
 from ldls.io.labels.label_formats import FORMATS, LabelFile, LabelFiles, read_labeling
 from ldls.io.labels.labeling_npz import read_confidence_npz
 from ldls.io.labels.squeezeseg import read_squeezeseg_ranges
+from ldls.io.points import READERS
 from ldls.io.result_npz import holds_result
 from ldls.labeling import Labeling
 from ldls.stages import project
 
-POINT_ENDINGS = (".bin", ".pcd.bin", ".npy", ".pcd", ".ply", ".las", ".laz")
+POINT_ENDINGS = (*READERS, ".pcd.bin")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,19 +38,20 @@ class FrameFolders:
     Attributes:
         points: Folder of lidar sweeps.
         calib: Folder of KITTI calibration files.
-        images: Folder of images, of which only the size is read; one that is not there is not known.
+        image: Folder of images, of which only the size is read; one that is not there is not known.
     """
 
     points: Path | None = None
     calib: Path | None = None
-    images: Path | None = None
+    image: Path | None = None
 
     def files(self, name: str) -> list[Path]:
         """The files of the frame `name` that the folders have."""
-        paths = [] if self.points is None else [self.points / f"{name}{ending}" for ending in POINT_ENDINGS]
-        paths += [] if self.calib is None else [self.calib / f"{name}.txt"]
-        paths += [] if self.images is None else [self.images / f"{name}{suffix}" for suffix in IMAGE_SUFFIXES]
-        return [path for path in paths if path.exists()]
+        return [
+            *_there(self.points, name, POINT_ENDINGS),
+            *_there(self.calib, name, (".txt",)),
+            *_there(self.image, name, IMAGE_SUFFIXES),
+        ]
 
     def read_points(self, name: str) -> Points:
         """(N, >= 3) points of the frame `name`, in metres.
@@ -60,8 +62,7 @@ class FrameFolders:
         """
         if self.points is None:
             raise InputError(f"frame {name}: needs its points; name their folder (--points)")
-        paths = [self.points / f"{name}{ending}" for ending in POINT_ENDINGS]
-        return read_points(next((path for path in paths if path.exists()), paths[0]))
+        return read_points(next(_there(self.points, name, POINT_ENDINGS), self.points / f"{name}{POINT_ENDINGS[0]}"))
 
     def read_camera(self, name: str) -> Camera:
         """Camera of the frame `name`, with the size of its image; KITTI's usual one, and a warning, without images.
@@ -77,8 +78,8 @@ class FrameFolders:
         return replace(camera, image_size=self._image_size(name))
 
     def _image_size(self, name: str) -> tuple[int, int]:
-        if self.images is None or not self.images.is_dir():
-            mend = "name their folder (--image)" if self.images is None else f"put them into {self.images}"
+        if self.image is None or not self.image.is_dir():
+            mend = "name their folder (--image)" if self.image is None else f"put them into {self.image}"
             height, width = IMAGE_SIZE
             warnings.warn(
                 f"images: their size is not known, {height} x {width} (height x width) is assumed, KITTI's usual one, "
@@ -87,11 +88,10 @@ class FrameFolders:
                 stacklevel=1,
             )
             return IMAGE_SIZE
-        paths = [self.images / f"{name}{suffix}" for suffix in IMAGE_SUFFIXES]
-        found = next((path for path in paths if path.exists()), None)
+        found = next(_there(self.image, name, IMAGE_SUFFIXES), None)
         if found is None:
             raise InputError(
-                f"frame {name}: has no image in {self.images}, expected {name} with {', '.join(IMAGE_SUFFIXES)}; add "
+                f"frame {name}: has no image in {self.image}, expected {name} with {', '.join(IMAGE_SUFFIXES)}; add "
                 "it, or leave out the folder for KITTI's usual size"
             )
         return read_image_size(found)
@@ -164,6 +164,13 @@ class Counting:
         for method, files in self.methods.items():
             if name in files and FORMATS[files[name].format].ignores:
                 yield method, ~self.folders.read_labels(name, files[name]).ignored
+
+
+def _there(folder: Path | None, name: str, endings: Iterable[str]) -> Iterator[Path]:
+    """The files of a frame that a folder has, with endings in small letters or in capitals."""
+    if folder is not None:
+        paths = (folder / f"{name}{spelt}" for ending in endings for spelt in (ending, ending.upper()))
+        yield from (path for path in paths if path.exists())
 
 
 def parse_place(text: str) -> tuple[Path, str | None]:
