@@ -7,12 +7,15 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from itertools import chain
+from os import PathLike
 from pathlib import Path, PureWindowsPath
+from typing import Any
 
 from ldls.batch.run_tracks import TRACKS_STATE, TRACKS_TABLE
+from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames
 from ldls.checks.values import is_whole
-from ldls.datasets import Source
+from ldls.datasets import Source, open_source
 from ldls.errors import BatchError, ParameterError, UnsafePathError, some
 from ldls.sequences.trajectory import is_gap
 from ldls.viewing.formats import ENDINGS, TRACKS, file_name, file_names
@@ -21,6 +24,17 @@ WINDOWS_DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com"
 
 LONGEST_NAME_BYTES = 200
 """Most file systems allow 255 bytes; ending and what marks unfinished files need some."""
+
+
+def open_for_run(path: str | PathLike[str], settings: RunSettings, /, **options: Any) -> Source:  # noqa: ANN401
+    """The source at a path, with what a run needs of it: no truth, and no poses where the settings bring them.
+
+    Args:
+        path: As of `open_source`, whose errors it raises.
+        settings: Those of the run.
+        options: As of `open_source`; they go before what the settings say.
+    """
+    return open_source(path, **{"truth": False, "poses": settings.poses is None, **options})
 
 
 def parse_frames(text: str | None) -> slice:

@@ -20,7 +20,7 @@ from ldls.batch.engines import Engine, EngineOptions, open_engine
 from ldls.batch.frame_work import Earlier, FrameWork
 from ldls.batch.journal import Journal, Record, formats_begun
 from ldls.batch.lock import only_run
-from ldls.batch.plan import check_apart, check_names, check_places, chosen_of, windows_of
+from ldls.batch.plan import check_apart, check_names, check_places, chosen_of, open_for_run, windows_of
 from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import NOTE, RunBag
 from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks, remove_tracks
@@ -37,7 +37,7 @@ from ldls.batch.summary import (
 )
 from ldls.batch.window import Frames, Outcome
 from ldls.checks import checked
-from ldls.datasets import Source, open_source
+from ldls.datasets import Source
 from ldls.datasets.stored_masks import fill
 from ldls.errors import (
     ChangedFileWarning,
@@ -122,10 +122,7 @@ def run(
         KeyboardInterrupt: It was interrupted; failures.jsonl has the frames that failed until then.
     """
     options = dict(options or {})
-    if isinstance(source, str | PathLike):
-        opened = open_source(source, **{"truth": False, "poses": settings.poses is None, **options})
-    else:
-        opened = source
+    opened = open_for_run(source, settings, **options) if isinstance(source, str | PathLike) else source
     runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
     chosen = chosen_of(opened, frames)
     names = [name for _, name in chosen]

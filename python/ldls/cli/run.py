@@ -120,8 +120,7 @@ def run(
     ldls run 2011_09_26/2011_09_26_drive_0064_sync --segmenter onnx:yolo11n-seg.onnx --out labels --sweeps 2 --track
     """
     import ldls.batch as batch
-    from ldls.batch.plan import parse_frames
-    from ldls.datasets import open_source
+    from ldls.batch.plan import open_for_run, parse_frames
 
     settings = batch.RunSettings(
         masks=masks,
@@ -135,7 +134,7 @@ def run(
         track=track,
     )
     options = parse_options(option or [])
-    opened = open_source(source, kind=dataset, **{"truth": False, "poses": poses is None, **options})
+    opened = open_for_run(source, settings, kind=dataset, **options)
     chosen = parse_frames(frames)
     say_own_masks(opened, masks, segmenter)
     finished = failed = 0
