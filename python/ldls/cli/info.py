@@ -58,16 +58,14 @@ def info(
     """
     from ldls.datasets.inspection import check_stamps, inspect, sample
     from ldls.io.files import check_outputs
+    from ldls.viewing.files import check_picture
 
     if picture is None:
         refuse({"frame": frame}, "the frame to draw, and there is no --picture")
     frames = opened(source, dataset, parse_options(option or []))
     drawn = chosen_frame(frames, frame)
-    if picture is not None:
-        from ldls.viewing.files import check_picture
-
-        check_picture(picture)
-        check_outputs({"--picture": [picture]}, (file for at in range(len(frames)) for file in frames.files(at)))
+    check_picture(picture)
+    check_outputs({"--picture": [picture]}, (file for at in range(len(frames)) for file in frames.files(at)))
     indices = list(range(len(frames))) if every else sample(len(frames), LOOKED_AT)
     facts = [inspect(frames, at) for at in progress(indices, len(indices), "looking at frames")]
     findings = [finding for each in facts for finding in each.findings] + check_stamps(frames.names, frames.stamps)

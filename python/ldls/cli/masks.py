@@ -173,8 +173,7 @@ def make(
     from ldls.io.files import check_outputs
     from ldls.segmenters.registry import segmenter_file
 
-    pictures = [] if picture is None else [picture]
-    check_outputs({"OUT": [out], "--picture": pictures}, [image, segmenter_file(segmenter)])
+    check_outputs({"OUT": [out], "--picture": [picture]}, [image, segmenter_file(segmenter)])
     pixels = read_image(image)
     made = masks_of(pixels, masks=None, segmenter=segmenter, min_score=min_score, categories=categories)
     save(made, out)
@@ -201,7 +200,7 @@ def show(
     from ldls.io import read_image
     from ldls.io.files import check_outputs
 
-    check_outputs({"--picture": [] if picture is None else [picture]}, [masks, image])
+    check_outputs({"--picture": [picture]}, [masks, image])
     pixels = None if image is None else read_image(image)
     shown = masks_of(pixels, masks=masks, segmenter=None, image_id=image_id, min_score=min_score, categories=categories)
     _show(shown, pixels, picture)

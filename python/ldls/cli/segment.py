@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -111,15 +112,14 @@ def segment(
     check_recording(rerun, diffusion)
     wanted = tuple(dict.fromkeys(words(formats)))
     check_formats(wanted)
-    if picture is not None:
-        check_picture(picture)
+    check_picture(picture)
     write_objects = None if objects is None else objects_writer(objects)
     name = points.stem.removesuffix(".pcd")
-    outputs = {
+    outputs: dict[str, Sequence[Path | None]] = {
         "--out": [out / file_name(name, word) for word in wanted],
-        "--save-masks": [] if save_masks is None else [save_masks],
-        "--objects": [] if objects is None else [objects],
-        "--picture": [] if picture is None else picture_files(picture),
+        "--save-masks": [save_masks],
+        "--objects": [objects],
+        "--picture": picture_files(picture),
         "--rerun": recording_files(rerun),
     }
     check_outputs(outputs, [points, calib, extrinsic, masks, segmenter_file(segmenter), image], made=out)

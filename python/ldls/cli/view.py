@@ -90,14 +90,12 @@ def view(
     ldls view DRIVE --results labels/tracks --picture pictures/drive.png
     """
     from ldls.io.results import FORMATS
+    from ldls.viewing.files import check_picture
 
     name = path.resolve().stem
     target = rerun if picture is not None else rerun or default_target(name)
     check_recording(target, diffusion)
-    if picture is not None:
-        from ldls.viewing.files import check_picture
-
-        check_picture(picture)
+    check_picture(picture)
     failures: list[str] = []
     if path.is_file() and any(path.name.lower().endswith(each.ending) for each in FORMATS.values()):
         of_sources = {"dataset": dataset, "option": option, "frames": frames, "masks": masks, "results": results}
@@ -142,7 +140,7 @@ def view_result(
 
     result = read_result(path)
     files = image_files(images, camera_names(result.views))
-    outputs = {"--picture": [] if picture is None else picture_files(picture), "--rerun": recording_files(target)}
+    outputs = {"--picture": picture_files(picture), "--rerun": recording_files(target)}
     check_outputs(outputs, files.values())
     pictures = {camera: read_image(file) for camera, file in files.items()}
     messages = []

@@ -210,7 +210,7 @@ def check_folder(path: str | PathLike[str]) -> None:
 
 
 def check_outputs(
-    outputs: Mapping[str, Iterable[Path]],
+    outputs: Mapping[str, Iterable[Path | None]],
     inputs: Iterable[str | PathLike[str] | None],
     *,
     made: Path | None = None,
@@ -220,7 +220,8 @@ def check_outputs(
     An output is never an input. Links, relative paths and letters of another case name the file that they lead to.
 
     Args:
-        outputs: The files that will be written, by the option that names them; they need not be there.
+        outputs: The files that will be written, by the option that names them; they need not be there. None is passed
+            over.
         inputs: The files that are read; of a folder, those in it. None is passed over.
         made: The folder that is made for them if need be.
 
@@ -228,7 +229,7 @@ def check_outputs(
         FileNotFoundError: The folder of one of `outputs` is not there.
         InputError: One of `outputs` is one of `inputs`, or that of two options.
     """
-    written = [(option, path) for option, paths in outputs.items() for path in paths]
+    written = [(option, path) for option, paths in outputs.items() for path in paths if path is not None]
     to_be = [] if made is None else [made.resolve(), *made.resolve().parents]
     for folder, path in {path.parent: path for _, path in written}.items():
         if folder.resolve() not in to_be:

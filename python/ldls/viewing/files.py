@@ -46,19 +46,22 @@ def save_pictures(path: str | PathLike[str], result: Segmentation, images: Image
     return [path, birds_eye, compared]
 
 
-def picture_files(path: str | PathLike[str]) -> list[Path]:
-    """The files that `save_pictures` writes: the overlay at `path`, the bird's-eye view and the comparison."""
+def picture_files(path: str | PathLike[str] | None) -> list[Path]:
+    """The files of `save_pictures`: the overlay at `path`, the bird's-eye view and the comparison; none of None."""
+    if path is None:
+        return []
     path = Path(path)
     return [path, *(path.with_name(f"{path.stem}-{what}{path.suffix}") for what in ("birds-eye", "comparison"))]
 
 
-def check_picture(path: str | PathLike[str]) -> None:
-    """Refuse a file of another format than pictures are written in, before one is drawn.
+def check_picture(path: str | PathLike[str] | None) -> None:
+    """Refuse a file of another format than pictures are written in, before one is drawn; None is no picture.
 
     Raises:
         UnsupportedFormatError: The name does not end in `.png`.
     """
-    of_ending(path, {".png": png_of}, "write", "pictures")
+    if path is not None:
+        of_ending(path, {".png": png_of}, "write", "pictures")
 
 
 def save_picture(path: str | PathLike[str], picture: Image.Image) -> None:
