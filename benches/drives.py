@@ -134,7 +134,7 @@ def scores(of_drives: Sequence[Window], size: int, threads: int) -> tuple[Evalua
 def long_scores(drive: Window, standing: Window, size: int, seed: int, threads: int) -> tuple[TrackingScores, int]:
     """Scores of the tracks of a long drive of which masks are left out, and id switches of the cars that stand."""
     _, tracked, _ = _tracked(with_masks_left_out(drive, seed), size, threads)
-    return _tracking(tracked, drive), _tracking(tracked, standing).id_switches
+    return _tracking(tracked, drive), _tracking(tracked, standing).total.id_switches
 
 
 def _tracked(
@@ -192,7 +192,8 @@ def errors_and_tracks(measured: Frame, options: argparse.Namespace) -> Table:
         for together, size, of_drives in (("1", 1, of_lidar), ("5", 5, of_lidar), ("5, wrong poses", 5, off)):
             found, tracks, seconds = scores(of_drives, size, options.threads)
             errors = [f"{100 - 100 * (found.semantic[name].iou or 0.0):.1f}" for name in CLASSES]
-            association = (f"{tracks.s_assoc or 0.0:.2f}", f"{tracks.switches_per_100 or 0.0:.2f}")
+            quality = tracks.total
+            association = (f"{quality.s_assoc or 0.0:.2f}", f"{quality.switches_per_100 or 0.0:.2f}")
             table.add_row(lidar, together, *errors, *association, *(f"{1e3 * each:.1f}" for each in seconds))
     return table
 
@@ -210,9 +211,10 @@ def numbers(_measured: Frame, options: argparse.Namespace) -> Table:
         twice = itertools.product(of_lidar, range(2))
         found = [long_scores(*drive, size, seed, options.threads) for drive, seed in twice]
         tracks, of_standing = zip(*found, strict=True)
-        association = statistics.mean(of_drive.s_assoc or 0.0 for of_drive in tracks)
+        totals = [of_drive.total for of_drive in tracks]
+        association = statistics.mean(total.s_assoc or 0.0 for total in totals)
         quality = statistics.mean(of_drive.lstq or 0.0 for of_drive in tracks)
-        switches = 100 * sum(t.id_switches for t in tracks) / sum(t.object_frames for t in tracks)
+        switches = 100 * sum(t.id_switches for t in totals) / sum(t.object_frames for t in totals)
         each = " ".join(str(count) for count in of_standing)
         table.add_row(f"{size}", f"{association:.3f}", f"{quality:.3f}", f"{switches:.2f}", each)
     return table

@@ -106,13 +106,11 @@ def test_ious_are_those_of_sets():
                 assert found.iou[t, p] == len(ours & theirs) / len(ours | theirs)
 
 
-def test_frames_merge():
+def test_frames_add_up():
     truth, prediction = labeling([1, 1], [1, 2]), labeling([1, 0], [1, 0])
     scores = scored(prediction, truth)
-    scores.merge(scored(prediction, truth))
+    scores.add(prediction, truth)
     assert scores["Car", 0.5] == Counts(tp=2, fn=2)
-    with pytest.raises(ParameterError, match="thresholds or minimum points"):
-        scores.merge(scored(prediction, truth, minimum_points=3))
 
 
 @pytest.mark.parametrize(

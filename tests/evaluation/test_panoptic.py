@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from evaluation.samples import disturbed, labeling, random_labeling
-from ldls.errors import ParameterError
 from ldls.evaluation import Counts, PanopticQuality, PanopticScores
 
 
@@ -62,12 +61,9 @@ def test_it_is_the_definition_on_1000_random_labelings():
     assert found_any > 100
 
 
-def test_frames_merge():
+def test_frames_add_up():
     truth, prediction = labeling([1, 1], [1, 2]), labeling([1, 0], [1, 0])
-    one, two = PanopticScores(truth.names[1:]), PanopticScores(truth.names[1:])
-    one.add(prediction, truth)
-    two.add(prediction, truth)
-    one.merge(two)
-    assert one["Car"] == PanopticQuality(Counts(2, 0, 2), 2.0)
-    with pytest.raises(ParameterError, match="minimum points"):
-        one.merge(PanopticScores(truth.names[1:], minimum_points=50))
+    scores = PanopticScores(truth.names[1:])
+    for _ in range(2):
+        scores.add(prediction, truth)
+    assert scores["Car"] == PanopticQuality(Counts(2, 0, 2), 2.0)

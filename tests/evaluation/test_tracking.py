@@ -80,11 +80,12 @@ def test_it_is_the_definition_on_500_random_drives():
         names, minimum = truth.names[1:], int(generator.integers(0, 5))
         scores = scored(sweeps, names, minimum_points=minimum)
         s_assoc, switches, frames, invented = by_definition(sweeps, minimum)
-        assert scores.s_assoc == (None if s_assoc is None else pytest.approx(s_assoc))
-        assert (scores.id_switches, scores.object_frames, scores.total.counts.fp) == (switches, frames, invented)
+        total = scores.total
+        assert total.s_assoc == (None if s_assoc is None else pytest.approx(s_assoc))
+        assert (total.id_switches, total.object_frames, total.counts.fp) == (switches, frames, invented)
         if frames:
             assert scores.lstq == pytest.approx(math.sqrt(s_assoc * scores.s_cls))
-            assert scores.motsa == (scores.total.counts.tp - invented - switches) / frames
+            assert total.motsa == (total.counts.tp - invented - switches) / frames
         switches_in_all += switches
         some_between += s_assoc is not None and 0.2 < s_assoc < 0.8
     assert switches_in_all > 500
@@ -118,16 +119,16 @@ CASES = [
 
 @pytest.mark.parametrize(("sweeps", "s_assoc", "switches", "motsa"), CASES)
 def test_cases_worked_by_hand(sweeps, s_assoc, switches, motsa):
-    scores = scored(drive(*sweeps))
-    assert scores.s_assoc == pytest.approx(s_assoc)
-    assert (scores.id_switches, scores.object_frames) == (switches, 2 * len(sweeps))
-    assert scores.motsa == pytest.approx(motsa)
-    assert scores.switches_per_100 == pytest.approx(100 * switches / (2 * len(sweeps)))
+    total = scored(drive(*sweeps)).total
+    assert total.s_assoc == pytest.approx(s_assoc)
+    assert (total.id_switches, total.object_frames) == (switches, 2 * len(sweeps))
+    assert total.motsa == pytest.approx(motsa)
+    assert total.switches_per_100 == pytest.approx(100 * switches / (2 * len(sweeps)))
 
 
 def test_a_right_prediction_is_exactly_one():
     scores = scored(drive(RIGHT, RIGHT, RIGHT))
-    assert (scores.lstq, scores.s_cls, scores.s_assoc, scores.motsa) == (1.0, 1.0, 1.0, 1.0)
+    assert (scores.lstq, scores.s_cls, scores.total.s_assoc, scores.total.motsa) == (1.0, 1.0, 1.0, 1.0)
 
 
 def test_a_class_that_changes_keeps_its_number():
@@ -135,10 +136,10 @@ def test_a_class_that_changes_keeps_its_number():
     truth = labeling([1, 1, 2, 2], [1, 1, 1, 1])
     right, wrong = labeling([1, 1, 2, 2], [1, 1, 4, 4]), labeling([1, 1, 1, 1], [1, 1, 4, 4])
     scores = scored([(right, truth), (wrong, truth), (right, truth)])
-    assert scores.s_assoc == 1.0
+    assert scores.total.s_assoc == 1.0
     assert scores["Pedestrian"].counts == Counts(2, 0, 1)
     assert scores["Car"].counts == Counts(3, 1, 0)
-    assert (scores.id_switches, scores.motsa) == (0, (5 - 1) / 6)
+    assert (scores.total.id_switches, scores.total.motsa) == (0, (5 - 1) / 6)
     assert scores.s_cls == pytest.approx((6 / 8 + 4 / 6) / 2)
 
 
@@ -153,7 +154,7 @@ def test_a_number_goes_on_through_classes_that_are_not_scored(classes, counts):
     car = np.tile(truth.instances == 7, 10)
     tube = np.concatenate([prediction.instances == 7 for prediction in sweeps])
     common = np.sum(car & tube)
-    assert tracking.s_assoc == pytest.approx(common / np.sum(car) * common / np.sum(car | tube))
+    assert tracking.total.s_assoc == pytest.approx(common / np.sum(car) * common / np.sum(car | tube))
     # a match is one of its class
     assert (tracking.total.tubes, tracking.total.counts) == (1, Counts(*counts))
 
@@ -161,38 +162,39 @@ def test_a_number_goes_on_through_classes_that_are_not_scored(classes, counts):
 def test_numbers_of_the_background_of_a_prediction_are_none():
     truth = labeling([1, 1, 0, 0], [7, 7, 0, 0])
     prediction = labeling([1, 1, 0, 0], [7, 7, 7, 7])
-    assert evaluate([("0", prediction, truth)], classes=ClassSet.kitti(), track=True).tracking.s_assoc == 1.0
+    assert evaluate([("0", prediction, truth)], classes=ClassSet.kitti(), track=True).tracking.total.s_assoc == 1.0
 
 
 def test_equal_numbers_of_two_classes_are_two_true_objects_and_one_predicted():
     truth = labeling([1, 1, 2, 2], [1, 1, 1, 1])
-    assert scored([(truth, truth)]).s_assoc == 0.5
-    assert scored([(labeling([1, 1, 2, 2], [1, 1, 2, 2]), truth)]).s_assoc == 1.0
+    assert scored([(truth, truth)]).total.s_assoc == 0.5
+    assert scored([(labeling([1, 1, 2, 2], [1, 1, 2, 2]), truth)]).total.s_assoc == 1.0
 
 
 def test_background_and_ignored_points_have_no_tube():
     # the number of a true point of the background means nothing; a predicted tube has its points where truth has it
     truth = labeling([1, 1, 0, 0, 0], [1, 1, 9, 9, 9], ignored=[4])
-    assert scored([(labeling([1, 1, 0, 0, 1], [3, 3, 0, 0, 3]), truth)]).s_assoc == 1.0
-    assert scored([(labeling([1, 1, 1, 1, 1], [3, 3, 3, 3, 3]), truth)]).s_assoc == 0.5
-    assert scored([(labeling([1, 1, 1, 1, 1], [3, 3, 3, 3, 3], ignored=[2, 3]), truth)]).s_assoc == 1.0
+    assert scored([(labeling([1, 1, 0, 0, 1], [3, 3, 0, 0, 3]), truth)]).total.s_assoc == 1.0
+    assert scored([(labeling([1, 1, 1, 1, 1], [3, 3, 3, 3, 3]), truth)]).total.s_assoc == 0.5
+    assert scored([(labeling([1, 1, 1, 1, 1], [3, 3, 3, 3, 3], ignored=[2, 3]), truth)]).total.s_assoc == 1.0
 
 
 def test_small_objects_are_left_out_sweep_by_sweep():
     near, far = labeling([1] * 4, [1] * 4), labeling([1, 1, 0, 0], [1, 1, 0, 0])
     renamed = labeling([1, 1, 0, 0], [2, 2, 0, 0])
     sweeps = [(near, near), (renamed, far), (near, near)]
-    scores = scored(sweeps, minimum_points=3)
-    assert (scores.s_assoc, scores.object_frames, scores.id_switches, scores.motsa) == (1.0, 2, 0, 1.0)
-    assert scored(sweeps, minimum_points=2).id_switches == 2
+    total = scored(sweeps, minimum_points=3).total
+    assert (total.s_assoc, total.object_frames, total.id_switches, total.motsa) == (1.0, 2, 0, 1.0)
+    assert scored(sweeps, minimum_points=2).total.id_switches == 2
     assert scored(sweeps, minimum_points=5).lstq is None
 
 
 def test_without_objects_there_is_no_score():
     scores = TrackingScores(NAMES)
-    assert (scores.lstq, scores.s_assoc, scores.s_cls, scores.motsa, scores.switches_per_100) == (None,) * 5
+    total = scores.total
+    assert (scores.lstq, total.s_assoc, scores.s_cls, total.motsa, total.switches_per_100) == (None,) * 5
     scores.add(labeling([1], [1]), labeling([0]))
-    assert (scores.lstq, scores.s_assoc, scores.s_cls, scores.motsa) == (None, None, 0.0, None)
+    assert (scores.lstq, scores.total.s_assoc, scores.s_cls, scores.total.motsa) == (None, None, 0.0, None)
     assert scores.total.counts == Counts(fp=1)
 
 
@@ -200,10 +202,11 @@ def test_drives_merge_and_their_objects_are_others():
     one, two = scored(drive(RIGHT, RIGHT)), scored(drive((5, 5, 5, 5, 6, 6), (7, 7, 7, 7, 8, 8)))
     one.merge(two)
     # two cars wholly, two by half; the number 1 of one drive is not followed into the other
-    assert (one.s_assoc, one.id_switches, one.object_frames, one.total.tubes) == (0.75, 2, 8, 4)
-    assert one.motsa == (8 - 2) / 8
+    total = one.total
+    assert (total.s_assoc, total.id_switches, total.object_frames, total.tubes) == (0.75, 2, 8, 4)
+    assert total.motsa == (8 - 2) / 8
     one.add(*drive(RIGHT)[0])
-    assert (one.s_assoc, one.id_switches) == (0.75, 2)
+    assert (one.total.s_assoc, one.total.id_switches) == (0.75, 2)
     with pytest.raises(ParameterError, match="minimum points"):
         one.merge(TrackingScores(NAMES, minimum_points=50))
     with pytest.raises(ParameterError, match="other classes"):
@@ -229,6 +232,7 @@ def test_evaluate_tracks_by_the_numbers_of_the_files():
     sweeps = [labeling([1, 1, 1, 1], [5] * 4, names=names), labeling([1, 1, 1, 2], [5] * 4, names=names)]
     pairs = [(f"{n}", prediction, truth) for n, prediction in enumerate(sweeps)]
     tracking = evaluate(pairs, classes=ClassSet.kitti(), track=True).tracking
-    assert (tracking.id_switches, tracking.s_assoc, tracking.object_frames) == (0, 1.0, 2)
+    total = tracking.total
+    assert (total.id_switches, total.s_assoc, total.object_frames) == (0, 1.0, 2)
     assert evaluate(pairs, classes=ClassSet.kitti()).tracking is None
-    assert evaluate(pairs, classes=ClassSet.kitti(), minimum_points=5, track=True).tracking.object_frames == 0
+    assert evaluate(pairs, classes=ClassSet.kitti(), minimum_points=5, track=True).tracking.total.object_frames == 0

@@ -84,14 +84,6 @@ class InstanceScores:
             for threshold in self.thresholds:
                 self._counts[name, threshold] += _count(overlap, matched, threshold, self.minimum_points)
 
-    @checked
-    def merge(self, other: InstanceScores) -> None:
-        """Add the instances that `other` counted."""
-        if self._counts.keys() != other._counts.keys() or self.minimum_points != other.minimum_points:
-            raise ParameterError("other: has other classes, thresholds or minimum points")
-        for key, counts in other._counts.items():
-            self._counts[key] += counts
-
     def __getitem__(self, key: tuple[str, float]) -> Counts:
         """Instances of (class name, threshold) found, invented and missed."""
         return self._counts[key]

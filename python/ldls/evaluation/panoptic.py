@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ldls.checks import checked, whole_number
-from ldls.errors import ParameterError
 from ldls.evaluation.counts import Counts, mean
 from ldls.evaluation.instance import overlaps
 from ldls.evaluation.semantic import check_vocabulary
@@ -73,15 +72,8 @@ class PanopticScores:
         """Count the segments of a frame; both labelings mapped to these classes."""
         check_vocabulary(self.names, prediction, truth)
         for k, name in enumerate(self.names, start=1):
-            self._add(name, _quality(prediction, truth, k, self.minimum_points))
-
-    @checked
-    def merge(self, other: PanopticScores) -> None:
-        """Add the segments that `other` counted."""
-        if (self.names, self.minimum_points) != (other.names, other.minimum_points):
-            raise ParameterError("other: has other classes or minimum points")
-        for name, quality in other._qualities.items():
-            self._add(name, quality)
+            before, now = self._qualities[name], _quality(prediction, truth, k, self.minimum_points)
+            self._qualities[name] = PanopticQuality(before.counts + now.counts, before.iou_sum + now.iou_sum)
 
     def __getitem__(self, name: str) -> PanopticQuality:
         """Quality of the class `name`."""
@@ -91,10 +83,6 @@ class PanopticScores:
     def mean_pq(self) -> float | None:
         """Mean PQ of the classes that have segments; None without any."""
         return mean([self[name].pq for name in self.names])
-
-    def _add(self, name: str, quality: PanopticQuality) -> None:
-        before = self._qualities[name]
-        self._qualities[name] = PanopticQuality(before.counts + quality.counts, before.iou_sum + quality.iou_sum)
 
 
 def _quality(prediction: Labeling, truth: Labeling, k: int, minimum_points: int) -> PanopticQuality:

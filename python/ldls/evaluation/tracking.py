@@ -148,40 +148,15 @@ class TrackingScores:
         return sum((self[name] for name in self.names), TrackingQuality())
 
     @property
-    def s_assoc(self) -> float | None:
-        """Association score: mean over all true objects, 0 to 1; None without any."""
-        return self.total.s_assoc
-
-    @property
     def s_cls(self) -> float | None:
         """Classification score: mean IoU of the classes that truth or prediction has; None without any."""
         return self.semantic.mean_iou
 
     @property
     def lstq(self) -> float | None:
-        """LiDAR segmentation and tracking quality, sqrt(`s_cls` x `s_assoc`); None without a true object."""
-        s_assoc, s_cls = self.s_assoc, self.s_cls
+        """LiDAR segmentation and tracking quality, sqrt(`s_cls` x `total.s_assoc`); None without a true object."""
+        s_assoc, s_cls = self.total.s_assoc, self.s_cls
         return None if s_assoc is None or s_cls is None else math.sqrt(s_cls * s_assoc)
-
-    @property
-    def id_switches(self) -> int:
-        """Matches under another number than that of the object's match before."""
-        return self.total.id_switches
-
-    @property
-    def object_frames(self) -> int:
-        """True objects, matched or not, one by one in each sweep."""
-        return self.total.object_frames
-
-    @property
-    def switches_per_100(self) -> float | None:
-        """Switches in a hundred object frames; None without a true object."""
-        return self.total.switches_per_100
-
-    @property
-    def motsa(self) -> float | None:
-        """Multi-object tracking and segmentation accuracy over all classes; None without a true object."""
-        return self.total.motsa
 
     def _add_tubes(self, prediction: Labeling, truth: Labeling) -> None:
         rows = np.flatnonzero(~(truth.ignored | prediction.ignored))
