@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import ldls
-from ldls.io.files import UNFINISHED, open_file, sweep, sync_folder, whole_file
+from ldls.io.files import UNFINISHED, open_file, remove_unfinished, sync_folder, whole_file
 
 
 class PanicException(BaseException):
@@ -169,7 +169,8 @@ def no_folder_opens(monkeypatch):
 def test_folders_are_synced_and_swept_where_none_can_be_opened(tmp_path, no_folder_opens):
     (tmp_path / f".0123{UNFINISHED}").write_bytes(b"")
     sync_folder(tmp_path)
-    assert sweep(tmp_path) == 1
+    remove_unfinished(tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_folders_are_refused_where_none_can_be_opened(tmp_path, no_folder_opens):

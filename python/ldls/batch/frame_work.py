@@ -42,14 +42,14 @@ class Earlier(Enum):
 class FrameWork:
     """Does the stages of windows, which are single frames where no sweeps are joined; several threads at a time may."""
 
-    def __init__(self, source: Source, settings: RunSettings, out: Path, earlier: KeptRecords | None = None) -> None:
+    def __init__(self, source: Source, settings: RunSettings, out: Path, records: KeptRecords | None = None) -> None:
         """Prepare for the frames of `source`: the segmenter is opened here, limited to one thread.
 
         Args:
             source: The frames.
             settings: How they are treated.
             out: Folder of the results.
-            earlier: What the journal says of frames of which an earlier run did a part.
+            records: What the journal says of frames of which an earlier run did a part.
 
         Raises:
             LdlsError: The segmenter, the place of the masks, or the file of poses cannot be used.
@@ -59,7 +59,7 @@ class FrameWork:
         self._source = source
         self._settings = settings
         self.out = out
-        self.records = earlier
+        self.records = records
         self._params = replace(settings.params, threads=1)
         self._diffusion = LabelDiffusion(params=self._params)
         self._own_masks = own_masks(source)
@@ -142,7 +142,7 @@ class FrameWork:
         self.write(window)
         return window.outcome()
 
-    def earlier(self, record: Mapping[str, Any] | None, together: Sequence[str]) -> Earlier:
+    def judge_earlier(self, record: Mapping[str, Any] | None, together: Sequence[str]) -> Earlier:
         """What an earlier run left of a frame, by its `record` and the files that are there.
 
         Args:

@@ -48,7 +48,7 @@ from ldls.errors import (
     ParameterError,
     some,
 )
-from ldls.io.files import check_outputs, sweep
+from ldls.io.files import check_outputs, remove_unfinished
 from ldls.io.objects import objects_writer
 from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.viewing.formats import BAG, ENDINGS, RESULT, TRACKS, file_name
@@ -148,7 +148,7 @@ def run(
     windows = _windows(opened, chosen, poses.stamps, settings.sweeps)
     folder.mkdir(parents=True, exist_ok=True)
     with only_run(folder):
-        sweep(folder)
+        remove_unfinished(folder)
         if bag is not None:
             bag.check_place()
         work = FrameWork(opened, settings, folder)
@@ -193,7 +193,7 @@ def run(
         failures = failures_of(journal.records(names))
         write_failures(folder, failures_of(journal.records(opened.names)))
         # workers of a killed run may have outlived it for a moment
-        sweep(folder)
+        remove_unfinished(folder)
         stored = partial(_stored, journal, opened.names, folder)
         unplaced = _write_of_all(tracks, bag, stored, partial(_outdate_bag, opened, settings, folder, of_tracks=True))
         if write_objects is not None:
@@ -291,7 +291,7 @@ def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> li
     frames = [(name, [name for _, name in window]) for window in windows for _, name in window]
     records = journal.kept(name for name, _ in frames)
     with ThreadPoolExecutor(_ldls.default_threads()) as threads:
-        left = list(threads.map(lambda frame: work.earlier(records.get(frame[0]), frame[1]), frames))
+        left = list(threads.map(lambda frame: work.judge_earlier(records.get(frame[0]), frame[1]), frames))
     changed = [name for (name, _), earlier in zip(frames, left, strict=True) if earlier is Earlier.CHANGED]
     if changed:
         message = (

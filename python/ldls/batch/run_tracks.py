@@ -30,7 +30,7 @@ from ldls.batch.journal import Record, line_of
 from ldls.batch.known_files import is_written, written
 from ldls.errors import LimitError, UnsafePathError
 from ldls.io import read_result, save
-from ldls.io.files import LARGE_BYTES, open_file, refuse_link, sweep, whole_file
+from ldls.io.files import LARGE_BYTES, open_file, refuse_link, remove_unfinished, whole_file
 from ldls.io.labels.semantic_kitti import MOST_INSTANCES as MOST_TRACKS
 from ldls.io.objects import DECIMALS, FrameObjects
 from ldls.io.options import of_ending
@@ -41,7 +41,7 @@ from ldls.viewing.formats import RESULT, TRACKS, file_name
 
 TRACKS_TABLE, TRACKS_STATE = "tracks.csv", "tracks.json"
 TRACKED_OBJECTS = f"{TRACKS}/objects.jsonl"
-FORMATS = ("npz", "label", "panoptic", "ply", "pcd", "las", "laz", "parquet", "csv")
+TRACKED_FORMATS = ("npz", "label", "panoptic", "ply", "pcd", "las", "laz", "parquet", "csv")
 """Formats of results that name instances."""
 COLUMNS = (
     "frame", "track", "label", "category", "name", "score", "n_points", "world_x_m", "world_y_m", "world_z_m",
@@ -99,7 +99,9 @@ class RunTracks:
         frames = [record["frame"] for record in records() if _is_placed(record)]
         # those of earlier runs stay
         formats = [
-            word for word in FORMATS if word in self._formats or any(_place(frame, word) in files for frame in frames)
+            word
+            for word in TRACKED_FORMATS
+            if word in self._formats or any(_place(frame, word) in files for frame in frames)
         ]
         expected = {TRACKS_TABLE, TRACKED_OBJECTS, *(_place(frame, word) for frame in frames for word in formats)}
         current = noted["made_of"] == made_of and expected == files.keys()
@@ -110,7 +112,7 @@ class RunTracks:
             before()
         places = LabelledMap()
         self.folder.mkdir(exist_ok=True)
-        sweep(self.folder)
+        remove_unfinished(self.folder)
         now: dict[str, list[int | str]] = {}
         with (
             whole_file(self._folder / TRACKS_TABLE) as file,
@@ -208,7 +210,7 @@ def _place(frame: str, word: str) -> str:
 
 def _is_ours(name: str) -> bool:
     """True for the name of a file that tracks have; nothing else is removed."""
-    endings = tuple(file_name("", word) for word in FORMATS)
+    endings = tuple(file_name("", word) for word in TRACKED_FORMATS)
     return name in (TRACKS_TABLE, TRACKED_OBJECTS) or (
         name.startswith(f"{TRACKS}/") and name.endswith(endings) and len(Path(name).parts) == 2
     )

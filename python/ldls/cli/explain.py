@@ -25,7 +25,7 @@ from ldls.cli.options import refuse
 from ldls.errors import InputError
 
 
-def refuse_options(word: str) -> str:
+def as_argument(word: str) -> str:
     """`word`, unless it is an option: the command takes what it does not know for arguments, as -3.2,1,0.5 is one.
 
     Raises:
@@ -44,7 +44,7 @@ def explain(
             metavar="POINT",
             help="Row number in the cloud, from 0; or U,V, a pixel of the image, or of the picture --on; or "
             "X,Y,Z in metres in the lidar frame. Of a pixel or a place, the nearest point is taken.",
-            callback=refuse_options,
+            callback=as_argument,
         ),
     ],
     result: Annotated[

@@ -329,12 +329,11 @@ def sync_folder(folder: str | PathLike[str]) -> None:
         os.close(handle)
 
 
-def sweep(folder: str | PathLike[str]) -> int:
-    """Remove what killed processes left unfinished in `folder`; how many files that were."""
-    left = list(Path(folder).glob(f".*{UNFINISHED}"))
-    for path in left:
+def remove_unfinished(folder: str | PathLike[str]) -> None:
+    """Remove the files that killed processes left unfinished in `folder`."""
+    # the folder is read to its end before it is changed
+    for path in list(Path(folder).glob(f".*{UNFINISHED}")):
         path.unlink(missing_ok=True)
-    return len(left)
 
 
 def folder_hint(folder: str | PathLike[str], *beginnings: str, option: str = "") -> str:

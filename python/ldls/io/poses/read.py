@@ -20,7 +20,7 @@ from ldls.sequences import Trajectory
 
 READERS: dict[str, Callable[..., Trajectory]] = {"kitti": kitti.read, "tum": tum.read, "kitti-raw": kitti_raw.read}
 """Readers of poses by format."""
-FORMATS = {len(kitti.COLUMNS.split()): "kitti", len(tum.COLUMNS.split()): "tum"}
+BY_COLUMNS = {len(kitti.COLUMNS.split()): "kitti", len(tum.COLUMNS.split()): "tum"}
 """Formats by the numbers that a line has."""
 
 
@@ -76,10 +76,10 @@ def format_of(path: Path) -> str:
             raise TruncatedFileError("no pose, expected 12 numbers a line (KITTI) or 8 (TUM)")
         number, line = rows[0]
         n_columns = len(line.split())
-        if n_columns not in FORMATS:
+        if n_columns not in BY_COLUMNS:
             mend = "leave out the last four of each line, 0 0 0 1, if they are matrices of KITTI's poses"
             raise UnsupportedFormatError(
                 f"line {number}: {n_columns} numbers, expected 12 of a KITTI pose, or 8 of TUM's ({tum.COLUMNS}), "
                 f"separated by blanks; {mend if n_columns == 16 else 'format= says what it is'}"
             )
-    return FORMATS[n_columns]
+    return BY_COLUMNS[n_columns]
