@@ -130,15 +130,7 @@ def run(
     settings.check_images(len(chosen), len(opened.camera_names))
     write_objects = None if objects is None else objects_writer(objects)
     folder = Path(out)
-    begun = formats_begun(folder)
-    # a journal that was cut off, or is none, is judged when it is opened
-    if begun is not None:
-        tables = [FAILURES_NAME] if not begun else []
-        tables += [TRACKS, TRACKS_TABLE] if settings.track and TRACKS not in begun else []
-        check_places(folder, opened.names, settings.frame_formats, begun, tables)
-    of_all = {name: Path(path) for name, path in (("objects", objects), ("map_file", map_file)) if path is not None}
-    check_outputs({name: [path] for name, path in of_all.items()}, _inputs(opened, settings), made=folder)
-    check_apart(of_all, folder, opened.names)
+    _check_files(opened, settings, folder, {"objects": objects, "map_file": map_file})
     tracks = _tracks(settings, folder, names, map_file)
     with_tracks = None if tracks is None else tracks.folder
     bag = RunBag(opened, folder, with_tracks) if BAG in settings.formats else None
@@ -218,6 +210,34 @@ def run(
         seconds=dict(seconds),
         elapsed=elapsed,
     )
+
+
+def _check_files(
+    source: Source, settings: RunSettings, folder: Path, of_all: Mapping[str, str | PathLike[str] | None]
+) -> None:
+    """Refuse to write over files that no run wrote in `folder`, over inputs, or two files in one place.
+
+    Args:
+        source: The frames.
+        settings: How they are treated.
+        folder: Folder of the results.
+        of_all: The files of all frames, by the arguments that name them; None for one that is not asked for.
+
+    Raises:
+        BatchError: Something that no run wrote is in the place of a result.
+        InputError: A file of all frames is an input.
+        ParameterError: It has the name of a file of the run.
+        FileNotFoundError: Its folder is not there.
+    """
+    begun = formats_begun(folder)
+    # a journal that was cut off, or is none, is judged when it is opened
+    if begun is not None:
+        tables = [FAILURES_NAME] if not begun else []
+        tables += [TRACKS, TRACKS_TABLE] if settings.track and TRACKS not in begun else []
+        check_places(folder, source.names, settings.frame_formats, begun, tables)
+    asked = {name: Path(path) for name, path in of_all.items() if path is not None}
+    check_outputs({name: [path] for name, path in asked.items()}, _inputs(source, settings), made=folder)
+    check_apart(asked, folder, source.names)
 
 
 def _windows(source: Source, chosen: Frames, stamps: Sequence[float | None], sweeps: int) -> list[Frames]:
