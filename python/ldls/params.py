@@ -19,14 +19,14 @@ class Params:
         pixel_weight: lambda, the weight of an edge from a pixel to a point.
         window: Side in pixels of the square window that joins pixels to a point; odd, 1 to 101.
         iterations: Number of products z <- A z + b, 1 to 100000; `None` for the converged solution.
-        remove_outliers: Whether an instance keeps only its largest connected component, and the parts near it.
+        remove_outliers: True if an instance keeps only its largest connected component, and the parts near it.
         ground_edges: Factor on the weight of an edge between a point of the ground and one that is not, 0 to 1: labels
             leak along the ground, whose points lie close together along a scan line. 1 for none of it. Needs the
             ground, which takes about 1 ms for 20,000 points in view.
         ground_clearance: Points of the ground lower than this above it, in metres, are background and have no part in
             the graph: what touches the ground cannot be told from it, and labels would run along it; 0 to 1, 0 for none
             of it. Saves the time of those points, a third to two thirds of all in view.
-        local_ground: Whether the ground follows kerbs and lawns where enough of it is seen, and not a smooth surface
+        local_ground: True if the ground follows kerbs and lawns where enough of it is seen, and not a smooth surface
             only. Costs about as much again as the surface.
         depth_gap: Gap in metres between the object of a mask and what is seen before and behind it: of the mask's
             points off the ground, in groups by their distance to the camera, the group with the most weight is the
@@ -40,7 +40,7 @@ class Params:
             decide. 0 for none of it. Part of the depth groups.
         part_gap: Gap in metres across which outlier removal keeps other components of an object beside its largest: a
             pole splits a car, and the lines of 16 beams fall apart. 0 for the largest alone.
-        calibrated: Whether confidence is the probability that a label is of the right class, from the winner's share of
+        calibrated: True if confidence is the probability that a label is of the right class, from the winner's share of
             the likelihoods and the score of its mask, as fitted on simulated frames of four lidars; else the share.
         abstain: Labels of less confidence become background, 0 to 1: `Segmentation.abstained` says which. 0 for none.
         threads: Threads to use; `None` for the environment variable `LDLS_NUM_THREADS` or else all cores that the

@@ -66,7 +66,7 @@ class DepthGroups:
         intervals: (M, 2) float64 nearest and farthest distance of the object in metres; NaN where no point off the
             ground falls on the mask: there is no object.
         distances: (n,) float64 distance of each point to the camera in metres.
-        unsure: (n,) bool: whether a point stands beside the edge of a mask, as far away as its object, so that
+        unsure: (n,) bool: True where a point stands beside the edge of a mask, as far away as its object, so that
             background pixels say nothing of it.
     """
 
@@ -120,7 +120,7 @@ def project(
         points: (N, >= 3) in metres in the lidar frame.
         camera: The camera.
         image_size: (height, width) of its image in pixels.
-        keep_origin: Whether points at exactly (0, 0, 0) are more than missing returns.
+        keep_origin: True if points at exactly (0, 0, 0) are more than missing returns.
         threads: As in `Params`.
     """
     Params(threads=threads)

@@ -147,7 +147,7 @@ class Camera:
             D: `distCoeffs` of 4, 5, 8, 12 or 14 numbers, or the 4 of `cv2.fisheye`; none for a rectified image.
             R: (3, 3) rotation from lidar to camera coordinates; `cv2.Rodrigues` makes it of a rotation vector.
             t: (3,) translation from lidar to camera coordinates, in metres.
-            fisheye: Whether the coefficients are those of `cv2.fisheye`.
+            fisheye: True if the coefficients are those of `cv2.fisheye`.
             image_size: (height, width) of the image in pixels, if known.
 
         Raises:
@@ -170,7 +170,7 @@ class Camera:
             message: The message, or a dict with the same names; `ldls.read_camera` reads files.
             T_camera_lidar: (4, 4) rigid transform from lidar coordinates to those of the camera as it is mounted, its
                 frame_id.
-            rectified: Whether masks are of the rectified image, which takes P and R, instead of the raw one, which
+            rectified: True if masks are of the rectified image, which takes P and R, instead of the raw one, which
                 takes K and D.
 
         Raises:

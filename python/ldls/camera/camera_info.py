@@ -31,7 +31,7 @@ def arguments(fields: Fields, T_camera_lidar: NDArray[np.float64], *, rectified:
     Args:
         fields: The message.
         T_camera_lidar: (4, 4) from lidar to the coordinates of the camera as it is mounted.
-        rectified: Whether masks are of the rectified image (P and R) instead of the raw one (K and D).
+        rectified: True if masks are of the rectified image (P and R) instead of the raw one (K and D).
 
     Raises:
         CalibrationError: The camera is not calibrated, or a field is missing or cannot be a camera's.

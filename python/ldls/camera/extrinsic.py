@@ -39,7 +39,7 @@ def extrinsic(
         quaternion_xyzw: Unit quaternion, w last (ROS, SciPy, TUM).
         roll_pitch_yaw_deg: Degrees about the fixed axes x, then y, then z (URDF).
         rotation: (3, 3) rotation matrix.
-        optical: Whether the camera's frame has x to the right, y down and z forward, as OpenCV's and ROS's optical
+        optical: True if the camera's frame has x to the right, y down and z forward, as OpenCV's and ROS's optical
             frames; if not, x forward, y left and z up, as bodies in ROS, to which the turn is added.
 
     Raises:

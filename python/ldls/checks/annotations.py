@@ -85,9 +85,9 @@ class _Kind:
     """What an annotation allows.
 
     Attributes:
-        accepts: Whether it allows a value.
+        accepts: Says if it allows a value.
         name: What messages call it.
-        is_noun: Whether it is an instance of a class, or a container of such.
+        is_noun: True if it is an instance of a class, or a container of such.
     """
 
     def __init__(self, accepts: Callable[[Any], bool], name: str, *, is_noun: bool = False) -> None:

@@ -88,7 +88,7 @@ def iou_against(
         curves: For each name in the legend, IoU from 0 to 1 by value; None is left out.
         path: PNG file to write.
         label: What the values are, with their unit.
-        logarithmic: Whether values double rather than add up.
+        logarithmic: True if values double rather than add up.
 
     Raises:
         ParameterError: There is nothing to draw.

@@ -21,7 +21,7 @@ class Neighbor:
         point: Its row in the cloud.
         distance_m: How far it is, in metres.
         weight: exp(-d^2 / sigma), times `ground_edges` of the parameters where the edge leaves the ground.
-        leaves_ground: Whether one of both belongs to the ground and the other does not, and edges between them are
+        leaves_ground: True if one of both belongs to the ground and the other does not, and edges between them are
             weakened.
         share: That weight over the sum of all edges of the point, its pixel edges included.
         label: Its label in the result.
@@ -89,7 +89,7 @@ class Components:
         sizes: Points of each, the largest first; of equal ones the one with the lowest row of the cloud first.
         gaps_m: How near each comes to the largest, in metres.
         own: Which of them the point lies in, from 0.
-        removal: Whether outliers were removed, so that number 0 was kept, and parts near it.
+        removal: True if outliers were removed, so that number 0 was kept, and parts near it.
         part_gap: Gap in metres within which a part was kept; 0 for the largest alone.
     """
 

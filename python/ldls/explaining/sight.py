@@ -26,7 +26,7 @@ class WindowCount:
         label: Label of the mask in the result; 0 for the pixels that no mask covers.
         mask: Number of the mask in its view, from 0; None for the background.
         pixels: How many; a pixel under two masks counts for both.
-        counts: Whether they label the point: those of a mask if it is as far away as its object, those of the
+        counts: True if they label the point: those of a mask if it is as far away as its object, those of the
             background unless it stands beside a mask.
         behind_m: How far behind the object of the mask the point is, in metres, negative before it, 0 as far away, NaN
             without an object; None for the background, and where the parameters ask for no depth groups.

@@ -140,7 +140,7 @@ def write_npz(path: str | PathLike[str], arrays: dict[str, NDArray[Any]]) -> Non
 
 
 def _shrinks(array: NDArray[Any]) -> bool:
-    """Whether an array gets half as large and less, going by its beginning.
+    """True if an array gets half as large and less, going by its beginning.
 
     Coordinates do not, and would take most of the time of a frame.
     """

@@ -17,5 +17,5 @@ def name_order(name: str) -> tuple[str, str]:
 
 
 def is_hidden(name: str) -> bool:
-    """Whether a file is one that people do not see, as file managers leave them: .DS_Store, ._0.png, Thumbs.db."""
+    """True if a file is one that people do not see, as file managers leave them: .DS_Store, ._0.png, Thumbs.db."""
     return name.startswith(".") or name in ("Thumbs.db", "desktop.ini")

@@ -22,7 +22,7 @@ class Report:
         sweeps: Sweeps over the graph that were computed; a series saves most of the products.
         residual: Largest change of any likelihood that one more product would make; None where the number of
             iterations was given.
-        converged: Whether that change is at most 1e-5 and a hundredth of the largest weight of pixel edges to a label;
+        converged: True if that change is at most 1e-5 and a hundredth of the largest weight of pixel edges to a label;
             False where the number of iterations was given.
         empty_masks: Labels of instances whose mask has no pixel.
         n_sweeps: Sweeps that were labelled together; all but `n_points`, `n_in_view` and `empty_masks` is of all of

@@ -156,7 +156,7 @@ class Segmentation:
 
     @property
     def abstained(self) -> NDArray[np.bool_]:
-        """(N,) bool: whether a label that diffusion gave is left out, for it is too doubtful (`Params.abstain`).
+        """(N,) bool: True where a label that diffusion gave is left out, for it is too doubtful (`Params.abstain`).
 
         Those that outlier removal left out are among them where they are as doubtful.
         """

@@ -24,7 +24,7 @@ class BoxSegmenter:
     Attributes:
         boxes: (n, 4) float64 left, top, right, bottom in pixels, whose centres lie at whole coordinates.
         min_score: Lowest score that is kept.
-        grabcut: Whether GrabCut draws the outlines.
+        grabcut: True if GrabCut draws the outlines.
         names: Name of each category id that masks can have.
     """
 

@@ -41,7 +41,7 @@ class OnnxFile:
         path: Where it lies.
         model: `onnx.ModelProto`, without the weights in other files.
         content: Its bytes.
-        has_external_data: Whether weights lie in other files.
+        has_external_data: True if weights lie in other files.
     """
 
     path: Path

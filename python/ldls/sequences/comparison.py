@@ -36,8 +36,8 @@ class Comparison(NamedTuple):
     Attributes:
         apart: (o, t) distance of each from each, as a share of the largest that they may have; infinite beyond it, and
             where categories differ.
-        same: (o, t) whether they are too near to be two objects.
-        part: (o, t) whether at first the object is of a few points, which lie on the track.
+        same: (o, t) True where they are too near to be two objects.
+        part: (o, t) True where at first the object is of a few points, which lie on the track.
     """
 
     apart: Floats

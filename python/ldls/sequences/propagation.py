@@ -106,7 +106,7 @@ def _nearest_to(moment: Moment, there: Moment, tracks: Sequence[Track]) -> tuple
 
 
 def _in_any(rows: Sequence[Ints], n: int) -> NDArray[np.bool_]:
-    """(n,) whether each index is in any of the rows."""
+    """(n,) True for each index that is in any of the rows."""
     found = np.zeros(n, bool)
     for each in rows:
         found[each] = True
@@ -163,7 +163,7 @@ def _beside(
         moment: The moment.
         known: Boxes of objects at earlier moments.
         categories: (k,) that of each.
-        stand: (k,) whether each stands.
+        stand: (k,) True for those that stand.
     """
     own = moment.boxes
     of_known = dict(zip(known.numbers.tolist(), categories.tolist(), strict=True))

@@ -66,7 +66,7 @@ class Sighting(NamedTuple):
     Attributes:
         stamp: When, in seconds.
         footprint: Where.
-        shown: Whether an image has a mask of it.
+        shown: True if an image has a mask of it.
     """
 
     stamp: float
@@ -112,7 +112,7 @@ class Track:
 
     @property
     def moves(self) -> bool:
-        """Whether it does not stand."""
+        """True if it does not stand."""
         return bool(self.velocity.any())
 
     def advance(self, instance: Instance, sighting: Sighting) -> None:

@@ -192,7 +192,7 @@ class Tracker:
             pairs: The track of each label, both by their place in the order.
             shown: Stamps of the sweeps whose images have a mask of each label, in seconds.
             apart: (labels, tracks) how far apart they are, as `compared` says.
-            same: (labels, tracks) whether they are too near to be two objects.
+            same: (labels, tracks) True where they are too near to be two objects.
         """
         twins = {}
         for i in range(len(shown)):
@@ -217,7 +217,8 @@ class Tracker:
 
         Args:
             pairs: The track of each label, both by their place in the order.
-            same: (labels, tracks) whether they are too near to be two objects, and the track has no label now or later.
+            same: (labels, tracks) True where they are too near to be two objects, and the track has no label now or
+                later.
         """
         free = set(range(len(self._tracks))) - set(pairs.values())
         joined, ended = {}, set()
@@ -238,7 +239,7 @@ class Tracker:
         return joined
 
     def _are_two(self, one: int, other: int) -> bool:
-        """Whether images show two tracks apart."""
+        """True if images show two tracks apart."""
         return self._tracks[one].shown_with(self._tracks[other]) >= TWO_OBJECTS
 
     def _begin(self, instance: Instance) -> Track:

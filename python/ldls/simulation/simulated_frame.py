@@ -126,7 +126,7 @@ def take_frame(
         drift: (4, 4) error of the calibration, after the true transform.
         pose: (4, 4) T_world_lidar at the time of the sweep, in a drive.
         segmenter: Errors of the masks; `SegmenterErrors()` by default.
-        moved: Whether calibrations hold from the lidar at the time of the sweep to the camera at that of the images, as
+        moved: True if calibrations hold from the lidar at the time of the sweep to the camera at that of the images, as
             they do where the rig stands still between them.
         motion: Where rig and objects are at each firing of the lidar; by default all stands still during the sweep.
 

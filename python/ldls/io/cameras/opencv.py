@@ -33,7 +33,7 @@ def camera_of(
         fields: The file's entries.
         T_camera_lidar: (4, 4) from lidar to camera coordinates, which such files do not have.
         camera: Which of a stereo pair, 1 or 2; 1 by default.
-        fisheye: Whether the coefficients are those of `cv2.fisheye`, where the file does not name their model.
+        fisheye: True if the coefficients are those of `cv2.fisheye`, where the file does not name their model.
         image_size: (height, width) in pixels, where the file does not say.
 
     Raises:

@@ -58,8 +58,8 @@ def read_camera(
             of it: 12 or 16 numbers by rows, or YAML, JSON or TOML with the arguments of `ldls.extrinsic`; or such a
             table.
         T_imu_lidar: (4, 4) rigid transform from lidar to IMU coordinates, to go by the T_cam_imu of a "kalibr" file.
-        fisheye: Whether the coefficients of an "opencv" file are those of `cv2.fisheye`, where it names no model.
-        rectified: Whether masks are of the rectified image of a "camera-info", which takes P and R, instead of the raw
+        fisheye: True if the coefficients of an "opencv" file are those of `cv2.fisheye`, where it names no model.
+        rectified: True if masks are of the rectified image of a "camera-info", which takes P and R, instead of the raw
             one, which takes K and D.
         image_size: (height, width) of the image in pixels, where a "kitti" or "opencv" file does not say.
 

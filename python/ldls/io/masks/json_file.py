@@ -54,7 +54,7 @@ def write(
         masks: Masks.
         image_id: Id of the image.
         file_name: Name of the image's file; without one there is none in the data set.
-        results: Whether to write the bare list of results, which has no names and, without masks, no image size.
+        results: True to write the bare list of results, which has no names and, without masks, no image size.
     """
     content: object = (
         coco.results(masks, masks.image_size, as_python(image_id))

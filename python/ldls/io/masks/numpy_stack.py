@@ -64,7 +64,7 @@ def write(path: str | PathLike[str], masks: InstanceMasks, *, pixels_only: bool 
     Args:
         path: `.npy` file.
         masks: Masks.
-        pixels_only: Whether categories, scores and names may be lost.
+        pixels_only: True if categories, scores and names may be lost.
 
     Raises:
         MaskError: They would be lost, for they are not those of masks that come from a `.npy` file.

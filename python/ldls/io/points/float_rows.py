@@ -33,7 +33,7 @@ def read(path: Path, *, columns: int | None = None, recover: bool = False) -> ND
     Args:
         path: The file.
         columns: Floats a row; 4, and 5 for `.pcd.bin`, by default.
-        recover: Whether a truncated file yields its whole rows and a warning instead of an error.
+        recover: True if a truncated file yields its whole rows and a warning instead of an error.
 
     Raises:
         TruncatedFileError: The file is empty, or its size is no whole number of rows.

@@ -45,7 +45,7 @@ def read_points(path: str | PathLike[str], *, columns: int | None = None, recove
             ring), `.npy`, `.pcd`, `.ply`, `.las` and `.laz`, or text: `.csv`, `.txt` and `.xyz`. docs/formats.md has
             what each may hold.
         columns: Floats a row of a `.bin` file; 4, and 5 for `.pcd.bin`, by default.
-        recover: Whether a truncated `.bin` yields its whole rows and a warning instead of an error.
+        recover: True if a truncated `.bin` yields its whole rows and a warning instead of an error.
 
     Raises:
         TruncatedFileError: The file ends before its header, or the size of its rows, says.
