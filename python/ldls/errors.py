@@ -115,9 +115,18 @@ class LimitError(LdlsError):
 
 
 class BatchError(LdlsError):
-    """A run over many frames that cannot begin, go on or end well."""
+    """A run over many frames that cannot begin, go on or end well.
+
+    Attributes:
+        failures: What went wrong with which frame, where it was frames.
+    """
 
     code = "batch"
+
+    def __init__(self, message: str, failures: Sequence[object] = ()) -> None:
+        """An error with its `message`, and the failures of frames."""
+        super().__init__(message)
+        self.failures = tuple(failures)
 
 
 class InternalError(LdlsError):

@@ -85,7 +85,7 @@ class _Kind:
     """What an annotation allows.
 
     Attributes:
-        accepts: Says if it allows a value.
+        accepts: True for a value that it allows.
         name: What messages call it.
         is_noun: True if it is an instance of a class, or a container of such.
     """
