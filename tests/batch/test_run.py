@@ -82,13 +82,14 @@ def test_pictures_are_a_format(few, tmp_path):
     [
         pytest.param("lable", "did you mean 'label'?", id="a slip"),
         pytest.param(".ply", "did you mean 'ply'?", id="with a dot"),
-        pytest.param("42", "expected some of npz, label, ply", id="nothing like it"),
+        pytest.param("42", "", id="nothing like it"),
     ],
 )
 def test_unknown_formats_are_refused_before_anything_is_done(few, tmp_path, ending, hint):
     outcome = command("run", few, "--masks", few / "masks", "--out", tmp_path / "out", "--formats", ending)
     assert outcome.exit_code == 1
-    assert f"formats: '{ending}' is unknown; {hint}" in outcome.output
+    assert f"formats: '{ending}' is unknown; expected some of npz, label, ply" in outcome.output
+    assert outcome.output.rstrip().endswith(hint)
     assert not (tmp_path / "out").exists()
 
 
