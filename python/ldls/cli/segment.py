@@ -125,6 +125,8 @@ def segment(
     check_outputs(outputs, [points, calib, extrinsic, masks, segmenter_file(segmenter), image], made=out)
     pixels = None if image is None else read_image(image)
     seen_by, called = camera_of(calib, camera=camera, extrinsic=extrinsic, fisheye=fisheye, rectified=rectified)
+    # before a segmenter, which takes long
+    cloud = read_points(points, columns=columns)
     chosen = masks_of(
         pixels,
         masks=masks,
@@ -137,11 +139,10 @@ def segment(
     drawn = out / file_name(name, PICTURE)
     if PICTURE in wanted and _is_photo(drawn, chosen.image_size):
         raise ParameterError(f"--out: would write over {drawn}, which seems to be the camera's image; give another")
+    result = label_points(cloud, [View(chosen, seen_by, called)], params=replace(params, threads=cores))
     out.mkdir(parents=True, exist_ok=True)
     if save_masks is not None:
         save(chosen, save_masks)
-    view = View(chosen, seen_by, called)
-    result = label_points(read_points(points, columns=columns), [view], params=replace(params, threads=cores))
     written = write_formats(result, out, name, wanted, [pixels])
     if write_objects is not None and objects is not None:
         write_objects([FrameObjects.of(name, result)])
