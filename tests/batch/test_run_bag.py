@@ -20,7 +20,7 @@ from datasets import layouts
 from datasets.ros_samples import START_NS, STEP_NS, Recording
 from ldls import batch
 from ldls.datasets import RosBag
-from ldls.errors import BatchError, ParameterError
+from ldls.errors import BatchError, ChangedFileWarning, LeftOutWarning, ParameterError
 from ldls.io.labelled_bag import LabelledBag
 from ldls.io.ros.point_cloud2 import decode
 
@@ -110,6 +110,25 @@ def test_the_bag_of_a_finished_run_is_added(tmp_path):
     assert run(bag, out, "--formats", "label").exit_code == 0
     assert run(bag, out, "--formats", "bag").exit_code == 0
     assert len(messages(out / "labelled.bag", "/points_labelled")) == 4
+
+
+def test_a_bag_is_made_of_results_as_the_run_wrote_them_alone(tmp_path):
+    bag, out = recorded(tmp_path, "mcap"), tmp_path / "out"
+    settings = batch.RunSettings(masks=str(tmp_path / "masks"), formats=("bag",))
+    assert run(bag, out, "--formats", "npz").exit_code == 0
+    first, _, third, last = (out / f"{START_NS + number * STEP_NS}.npz" for number in range(4))
+    shutil.copy(first, third)
+    last.unlink()
+    with pytest.warns(LeftOutWarning, match=rf"of 2 frames outside --frames \({third.stem}, {last.stem}\) are missing"):
+        batch.run(bag, out, settings, frames=slice(0, 1))
+    assert n_points(out / "labelled") == [60, 61]
+    with pytest.warns(ChangedFileWarning, match=third.stem):
+        batch.run(bag, out, settings)
+    assert n_points(out / "labelled") == [60, 61, 62, 63]
+
+
+def n_points(path):
+    return [cloud.width * cloud.height for _, _, cloud in messages(path, "/points_labelled")]
 
 
 def test_frames_that_fail_are_not_in_the_bag(tmp_path):

@@ -7,6 +7,7 @@ import shutil
 import signal
 import sys
 from collections import Counter
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ from batch import drives, runs
 from command import command
 from datasets import layouts
 from ldls import batch
-from ldls.batch import run_tracks
+from ldls.batch import frame_work, run_tracks, stored_results
+from ldls.batch.known_files import is_written
 from ldls.batch.poses import Poses
 from ldls.datasets import open_source
 from ldls.errors import (
+    ChangedFileWarning,
     LdlsWarning,
     LeftOutWarning,
     LimitError,
@@ -265,6 +268,39 @@ def test_tracks_are_those_of_all_frames_that_are_done(drive, tracked, tmp_path, 
     run(drive, parts, frames=slice(3, None))
     assert numbered == [3, 3, 3, 2]
     assert tracks(parts) == before
+
+
+DAMAGES = {
+    "of another frame": lambda path: shutil.copy(path.with_name("000004.npz"), path),
+    "cut off": lambda path: path.write_bytes(path.read_bytes()[:-100]),
+    "missing": lambda path: path.unlink(),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_tracks_and_map_are_made_of_results_as_the_run_wrote_them_alone(drive, tracked, tmp_path, damage, numbered):
+    out, settings = tmp_path / "parts", runs.stored(drive, sweeps=1, formats=("npz",), track=True)
+    run(drive, out, frames=slice(0, 6), track=False)
+    DAMAGES[damage](out / "000005.npz")
+    said = r"parts: results \(\.npz\) of 1 frames outside --frames \(000005\) are missing, .*; run them again"
+    with pytest.warns(LeftOutWarning, match=said) as caught:
+        batch.run(drive, out, settings, frames=slice(6, 8), map_file=tmp_path / "map.ply")
+    assert [warning.filename for warning in caught] == [__file__]
+    assert numbered == [3, 2, 2]
+    assert "000005" not in {row["frame"] for row in rows(out)} and not (out / "tracks/000005.label").exists()
+    with nullcontext() if damage == "missing" else pytest.warns(ChangedFileWarning, match="000005"):
+        batch.run(drive, out, settings, map_file=tmp_path / "map.ply")
+    assert runs.contents(out) == runs.contents(tracked[0])
+    run_with_map(drive, tracked[0], tmp_path / "expected.ply", track=True)
+    assert (tmp_path / "map.ply").read_bytes() == (tmp_path / "expected.ply").read_bytes()
+
+
+def test_digests_of_results_are_read_once(drive, tracked, monkeypatch):
+    read = []
+    for module in (frame_work, stored_results):
+        monkeypatch.setattr(module, "is_written", lambda path, state: read.append(path.name) or is_written(path, state))
+    run(drive, tracked[0], frames=slice(0, 3))
+    assert sorted(read) == [f"{number:06d}.npz" for number in range(8)]
 
 
 def test_tracks_may_be_added_to_a_finished_run(drive, tracked, tmp_path):

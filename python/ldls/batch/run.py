@@ -25,6 +25,7 @@ from ldls.batch.poses import Poses, with_odometry
 from ldls.batch.run_bag import NOTE, RunBag
 from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks, remove_tracks
 from ldls.batch.settings import RunSettings
+from ldls.batch.stored_results import StoredResults
 from ldls.batch.summary import (
     FAILURES_NAME,
     Summary,
@@ -51,7 +52,7 @@ from ldls.errors import (
 from ldls.io.files import check_outputs, remove_unfinished
 from ldls.io.objects import objects_writer
 from ldls.sequences.trajectory import LONGEST_GAP_S
-from ldls.viewing.formats import BAG, ENDINGS, RESULT, TRACKS, file_name
+from ldls.viewing.formats import BAG, ENDINGS, RESULT, TRACKS
 
 GROUP_S = 0.5
 """Frames finished within this time share a wait for the disk."""
@@ -186,14 +187,15 @@ def run(
         write_failures(folder, failures_of(journal.records(opened.names)))
         # workers of a killed run may have outlived it for a moment
         remove_unfinished(folder)
-        stored = partial(_stored, journal, opened.names, folder)
-        unplaced = _write_of_all(tracks, bag, stored, partial(_outdate_bag, opened, settings, folder, of_tracks=True))
+        # results of the frames of this run were looked at before, or written
+        find_stored = partial(StoredResults, journal, folder, opened.names, names)
+        outdate_bag = partial(_outdate_bag, opened, settings, folder, of_tracks=True)
+        left_out = _write_of_all(tracks, bag, find_stored, outdate_bag)
         if write_objects is not None:
             write_objects(objects_of(_found(journal, names, tracks)))
         n_objects = count_objects(_found(journal, names, tracks))
         n_tracks = count_tracks(_found(journal, names, tracks))
-    if unplaced:
-        message = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
+    for message in left_out:
         warnings.warn(message, LeftOutWarning, stacklevel=3)
     doubts = doubts_of(journal.records(names))
     for doubt, frames_in_doubt in doubts.items():
@@ -283,27 +285,25 @@ def _tracks(
 def _write_of_all(
     tracks: RunTracks | None,
     bag: RunBag | None,
-    stored: Callable[[], Iterator[Record]],
+    find_stored: Callable[[], StoredResults],
     before: Callable[[], None],
 ) -> list[str]:
-    """Write the tracks, and the bag, which has them, of all frames that are `stored`; the frames without tracks."""
+    """Write the tracks, and the bag, which has them, of all frames that are stored; a line for those left out."""
+    if tracks is None and bag is None:
+        return []
+    stored = find_stored()
     # a bag of other tracks must not outlive a run that is killed
-    unplaced = [] if tracks is None else tracks.write(stored, before)
+    unplaced = [] if tracks is None else tracks.write(stored.records, before)
     if bag is not None:
-        bag.write(stored)
-    return unplaced
+        bag.write(stored.records)
+    no_pose = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
+    return [*([no_pose] if unplaced else []), *([stored.doubt()] if stored.left_out else [])]
 
 
 def _found(journal: Journal, names: Sequence[str], tracks: RunTracks | None) -> Iterator[Record]:
     """The records of frames, with their objects as they are tracked, if they are."""
     records = journal.records(names)
     return records if tracks is None else tracks.objects(records)
-
-
-def _stored(journal: Journal, names: Sequence[str], folder: Path) -> Iterator[Record]:
-    """The records of the frames of which a whole result is in the folder."""
-    done = (record for record in journal.records(names) if "error" not in record)
-    return (record for record in done if (folder / file_name(record["frame"], RESULT)).is_file())
 
 
 def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> list[Frames]:
