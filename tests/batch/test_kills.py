@@ -8,6 +8,8 @@ import pytest
 
 from batch import killed_at, runs
 from command import command, process
+from ldls.batch.frame_work import FrameWork
+from ldls.batch.run_tracks import RunTracks
 
 AT_STEPS = [
     pytest.param(step, n, id=f"{step}, {n}")
@@ -69,3 +71,25 @@ def test_interrupted_by_ctrl_c(source, undisturbed, tmp_path):
     assert 0 < int(count) <= len(left) - 1
     assert "by earlier runs" in process(*words).stdout
     assert runs.contents(tmp_path) == undisturbed
+
+
+def interrupt(*_):
+    raise KeyboardInterrupt
+
+
+def test_ctrl_c_counts_the_frames_of_earlier_runs(few, tmp_path, monkeypatch):
+    words = runs.arguments(few, tmp_path / "out")
+    assert command(*words, "--frames", "0:5").exit_code == 0
+    monkeypatch.setattr(FrameWork, "read", interrupt)
+    outcome = command(*words)
+    assert outcome.exit_code == 130
+    assert outcome.stderr == "stopped: 5 of 12 frames are done; give the same command again to go on\n"
+    assert "labelling" not in outcome.stdout, "a speed of frames of earlier runs"
+
+
+def test_ctrl_c_while_tracks_are_made_says_that_the_frames_are_done(drive, tmp_path, monkeypatch):
+    monkeypatch.setattr(RunTracks, "write", interrupt)
+    outcome = command(*runs.arguments(drive, tmp_path / "out"), "--track", "--map", tmp_path / "map.ply")
+    assert outcome.exit_code == 130
+    said = "stopped: 8 of 8 frames are done, but not all that is made of them together (tracks, map); give the same"
+    assert outcome.stderr.startswith(said)

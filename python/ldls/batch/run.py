@@ -101,7 +101,7 @@ def run(
         engine: Where they are segmented: "local", "ray", or an engine of your own.
         ray_address: Address of the Ray cluster to join; by default one is started on this machine.
         gpus: GPUs that a worker of the Ray cluster needs for its segmenter.
-        on_progress: Called after each frame.
+        on_progress: Called when it is known how many frames earlier runs did, and after each frame.
 
     Returns:
         What came of it; frames that failed are in its `failures`.
@@ -161,6 +161,8 @@ def run(
             to_do = [name for window in pending for _, name in window]
             work.records = journal.kept(to_do)
             n_earlier = len(chosen) - len(to_do)
+            report = on_progress or (lambda *_: None)
+            report(n_earlier, 0, len(names))
             start = time.perf_counter()
             seconds: Counter[str] = Counter()
             n_finished, n_failed = n_earlier, 0
@@ -174,8 +176,7 @@ def run(
                     seconds.update(outcome.seconds)
                     n_finished += len(outcome.records)
                     n_failed += sum("error" in record for record in outcome.records)
-                    if on_progress is not None:
-                        on_progress(n_finished, n_failed, len(names))
+                    report(n_finished, n_failed, len(names))
         except KeyboardInterrupt:
             write_failures(folder, failures_of(journal.records(opened.names)))
             raise

@@ -26,25 +26,31 @@ def progress(items: Iterable[T], total: int, title: str) -> Iterator[T]:
 
 
 @contextmanager
-def frame_progress(title: str) -> Iterator[Callable[[int, int, int], None]]:
+def frame_progress(title: str, *, resumes: bool = False) -> Iterator[Callable[[int, int, int], None]]:
     """Yield a function to call with the frames finished, those of them that failed, and in all.
+
+    Where work `resumes`, the first call tells how many frames were finished earlier, of which no speed comes.
 
     Standard error shows a bar, speed, time left and failures if it is a terminal. Standard output has a line now and
     then, and one at the end, if it is none, so that a log tells how far the command is.
     """
     start = time.monotonic()
     said: float | None = None
+    earlier = None if resumes else 0
     with _bar(title) as show:
 
         def update(finished: int, failed: int, total: int) -> None:
-            nonlocal said
+            nonlocal said, earlier
             now = time.monotonic()
             show(finished, failed, total)
+            if earlier is None:
+                earlier = finished
+                return
             soon = said is not None and now - said < LINE_EVERY_S
             if sys.stdout.isatty() or is_quiet() or (soon and finished < total):
                 return
             said = now
-            rate = finished / max(now - start, 1e-9)
+            rate = (finished - earlier) / max(now - start, 1e-9)
             failures = f", {failed:,} failed" if failed else ""
             # whoever reads the log may end before, as `head -1` does
             with suppress(BrokenPipeError):

@@ -138,7 +138,7 @@ def run(
     chosen = parse_frames(frames)
     say_own_masks(opened, masks, segmenter)
     finished = failed = 0
-    with frame_progress("labelling") as show_progress:
+    with frame_progress("labelling", resumes=True) as show_progress:
 
         def on_progress(*counts: int) -> None:
             nonlocal finished, failed
@@ -162,7 +162,12 @@ def run(
             )
         except KeyboardInterrupt:
             failures = f", {failed:,} failed (failures.jsonl)" if failed else ""
-            done = f"{finished - failed:,} of {len(opened.names[chosen]):,} frames are done{failures}"
+            total = len(opened.names[chosen])
+            done = f"{finished - failed:,} of {total:,} frames are done{failures}"
+            of_all = {"tracks": track, "map": map_file, "bag": "bag" in settings.formats, "table of objects": objects}
+            if finished == total and any(of_all.values()):
+                asked = ", ".join(word for word, value in of_all.items() if value)
+                done += f", but not all that is made of them together ({asked})"
             typer.echo(f"stopped: {done}; give the same command again to go on", err=True)
             raise typer.Exit(STOPPED) from None
     show(summary, out)
