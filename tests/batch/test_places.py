@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-import ldls.batch.poses as found_poses
+import ldls.batch.odometry as found_poses
 from batch import drives, runs
 from datasets import layouts
 from ldls import batch, read_poses
+from ldls.batch.lock import only_run
 from ldls.datasets import open_source
-from ldls.errors import BatchError, InputError, ParameterError
+from ldls.errors import BatchError, InputError, ParameterError, UnsafePathError
 from ldls.io import read_masks, save
 
 REASON = "which no run here wrote and the run would write over; an output is never written over an input"
@@ -192,3 +193,42 @@ def test_files_of_all_frames_are_not_written_over_those_of_one(drive, tmp_path, 
         batch.run(drive, tmp_path / "out", settings, **{name: tmp_path / "out" / file})
     assert runs.contents(tmp_path / "out") == before
     batch.run(drive, tmp_path / "out", settings, **{name: tmp_path / "out" / f"other-{file[-6:]}"})
+
+
+@pytest.mark.parametrize("other", [{}, {"poses": "given.txt"}, {"poses": "kiss-icp", "sweeps": 0}])
+def test_odometry_begins_in_no_folder_of_other_settings(drive, tmp_path, monkeypatch, other):
+    out = tmp_path / "out"
+    layouts.write_text(tmp_path / "given.txt", drives.tum_poses(8))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(found_poses, "odometry_of", lambda _: read_poses(tmp_path / "given.txt"))
+    batch.run(drive, out, runs.stored(drive, **{"sweeps": 1, **other}))
+    (out / "poses.txt").unlink(missing_ok=True)
+    before = runs.contents(out)
+    monkeypatch.setattr(found_poses, "odometry_of", lambda _: pytest.fail("the work is done"))
+    settings = runs.stored(drive, sweeps=1, poses="kiss-icp")
+    with pytest.raises(BatchError, match=r"holds a run of other settings: settings\.(poses|same_object) was .*; give"):
+        batch.run(drive, out, settings)
+    with only_run(out), pytest.raises(BatchError, match="another run is at work here"):
+        batch.run(drive, out, settings)
+    assert runs.contents(out) == before
+
+
+def test_found_poses_that_are_gone_are_found_again(drive, tmp_path, monkeypatch):
+    out, settings = tmp_path / "out", runs.stored(drive, sweeps=1, poses="kiss-icp")
+    layouts.write_text(tmp_path / "told.txt", drives.tum_poses(8))
+    monkeypatch.setattr(found_poses, "odometry_of", lambda _: read_poses(tmp_path / "told.txt"))
+    batch.run(drive, out, settings)
+    (out / "poses.txt").unlink()
+    assert batch.run(drive, out, settings).n_earlier == 8
+
+
+def test_a_link_that_leads_nowhere_is_no_folder_to_write_to(few, tmp_path):
+    (tmp_path / "disk").symlink_to(tmp_path / "unmounted")
+    for out in ("disk", "disk/out"):
+        with pytest.raises(
+            UnsafePathError, match=r"disk: is a link that leads nowhere \(to .*unmounted\), expected a fol"
+        ):
+            run(few, tmp_path / out, "npz")
+    assert not (tmp_path / "unmounted").exists()
+    (tmp_path / "unmounted").mkdir()
+    assert run(few, tmp_path / "disk/out", "npz").n_done == 12

@@ -157,7 +157,7 @@ class Journal:
             for number, line in enumerate(iter(lambda: file.readline(LONGEST_LINE_BYTES), b""), start=1):
                 if not line.endswith(b"\n") and self._may_be_cut(line, number):
                     break
-                record = self._parsed(line, number)
+                record = _parsed(self._path, line, number)
                 if number == 1:
                     if self._is_replaced(record, file):
                         break
@@ -171,20 +171,6 @@ class Journal:
         """Return True for a line without an end that a run may have left; only our own are dropped."""
         return len(line) < LONGEST_LINE_BYTES and (number > 1 or line_of(self._header).startswith(line))
 
-    def _parsed(self, line: bytes, number: int) -> Record:
-        try:
-            record: Record = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            found = str(error)
-        else:
-            if isinstance(record, dict) if number == 1 else _is_of_frame(record):
-                return record
-            found = f"expected a record of {'settings' if number == 1 else 'a frame'}, got {line[:60]!r}"
-        raise CorruptFileError(
-            f"{self._path}: line {number}: not a journal of ldls ({found}); choose another folder, or empty this one "
-            "to do all frames again"
-        )
-
     def _is_replaced(self, header: Record, rest: Iterable[bytes]) -> bool:
         """Return True for the journal of a run of other settings that did no frame, as the `rest` of its lines tells.
 
@@ -195,10 +181,7 @@ class Journal:
         # poses that the sweeps told are true of their source alone
         binds = holds_found_poses(self._folder) and header.get("source") != self._header["source"]
         if differences and (binds or not all(map(_is_failure, rest))):
-            raise BatchError(
-                f"{self._folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go "
-                "on with it (frames and formats may be added), or choose another folder"
-            )
+            raise _of_other_settings(self._folder, differences)
         return bool(differences)
 
 
@@ -233,6 +216,56 @@ def formats_begun(folder: Path) -> tuple[str, ...] | None:
             case {"written_formats": [*words]}:
                 return tuple(word for word in WRITTEN if word in words)
     return None
+
+
+def check_goes_on(folder: Path, known: Record) -> None:
+    """Refuse a folder with frames that a run of other settings did, before all settings of this one are known.
+
+    Args:
+        folder: The folder, with a journal or without.
+        known: What its first line is to have, as far as it is known: keys of "settings" and of "source".
+
+    Raises:
+        BatchError: There are such frames.
+        CorruptFileError: The journal is none.
+    """
+    path = folder / JOURNAL_NAME
+    if not path.is_file():
+        return
+    with path.open("rb") as file:
+        first = file.readline(LONGEST_LINE_BYTES)
+        # one that was cut off, which no frames follow, is judged when the journal is opened
+        header = _parsed(path, first, 1) if first.endswith(b"\n") else {}
+        now = {
+            key: {**before, **known[key]} if isinstance(before := header.get(key), dict) else known[key]
+            for key in known
+        }
+        differences = [*_differences({key: header.get(key) for key in known}, now)]
+        if differences and not all(map(_is_failure, file)):
+            raise _of_other_settings(folder, differences)
+
+
+def _of_other_settings(folder: Path, differences: Iterable[str]) -> BatchError:
+    return BatchError(
+        f"{folder}: holds a run of other settings: {'; '.join(differences)}; give the same command to go on with it "
+        "(frames and formats may be added), or choose another folder"
+    )
+
+
+def _parsed(path: Path, line: bytes, number: int) -> Record:
+    """Line `number` of the journal `path`, from 1."""
+    try:
+        record: Record = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        found = str(error)
+    else:
+        if isinstance(record, dict) if number == 1 else _is_of_frame(record):
+            return record
+        found = f"expected a record of {'settings' if number == 1 else 'a frame'}, got {line[:60]!r}"
+    raise CorruptFileError(
+        f"{path}: line {number}: not a journal of ldls ({found}); choose another folder, or empty this one to do all "
+        "frames again"
+    )
 
 
 def _is_failure(line: bytes) -> bool:

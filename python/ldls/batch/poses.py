@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,15 +13,15 @@ from numpy.typing import NDArray
 
 from ldls.batch.settings import RunSettings
 from ldls.batch.window import Frames
-from ldls.datasets import Frame, Source, odometry_of
+from ldls.datasets import Frame, Source
 from ldls.datasets.file_source import counts_of
 from ldls.datasets.frame import LEAVE_POSES_OUT
 from ldls.datasets.nuscenes import NuScenesSource
-from ldls.errors import BatchError, LdlsError, LdlsWarning, PoseError, some, within
+from ldls.errors import LdlsError, LdlsWarning, PoseError, some, within
 from ldls.io import read_poses
 from ldls.io.files import MAX_TEXT_BYTES, digest_of, open_file
 from ldls.io.names import name_order
-from ldls.io.poses import kitti, tum
+from ldls.io.poses import kitti
 from ldls.io.poses.pose_rows import pose_rows
 from ldls.io.poses.read import format_of
 from ldls.sequences import Trajectory
@@ -35,29 +33,6 @@ FOUND_POSES = "poses.txt"
 """File in the folder of the run that these poses are kept in, in TUM's format."""
 FOUND = "poses that ldls found by kiss-icp"
 """First line of this file, a comment."""
-
-
-def with_odometry(source: Source, settings: RunSettings, folder: Path) -> RunSettings:
-    """The settings with a file of poses where these are to be found from the sweeps, which is done once a folder.
-
-    Raises:
-        BatchError: A file that no run wrote is in their place.
-        LdlsError: The sweeps do not say how the lidar moved; see `ldls.datasets.odometry_of`.
-        ImportError: `ldls[odometry]` is not installed.
-    """
-    if settings.poses != KISS_ICP:
-        return settings
-    path = folder / FOUND_POSES
-    if not holds_found_poses(folder):
-        if os.path.lexists(path):
-            raise BatchError(
-                f"{path}: is there, no run here wrote it, and poses by {KISS_ICP} would take its place; take them from "
-                f"it by --poses {path}, or give another --out"
-            )
-        trajectory = odometry_of(source)
-        folder.mkdir(parents=True, exist_ok=True)
-        tum.write(path, trajectory, comment=FOUND)
-    return replace(settings, poses=str(path))
 
 
 def holds_found_poses(folder: Path) -> bool:

@@ -20,8 +20,9 @@ from ldls.batch.engines import Engine, EngineOptions, open_engine
 from ldls.batch.frame_work import Earlier, FrameWork
 from ldls.batch.journal import Journal, Record, formats_begun
 from ldls.batch.lock import only_run
+from ldls.batch.odometry import with_odometry
 from ldls.batch.plan import check_apart, check_names, check_places, chosen_of, open_for_run, windows_of
-from ldls.batch.poses import Poses, with_odometry
+from ldls.batch.poses import Poses
 from ldls.batch.run_bag import NOTE, RunBag
 from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks, remove_tracks
 from ldls.batch.settings import RunSettings
@@ -49,7 +50,7 @@ from ldls.errors import (
     ParameterError,
     some,
 )
-from ldls.io.files import check_outputs, remove_unfinished
+from ldls.io.files import check_outputs, make_folder, remove_unfinished
 from ldls.io.objects import objects_writer
 from ldls.sequences.trajectory import LONGEST_GAP_S
 from ldls.viewing.formats import BAG, ENDINGS, RESULT, TRACKS
@@ -115,7 +116,8 @@ def run(
             segmenter or a file of all masks has no such category.
         InputError: An argument is of another type, or `objects` or `map_file` is an input.
         UnsupportedFormatError: `objects` ends in neither `.csv` nor `.json`, or `map_file` in no format of maps.
-        UnsafePathError: A frame's name is no file name, or a link lies in the place of the lock or the journal.
+        UnsafePathError: A frame's name is no file name, a link lies in the place of the lock or the journal, or `out`
+            is one that leads nowhere.
         PoseError: Sweeps are to be joined or objects tracked, and frames have no stamps or poses.
         LimitError: There are more tracks than 16 bits number.
         ImportError: The engine, or the tracks, need an extra that is not installed.
@@ -135,24 +137,22 @@ def run(
     tracks = _tracks(settings, folder, names, map_file)
     with_tracks = None if tracks is None else tracks.folder
     bag = RunBag(opened, folder, with_tracks) if BAG in settings.formats else None
-    settings = with_odometry(opened, settings, folder)
+    of_source = {
+        "kind": opened.kind,
+        "path": str(Path(opened.path).resolve()),
+        "options": {name: str(value) for name, value in sorted(options.items())},
+    }
+    settings = with_odometry(opened, settings, folder, of_source)
     poses = Poses(opened, settings)
     poses.check(chosen)
     windows = _windows(opened, chosen, poses.stamps, settings.sweeps)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with only_run(folder):
         remove_unfinished(folder)
         if bag is not None:
             bag.check_place()
         work = FrameWork(opened, settings, folder)
-        header = {
-            "settings": settings.record() | work.digests,
-            "source": {
-                "kind": opened.kind,
-                "path": str(Path(opened.path).resolve()),
-                "options": {name: str(value) for name, value in sorted(options.items())},
-            },
-        }
+        header = {"settings": settings.record() | work.digests, "source": of_source}
         journal = Journal(folder, header, (*settings.frame_formats, *([TRACKS] if settings.track else [])))
         try:
             check_names(sorted({*names, *journal.frames}), [word for word in journal.formats if word in ENDINGS])

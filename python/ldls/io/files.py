@@ -209,6 +209,22 @@ def check_folder(path: str | PathLike[str]) -> None:
         raise FileNotFoundError(errno.ENOENT, "no such folder to write to; make it first", str(folder))
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder, and those that it is to be in, where they are not there.
+
+    Raises:
+        UnsafePathError: It, or one that it is to be in, is a link that leads nowhere.
+        OSError: There is a file of this name, or the system makes none.
+    """
+    dangling = next((each for each in (path, *path.parents) if each.is_symlink() and not each.exists()), None)
+    if dangling is not None:
+        raise UnsafePathError(
+            f"{dangling}: is a link that leads nowhere (to {dangling.readlink()}), expected a folder or none; make "
+            "what it leads to, or remove the link"
+        )
+    path.mkdir(parents=True, exist_ok=True)
+
+
 def check_outputs(
     outputs: Mapping[str, Iterable[Path | None]],
     inputs: Iterable[str | PathLike[str] | None],
