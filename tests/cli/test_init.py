@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import tomllib
 from pathlib import Path
@@ -13,6 +14,7 @@ from PIL import Image
 import ldls
 import ldls.errors
 from command import command
+from datasets import layouts
 from ldls.datasets import open_source
 from ldls.simulation import sample_frame
 from ldls.simulation.kitti_layout import calibration_lines
@@ -444,3 +446,22 @@ def test_real_folders(tmp_path):
     config = json.loads((real / "boards/config.json").read_text())
     np.testing.assert_allclose(camera.T_camera_lidar, config["tf"])
     assert camera.distortion == ldls.Distortion("plumb_bob", tuple(config["cam"]["D"]))
+
+
+def test_the_commands_that_are_next_can_be_pasted(rig, sample, tmp_path):
+    folder = tmp_path / "mein Ordner ü"
+    folder.mkdir()
+    for name in ("lidar", "front", "labels"):
+        (tmp_path / name).rename(folder / name)
+    following = f"ldls info {shlex.quote(str(folder))} --picture check.png"
+    assert f"then: {following}\n" in command("init", folder).output
+    (folder / "ldls.toml").unlink()
+    in_kitti_files(folder, sample.images[0].camera)
+    assert f"next: {following};" in command("init", folder).output
+
+
+@pytest.mark.parametrize("inside", ["", "a drive"])
+def test_the_command_for_what_is_read_as_it_is_can_be_pasted(tmp_path, inside):
+    source = layouts.many_frames(tmp_path / "two words" / inside, 1)
+    outcome = command("init", tmp_path / "two words")
+    assert outcome.output.endswith(f"next: ldls info '{source}'\n"), outcome.output

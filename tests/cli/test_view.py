@@ -151,6 +151,22 @@ def test_results_of_another_drive_are_refused(drive, tmp_path, target):
     assert both.exit_code == 2 and f"{first} failed" in both.output and "1 of 3 frames" in both.output, both.output
 
 
+def test_a_frame_that_the_run_has_not_done_is_named_as_such(drive):
+    done = command("run", drive, "--masks", drive / "masks_02", "--out", "out", "--formats", "npz", "--frames", "0:1")
+    assert done.exit_code == 0, done.output
+    name = ldls.datasets.open_source(drive).names[1]
+    both = command("view", drive, "--results", "out", "--frames", "0:2", "--rerun", "seen.rrd")
+    said = (
+        f"{name} failed: --results: out has no {name}.npz; `ldls run` has not done this frame; run it, or choose others"
+    )
+    assert both.exit_code == 2 and f"{said} by --frames" in " ".join(both.stderr.split()), both.output
+
+
+def test_the_command_that_opens_a_recording_can_be_pasted(saved):
+    done = command("view", "frame.npz", "--rerun", "mein Bild.rrd", "--diffusion", 0)
+    assert done.exit_code == 0 and "open it with: rerun 'mein Bild.rrd'" in done.output
+
+
 def test_objects_of_a_drive_keep_their_numbers(drive):
     done = command("run", drive, "--masks", drive / "masks_02", "--out", "out", "--sweeps", "1", "--track")
     assert done.exit_code == 0, done.output

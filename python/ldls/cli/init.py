@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -44,12 +45,14 @@ def init(
         raise InputError(f"{path}: is there already; change it, or delete it to have it made anew")
     kinds = [kind for kind, source in SOURCES.items() if source.recognises(folder)]
     if kinds:
-        say(f"{folder} is read as it is ({' or '.join(kinds)}), without {FILE}; next: ldls info {folder}")
+        say(f"{folder} is read as it is ({' or '.join(kinds)}), without {FILE}; next: ldls info {quote(str(folder))}")
         return
     inside = [child for child in sorted(folder.iterdir()) if any(each.recognises(child) for each in SOURCES.values())]
     if inside:
-        say(f"{', '.join(child.name for child in inside)}: read without {FILE}; next: ldls info {inside[0]}")
+        names, first = ", ".join(child.name for child in inside), quote(str(inside[0]))
+        say(f"{names}: read without {FILE}; next: ldls info {first}")
         return
+    next_step = f"ldls info {quote(str(folder))} --picture check.png"
     made = propose(folder)
     with whole_file(path) as file:
         file.write(made.text.encode())
@@ -60,7 +63,7 @@ def init(
     questions = sum(line.startswith("# ?") for line in made.lines)
     say(f"wrote {path}" + (f"; lines with # ? ask what to look at: {questions}" if questions else ""))
     if made.missing:
-        say(f"next: add what is missing to {path}, then: ldls info {folder} --picture check.png")
+        say(f"next: add what is missing to {path}, then: {next_step}")
         raise typer.Exit(1)
     # what is written must open
     allowed = ""
@@ -71,4 +74,4 @@ def init(
         message = f"{folder}: links lead out of it; copy their files there, or give each command{allowed}"
         warnings.warn(message, LdlsWarning, stacklevel=2)
         open_source(folder, allow_outside=True)
-    say(f"next: ldls info {folder} --picture check.png{allowed}; do the colours change where objects end?")
+    say(f"next: {next_step}{allowed}; do the colours change where objects end?")

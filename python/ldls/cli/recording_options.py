@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -103,7 +104,7 @@ def where_recorded(target: str) -> str:
 
     if target == VIEWER:
         return "shown in the Rerun viewer"
-    return f"wrote {target} ({Path(target).stat().st_size / 1e6:.1f} MB); open it with: rerun {target}"
+    return f"wrote {target} ({Path(target).stat().st_size / 1e6:.1f} MB); open it with: rerun {quote(target)}"
 
 
 def default_target(name: str) -> str:

@@ -170,12 +170,17 @@ def _stored(source: Source, results: Path, index: int) -> tuple[Frame, Segmentat
     """A frame and its stored result.
 
     Raises:
-        InputError: The result is of another cloud.
+        InputError: There is no result of this frame, or it is of another cloud.
     """
     from ldls.io import read_result
     from ldls.viewing.formats import file_name
 
     path = results / file_name(source.names[index], "npz")
+    if not path.exists():
+        raise InputError(
+            f"--results: {results} has no {path.name}; `ldls run` has not done this frame; run it, or choose others by "
+            "--frames"
+        )
     frame, result = source[index], read_result(path)
     if len(result.labels) != len(frame.points):
         raise InputError(
