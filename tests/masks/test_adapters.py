@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import ldls
+from segmenters.test_pasting import slow_resize
 
 PIXELS = np.random.default_rng(2).random((3, 11, 17)) > 0.5
 BOXES = np.array([[0, 0, 5, 5], [1, 1, 9, 9], [2, 2, 16, 10.0]])
@@ -173,9 +174,34 @@ def test_ultralytics_masks_of_the_images_size_are_taken_as_they_are():
     np.testing.assert_array_equal(masks.scores, np.float32([0.9, 0.5, 0.25]))
 
 
-def test_ultralytics_masks_of_the_padded_input_come_from_their_outlines():
+def test_ultralytics_masks_of_the_padded_input_are_cut_out_and_resampled():
+    padded = (np.random.default_rng(3).random((3, 64, 64)) > 0.5).astype(np.float32)
+    padded[0] = 1
+    padded[0, :11] = 0  # of grey rows 11 and 12, as Ultralytics rounds 23 / 2
+    padded[0, 52:] = 0
+    masks = ldls.InstanceMasks.from_ultralytics(ultralytics_result(SimpleNamespace(data=Tensor(padded))))
+    expected = [slow_resize(mask[11:52], 11, 17) > 0.5 for mask in padded]
+    np.testing.assert_array_equal(masks.to_array(), expected)
+    assert masks[0].area == 11 * 17
+
+
+def test_small_ultralytics_masks_lose_no_edges():
+    rows, columns = np.mgrid[:375, :1242]
+    truth = ((columns - 700) / 4) ** 2 + ((rows - 180) / 8) ** 2 <= 1
+    rows, columns = (np.mgrid[:224, :640] + 0.5 - np.reshape([15, 0], (2, 1, 1))) * 1242 / 640 - 0.5
+    of_network = ((columns - 700) / 4) ** 2 + ((rows - 180) / 8) ** 2 <= 1
+    result = ultralytics_result(
+        SimpleNamespace(data=of_network[None]), orig_shape=truth.shape, boxes=SimpleNamespace(cls=[0.0], conf=[0.5])
+    )
+    found = ldls.InstanceMasks.from_ultralytics(result).to_array()[0]
+    assert (found & truth).sum() / (found | truth).sum() > 0.8
+    for axis in (0, 1):
+        assert abs(np.nonzero(found)[axis].mean() - np.nonzero(truth)[axis].mean()) < 0.25
+
+
+def test_ultralytics_outlines_serve_where_there_are_no_pixels():
     outline = np.array([[2, 1], [9, 1], [9, 6], [2, 6]], np.float32)
-    shapes = SimpleNamespace(data=Tensor(np.zeros((3, 32, 32))), xy=[outline, np.zeros((0, 2)), outline + 1])
+    shapes = SimpleNamespace(xy=[outline, np.zeros((0, 2)), outline + 1])
     masks = ldls.InstanceMasks.from_ultralytics(ultralytics_result(shapes))
     expected = np.zeros((3, 11, 17), bool)
     expected[0, 1:6, 2:9] = True
@@ -205,7 +231,12 @@ def test_ultralytics_may_find_nothing():
             id="NaN class",
         ),
         pytest.param(
-            ultralytics_result(SimpleNamespace(data=Tensor(np.zeros((3, 9, 9))), xy=[np.full((3, 2), np.nan)] * 3)),
+            ultralytics_result(SimpleNamespace(data=Tensor(NAN_MASKS[:, 0]))),
+            r"mask 1: pixel \(2, 3\) is nan",
+            id="NaN",
+        ),
+        pytest.param(
+            ultralytics_result(SimpleNamespace(data=None, xy=[np.full((3, 2), np.nan)] * 3)),
             "mask 0: .*NaN",
             id="NaN outline",
         ),

@@ -13,7 +13,9 @@ from ldls.categories import COCO_NAMES, category_ids
 from ldls.checks import as_array, numbers, shown
 from ldls.errors import MaskError, within
 from ldls.masks.coco import from_rle
+from ldls.masks.letterbox import Letterbox
 from ldls.masks.pixels import checked_size, encode
+from ldls.masks.resampling import upsample
 
 Arguments = dict[str, Any]
 """Keyword arguments of `InstanceMasks`."""
@@ -106,12 +108,13 @@ def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
 
     Source: https://docs.ultralytics.com/reference/engine/results/
 
-    Masks of the image's size, as `retina_masks=True` makes them, are taken as they are. Those of the padded input give
-    way to their outlines in the image, `masks.xy`, which are coarser and have no holes.
+    Masks of the image's size, as `retina_masks=True` makes them, are taken as they are. Those of the padded input are
+    cut out of it and resampled bilinearly. Outlines alone run through the middles of the outermost cells of the
+    network, so that half a cell is lacking all around, and have no holes.
 
     Args:
-        result: `masks` (`data` (N, h, w) and `xy`, N outlines in image pixels) or None, `boxes` (`cls`, `conf`),
-            `names` and `orig_shape`.
+        result: `masks` (`data` (N, h, w), or without them `xy`, N outlines in image pixels) or None, `boxes` (`cls`,
+            `conf`), `names` and `orig_shape`.
 
     Raises:
         MaskError: There are boxes and no masks, an index that `names` does not have, or parts that do not fit one
@@ -137,10 +140,20 @@ def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
 
 
 def _ultralytics_rles(masks: Any, size: tuple[int, int]) -> list[_ldls.Rle]:  # noqa: ANN401
+    if getattr(masks, "data", None) is None:
+        return [_from_outline(i, to_numpy(outline), size) for i, outline in enumerate(masks.xy)]
     pixels = to_numpy(masks.data)
+    rles = [encode(i, mask) for i, mask in enumerate(pixels)]
     if pixels.shape[1:] == size:
-        return [encode(i, mask) for i, mask in enumerate(pixels)]
-    return [_from_outline(i, to_numpy(outline), size) for i, outline in enumerate(masks.xy)]
+        return rles
+    return [_in_image(rle, size) for rle in rles]
+
+
+def _in_image(rle: _ldls.Rle, size: tuple[int, int]) -> _ldls.Rle:
+    """A mask of a network's padded input as one of the image (`scale_masks` of Ultralytics 8.4, and more than half)."""
+    box = Letterbox.fit(size, (rle.height, rle.width))
+    grid = rle.crop(box.top, box.left, *box.scaled_size)
+    return _ldls.Rle.from_pixels(upsample(grid.astype(np.float32), *size) > 0.5)
 
 
 def _from_outline(index: int, outline: Any, size: tuple[int, int]) -> _ldls.Rle:  # noqa: ANN401

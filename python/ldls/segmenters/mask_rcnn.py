@@ -13,12 +13,12 @@ from PIL import Image
 
 from ldls.errors import FileFormatError, LimitError
 from ldls.masks import InstanceMasks
+from ldls.masks.resampling import F32
 from ldls.segmenters.classes import Classes
 from ldls.segmenters.crops import Crop, assemble
 from ldls.segmenters.onnx_graph import Signature, Value
 from ldls.segmenters.outputs import check_finite, check_scores, expect_shape
 from ldls.segmenters.pasting import padded_paste, plain_paste
-from ldls.segmenters.resampling import F32
 
 ROLES = ("boxes", "labels", "scores", "masks")
 ZOO_CELLS = 28

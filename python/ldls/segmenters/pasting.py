@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ldls.segmenters.resampling import F32, bilinear_weights
+from ldls.masks.resampling import F32, bilinear_weights
 
 MAX_SIDE = 1 << 20
 """Longer boxes, in pixels, are cut; nothing sound draws them."""

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from ldls.cloud import Ints
 from ldls.errors import CorruptFileError, FileFormatError, ParameterError, UnsupportedFormatError
 from ldls.masks import InstanceMasks
+from ldls.masks.letterbox import Letterbox
+from ldls.masks.resampling import F32
 from ldls.segmenters.classes import Classes, contiguous_coco_classes, named_classes
 from ldls.segmenters.crops import Crop, assemble
-from ldls.segmenters.letterbox import Letterbox
 from ldls.segmenters.onnx_graph import Signature, Value, image_input
 from ldls.segmenters.outputs import check_finite, check_scores, expect_shape
-from ldls.segmenters.resampling import F32
 from ldls.segmenters.suppression import suppress
 
 N_COCO = 80

@@ -8,7 +8,7 @@ from math import gcd
 import numpy as np
 from numpy.typing import NDArray
 
-from ldls.segmenters.resampling import F32, bilinear_weights, resize
+from ldls.masks.resampling import F32, bilinear_weights, resize
 
 GREY = 114
 FARTHEST = 1e6

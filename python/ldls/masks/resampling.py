@@ -27,6 +27,14 @@ def bilinear_weights(source: int, target: int, window: slice = slice(None)) -> F
     return weights
 
 
+def upsample(grid: F32, height: int, width: int) -> F32:
+    """A grid (h, w) resampled to (height, width)."""
+    above, below, down = bilinear_taps(grid.shape[0], height)
+    left, right, across = bilinear_taps(grid.shape[1], width)
+    columns = grid[:, left] * (1 - across) + grid[:, right] * across
+    return np.asarray(columns[above] * (1 - down)[:, None] + columns[below] * down[:, None], np.float32)
+
+
 def resize(image: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint8]:
     """An image (H, W, C) resampled to (height, width, C), as OpenCV's `INTER_LINEAR` does it for 8 bits.
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ldls.segmenters.letterbox import Letterbox
-from ldls.segmenters.resampling import resize
+from ldls.masks.letterbox import Letterbox
+from ldls.masks.resampling import resize
 from segmenters.test_pasting import slow_resize
 
 SIZES = [
