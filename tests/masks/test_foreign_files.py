@@ -31,6 +31,57 @@ def test_polygons_of_yolo(tmp_path):
     assert own.categories.tolist() == [1, 100] and own.names[100] == "forklift"
 
 
+@pytest.mark.parametrize(
+    ("text", "scores"),
+    [
+        pytest.param(f"2 {YOLO} 0.75 2\n0 {YOLO} 1 1\n", [0.75, 1], id="scores and tracks"),
+        pytest.param(f"2 {YOLO} 0.75 12\n", [0.75], id="score and track"),
+        pytest.param(f"2 {YOLO} 2\n0 {YOLO} 1\n", [1, 1], id="tracks"),
+        pytest.param(f"2 {YOLO} 1\n", [1], id="track 1"),
+        pytest.param(f"2 {YOLO} 1\n0 {YOLO} 1\n", [1, 1], id="scores of 1"),
+        pytest.param(f"2 {YOLO} 1\n0 {YOLO}\n", [1, 1], id="some with scores"),
+    ],
+)
+def test_numbers_of_tracks_are_no_corners(tmp_path, text, scores):
+    (tmp_path / "a.txt").write_text(text)
+    masks = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))
+    np.testing.assert_array_equal(pixels(masks), [SQUARE] * len(scores))
+    assert masks.scores.tolist() == scores
+
+
+def test_a_corner_that_may_be_a_track_is_warned_of(tmp_path):
+    (tmp_path / "a.txt").write_text(f"2 {YOLO} 0.25 1\n")
+    with pytest.warns(LdlsWarning, match=r"a\.txt, line 1: 0\.25 1 is taken for a corner; if") as caught:
+        assert ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))[0].area > SQUARE.sum() / 2
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    "text", [pytest.param("2 0 0 1 0 1 1 0 1", id="whole image"), pytest.param(f"2 {YOLO} 0 1\n" * 2, id="twice")]
+)
+def test_polygons_may_end_at_the_lower_edge(tmp_path, text):
+    (tmp_path / "a.txt").write_text(text)
+    assert all(mask.score == 1 and mask.area for mask in ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80)))
+
+
+@pytest.mark.parametrize(
+    ("tiny", "behind"),
+    [
+        pytest.param("", "", id="no corner"),
+        pytest.param(" 0.31", " 0.75", id="score"),
+        pytest.param(" 0.31 4", " 0.75 3", id="score and track"),
+        pytest.param(" 0.5 0.5 0.31", " 0.75", id="a corner"),
+        pytest.param(" 0.5 0.5 0.5 0.6", "", id="upright line"),
+        pytest.param(" 0.5 0.5 0.5125 0.5166667", "", id="diagonal line"),
+    ],
+)
+def test_instances_of_yolo_too_small_for_an_outline_have_no_pixel(tmp_path, tiny, behind):
+    (tmp_path / "a.txt").write_text(f"2{tiny}\n0 {YOLO}{behind}\n")
+    masks = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))
+    np.testing.assert_array_equal(pixels(masks), [np.zeros_like(SQUARE), SQUARE])
+    np.testing.assert_array_equal(masks.scores, np.float32([0.31 if "0.31" in tiny else 1, 0.75 if behind else 1]))
+
+
 def test_a_class_of_yolo_that_is_named_background_has_no_objects(tmp_path):
     (tmp_path / "a.txt").write_text(f"0 {YOLO}\n1 {YOLO} 0.75\n")
     masks = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80), names={0: "background", 1: "Car"})
@@ -42,6 +93,12 @@ def test_a_class_of_yolo_that_is_named_background_has_no_objects(tmp_path):
     [
         pytest.param(f"2 {YOLO}", {"image_size": None}, "give its image_size=", id="no size"),
         pytest.param("2 0.5 0.5 0.1 0.2", {}, r"line 1: a box, expected a polygon", id="boxes"),
+        pytest.param("2 0.5 0.5 0.1 0.2 0.9 3\n", {}, r"line 1: a box, expected a polygon", id="boxes of tracks"),
+        pytest.param(f"0 {YOLO}\n2 0.5 0.5 0.1 0.2", {}, r"line 2: a box, expected", id="a box among polygons"),
+        pytest.param("2 0.31", {}, "line 1: expected a class and x y of three", id="no corner at all"),
+        pytest.param("2 0.5 0.6", {}, "line 1: expected a class and x y of three", id="one corner"),
+        pytest.param(f"2 {YOLO} 2 2", {}, "as shares of the image from 0 to 1", id="score above 1"),
+        pytest.param(f"2 {YOLO} 2\n2 {YOLO} 2", {}, "as shares of the image from 0 to 1", id="a track twice"),
         pytest.param(f"80 {YOLO}", {}, "class 80 has no name; pass names=", id="unknown class"),
         pytest.param("2 10 10 20 10 20 20", {}, "as shares of the image from 0 to 1", id="pixels"),
         pytest.param("2 0.1 0.2 0.3 0.4 0.5 x", {}, "expected a class and numbers", id="word"),
