@@ -125,6 +125,14 @@ def test_supervision_classes_go_by_their_names():
             {"data": {}}, {"names": {0: "dog", 2: "bus"}}, [(18, "dog"), (101, "class 1"), (6, "bus")], id="names"
         ),
         pytest.param({"class_id": None, "data": {}}, {}, [(1, "object")] * 3, id="no classes"),
+        pytest.param({"class_id": None, "data": None}, {}, [(1, "object")] * 3, id="no data"),
+        pytest.param({"class_id": None}, {}, [(1, "person"), (101, "forklift"), (3, "car")], id="names alone"),
+        pytest.param(
+            {"class_id": None, "data": {"class_name": ["pit", "crane", "pit"]}},
+            {"names": {0: "car", 4: "pit"}},
+            [(104, "pit"), (105, "crane"), (104, "pit")],
+            id="names alone, some known",
+        ),
     ],
 )
 def test_supervision_may_lack_names(changes, options, categories):
@@ -138,6 +146,12 @@ def test_supervision_may_find_nothing():
     assert ldls.InstanceMasks.from_supervision(nothing, image_size=(4, 5)).image_size == (4, 5)
     with pytest.raises(ldls.MaskError, match="pass image_size="):
         ldls.InstanceMasks.from_supervision(nothing)
+    nothing.mask = np.zeros((0, 4, 5), bool)
+    assert ldls.InstanceMasks.from_supervision(nothing).image_size == (4, 5)
+    assert ldls.InstanceMasks.from_supervision(nothing, image_size=(6, 5)).image_size == (6, 5)
+    nothing.mask = np.zeros((0, 0, 0), bool)
+    with pytest.raises(ldls.MaskError, match="pass image_size="):
+        ldls.InstanceMasks.from_supervision(nothing)
 
 
 @pytest.mark.parametrize(
@@ -145,6 +159,11 @@ def test_supervision_may_find_nothing():
     [
         pytest.param({"mask": None}, "3 boxes without masks, .*InstanceMasks.from_boxes .*Box", id="boxes only"),
         pytest.param({"class_id": np.array([0, 1])}, "3 masks, 2 class ids, 3 class names", id="too few classes"),
+        pytest.param(
+            {"class_id": None, "data": {"class_name": ["car"]}},
+            "3 masks, 1 class ids, 1 class names",
+            id="too few names",
+        ),
         pytest.param({"class_id": np.array([0, 0, 2])}, "mask 0: class 0 is 'person', elsewhere", id="two names"),
         pytest.param({"class_id": np.array([0, -200, 2])}, "mask 1: class -200", id="class -200"),
         pytest.param({"confidence": np.array([1, 1])}, "scores: expected one for each of 3", id="too few scores"),
@@ -209,6 +228,25 @@ def test_ultralytics_outlines_serve_where_there_are_no_pixels():
     np.testing.assert_array_equal(masks.to_array(), expected)
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        pytest.param(["person", "forklift", "car"], id="list"),
+        pytest.param({"0": "person", "1": "forklift", "2": "car"}, id="numbers as text"),
+        pytest.param({np.int64(i): name for i, name in CLASSES.items()}, id="numbers of NumPy"),
+    ],
+)
+def test_ultralytics_names_may_be_of_json(names):
+    masks = ldls.InstanceMasks.from_ultralytics(ultralytics_result(names=names))
+    assert [(mask.category, mask.name) for mask in masks] == [(1, "person"), (101, "forklift"), (3, "car")]
+
+
+def test_ultralytics_masks_may_have_no_boxes():
+    masks = ldls.InstanceMasks.from_ultralytics(ultralytics_result(boxes=None))
+    np.testing.assert_array_equal(masks.to_array(), PIXELS)
+    assert [(mask.name, mask.score) for mask in masks] == [("object", 1)] * 3
+
+
 def test_ultralytics_may_find_nothing():
     for boxes in (SimpleNamespace(cls=Tensor(np.zeros(0)), conf=Tensor(np.zeros(0))), None):
         masks = ldls.InstanceMasks.from_ultralytics(ultralytics_result(None, boxes=boxes))
@@ -219,6 +257,8 @@ def test_ultralytics_may_find_nothing():
     ("result", "message"),
     [
         pytest.param(ultralytics_result(names={0: "person"}), "mask 1: class 1 has no name", id="no name"),
+        pytest.param(ultralytics_result(names={"a": "b"}), "names: got {'a': 'b'}, expected class names", id="key a"),
+        pytest.param(ultralytics_result(names=None), "names: got None, expected class names by", id="names None"),
         pytest.param(ultralytics_result(None), "result: 3 boxes without masks, expected a result", id="boxes only"),
         pytest.param(
             ultralytics_result(boxes=SimpleNamespace(cls=Tensor([0.0]), conf=Tensor([1.0]))),

@@ -63,9 +63,11 @@ def from_supervision(
     Source: https://supervision.roboflow.com/latest/detection/core/
 
     Args:
-        detections: `mask` (N, H, W), `confidence` (N,) or None, `class_id` (N,) or None, and `data["class_name"]`.
+        detections: `mask` (N, H, W), `confidence` (N,) or None, `class_id` (N,) or None, and `data["class_name"]`,
+            which does without class ids.
         names: Name of each class id, where `data` does not say; a class without one is called by its number.
-        image_size: (height, width) of the image in pixels; only needed where there may be no detection.
+        image_size: (height, width) of the image in pixels; only needed where there may be no detection, and no array of
+            masks that has the size.
 
     Raises:
         MaskError: There are boxes and no masks, or arrays that do not fit one another.
@@ -76,6 +78,8 @@ def from_supervision(
         _check_no_boxes("detections", detections.xyxy)
     pixels = [] if masks is None else [to_numpy(mask) for mask in masks]
     if not pixels and image_size is None:
+        image_size = _image_size(masks)
+    if not pixels and image_size is None:
         raise MaskError("detections: none, so the image's size is not known; pass image_size=(height, width)")
     rles = [encode(i, mask) for i, mask in enumerate(pixels)]
     classes = _classes(detections, len(rles), names)
@@ -83,14 +87,25 @@ def from_supervision(
     return {"rles": rles, "image_size": size, "scores": detections.confidence, **classes}
 
 
+def _image_size(masks: Any) -> tuple[int, int] | None:  # noqa: ANN401
+    """(H, W) of an array (0, H, W); None where there is no such array."""
+    shape: tuple[int, ...] = getattr(masks, "shape", ())
+    return (shape[1], shape[2]) if len(shape) == 3 and all(shape[1:]) else None
+
+
 def _classes(detections: Any, count: int, names: Mapping[int, str] | None) -> dict[str, Any]:  # noqa: ANN401
-    """Categories and their names; none where there are no class ids."""
-    if detections.class_id is None:
+    """Categories and their names; none where there are neither class ids nor names."""
+    own = {index: str(name) for index, name in (names or {}).items()}
+    class_names = (detections.data or {}).get("class_name")
+    if detections.class_id is not None:
+        indices = whole_numbers("class_id", detections.class_id)
+        if class_names is None:
+            class_names = [own.get(index, f"class {index}") for index in indices]
+    elif class_names is None:
         return {}
-    indices = whole_numbers("class_id", detections.class_id)
-    own = dict(names or {})
-    class_names = [own.get(index, f"class {index}") for index in indices]
-    class_names = [str(name) for name in detections.data.get("class_name", class_names)]
+    else:
+        indices = _numbered([str(name) for name in class_names], own)
+    class_names = [str(name) for name in class_names]
     if not len(indices) == len(class_names) == count:
         raise MaskError(f"detections: {count} masks, {len(indices)} class ids, {len(class_names)} class names")
     by_index = dict(zip(indices, class_names, strict=True))
@@ -101,6 +116,14 @@ def _classes(detections: Any, count: int, names: Mapping[int, str] | None) -> di
             raise MaskError(f"mask {i}: class {index} is {name!r}, elsewhere {by_index[index]!r}; one name a class")
     ids, by_category = category_ids(by_index)
     return {"categories": [ids[index] for index in indices], "names": by_category}
+
+
+def _numbered(class_names: Sequence[str], names: Mapping[int, str]) -> list[int]:
+    """The number of each name: that of `names`, of others one behind these, by the alphabet."""
+    numbers = {name: index for index, name in names.items()}
+    others = sorted(set(class_names) - numbers.keys())
+    numbers |= {name: index for index, name in enumerate(others, start=max(names, default=-1) + 1)}
+    return [numbers[name] for name in class_names]
 
 
 def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
@@ -114,7 +137,7 @@ def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
 
     Args:
         result: `masks` (`data` (N, h, w), or without them `xy`, N outlines in image pixels) or None, `boxes` (`cls`,
-            `conf`), `names` and `orig_shape`.
+            `conf`) or None, for objects of one category, `names` (a list, or by number) and `orig_shape`.
 
     Raises:
         MaskError: There are boxes and no masks, an index that `names` does not have, or parts that do not fit one
@@ -122,10 +145,12 @@ def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
     """
     _check_parts("result", result, ("masks", "boxes", "names", "orig_shape"))
     size = checked_size(result.orig_shape)
-    ids, names = category_ids(result.names)
+    ids, names = category_ids(_by_number(result.names))
     if result.masks is None:
         _check_no_boxes("result", () if result.boxes is None else result.boxes.cls)
         return {"rles": [], "image_size": size, "categories": [], "scores": [], "names": names}
+    if result.boxes is None:
+        return {"rles": _ultralytics_rles(result.masks, size), "image_size": size}
     classes = whole_numbers("boxes.cls", result.boxes.cls)
     for i, index in enumerate(classes):
         if index not in ids:
@@ -137,6 +162,17 @@ def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
         "scores": to_numpy(result.boxes.conf),
         "names": names,
     }
+
+
+def _by_number(names: Any) -> dict[int, str]:  # noqa: ANN401
+    """Class names by their numbers, of a list or a mapping whose keys may be text, as JSON makes them."""
+    try:
+        listed = dict(enumerate(names)) if isinstance(names, list | tuple) else names
+        return {int(number): str(name) for number, name in listed.items()}
+    except (AttributeError, TypeError, ValueError):
+        raise MaskError(
+            f"names: got {shown(names)}, expected class names by their numbers, or a list of them"
+        ) from None
 
 
 def _ultralytics_rles(masks: Any, size: tuple[int, int]) -> list[_ldls.Rle]:  # noqa: ANN401
