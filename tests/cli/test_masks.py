@@ -154,3 +154,15 @@ def test_any_number_of_masks(count, tmp_path):
     ldls.save(ldls.InstanceMasks.from_array(pixels), tmp_path / "masks.json")
     assert command("masks", "convert", tmp_path / "masks.json", tmp_path / "masks.png").exit_code == 0
     np.testing.assert_array_equal(ldls.read_masks(tmp_path / "masks.png").to_array(), pixels)
+
+
+@pytest.mark.parametrize("ids", [pytest.param(("a", "b"), id="text"), pytest.param((7, 8), id="numbers")])
+def test_an_image_is_chosen_by_its_id(masks, ids):
+    made, folder = masks
+    content = made.to_coco()
+    images = [content["images"][0] | {"id": each} for each in ids]
+    annotations = [each | {"image_id": ids[0]} for each in content["annotations"]]
+    (folder / "two.json").write_text(json.dumps(content | {"images": images, "annotations": annotations}))
+    for chosen, n_masks in zip(ids, (3, 0), strict=True):
+        outcome = command("masks", "show", folder / "two.json", "--image-id", str(chosen))
+        assert outcome.exit_code == 0 and f"{n_masks} masks of" in outcome.output, outcome.output

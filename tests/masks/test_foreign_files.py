@@ -261,6 +261,24 @@ def test_records_of_segment_anything(tmp_path, wrapped):
     assert (masks.categories.tolist(), masks.scores.tolist(), masks.names[1]) == ([1], [0.5], "object")
 
 
+def test_the_image_of_segment_anything_says_its_size(tmp_path):
+    content = {"image": {"image_id": 1, "width": 80, "height": 60, "file_name": "a.jpg"}, "annotations": []}
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    masks = ldls.read_masks(tmp_path / "a.json")
+    assert (len(masks), masks.image_size) == (0, (60, 80))
+    with pytest.raises(ldls.MaskError, match=r"a\.json: masks of \(60, 80\).* image is \(80, 60\); swapped"):
+        ldls.read_masks(tmp_path / "a.json", image_size=(80, 60))
+    rle = ldls.InstanceMasks.from_array(SQUARE.T[None]).to_coco()["annotations"][0]["segmentation"]
+    content["annotations"] = [{"segmentation": rle, "predicted_iou": 0.5}]
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.raises(ldls.MaskError, match=r"a\.json: .*80.*60"):
+        ldls.read_masks(tmp_path / "a.json")
+    del content["image"]["width"], content["annotations"][0]
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    with pytest.raises(ldls.MaskError, match=r"a\.json: records: none, so the image's size is not known"):
+        ldls.read_masks(tmp_path / "a.json")
+
+
 def test_a_folder_of_one_png_an_instance(tmp_path):
     for number in (10, 2):
         Image.fromarray(np.where(SQUARE, 255, 0).astype(np.uint8)[:, :: -1 if number == 2 else 1]).save(
@@ -390,9 +408,10 @@ def test_cityscapes_numbers_instances_from_0(tmp_path):
     ]
 
 
-def test_an_empty_segmentation_is_left_out(tmp_path):
+@pytest.mark.parametrize("empty", [[], [[]], [[], []]], ids=["no polygon", "empty polygon", "empty polygons"])
+def test_an_empty_segmentation_is_left_out(tmp_path, empty):
     content = ldls.InstanceMasks.from_array(SQUARE[None], categories=[1]).to_coco()
-    content["annotations"].append(content["annotations"][0] | {"id": 9, "segmentation": []})
+    content["annotations"].append(content["annotations"][0] | {"id": 9, "segmentation": empty})
     (tmp_path / "a.json").write_text(json.dumps(content))
     with pytest.warns(LeftOutWarning, match="1 of 2 annotations have an empty segmentation"):
         assert len(ldls.read_masks(tmp_path / "a.json")) == 1

@@ -76,7 +76,7 @@ def explain(
     extrinsic: ExtrinsicOption = None,
     fisheye: FisheyeOption = None,
     rectified: RectifiedOption = None,
-    image_id: Annotated[int | None, IMAGE_ID] = None,
+    image_id: Annotated[str | None, IMAGE_ID] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")] = False,
 ) -> None:
     """Say why a point has its label.

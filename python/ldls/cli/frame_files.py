@@ -31,7 +31,7 @@ MASKS = typer.Option(
     show_default=False,
     **(EXISTING | {"dir_okay": True}),
 )
-IMAGE_ID = typer.Option(metavar="N", help="Which image of a COCO file that holds several.")
+IMAGE_ID = typer.Option(metavar="ID", help="Which image of a COCO file that holds several: its id, number or text.")
 ExtrinsicOption = Annotated[
     Path | None,
     typer.Option(

@@ -45,7 +45,7 @@ def masks_of(
     *,
     masks: Path | None,
     segmenter: str | None,
-    image_id: int | None = None,
+    image_id: str | None = None,
     image_size: tuple[int, int] | None = None,
     min_score: float | None = None,
     categories: str | None = None,

@@ -76,7 +76,7 @@ AXES = {None: None, Axis.FIRST: 0, Axis.LAST: -1}
 def convert(
     masks: MasksArgument,
     out: OutArgument,
-    image_id: Annotated[int | None, IMAGE_ID] = None,
+    image_id: Annotated[str | None, IMAGE_ID] = None,
     image_size: Annotated[
         str | None,
         typer.Option(metavar="HEIGHTxWIDTH", help="Size of the image, where the file does not say: 375x1242."),
@@ -189,7 +189,7 @@ def show(
         Path | None, typer.Option(metavar="FILE", help="The image they are of.", show_default=False, **EXISTING)
     ] = None,
     picture: MaskPictureOption = None,
-    image_id: Annotated[int | None, IMAGE_ID] = None,
+    image_id: Annotated[str | None, IMAGE_ID] = None,
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
 ) -> None:

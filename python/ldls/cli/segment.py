@@ -73,7 +73,7 @@ def segment(
     extrinsic: ExtrinsicOption = None,
     fisheye: FisheyeOption = None,
     rectified: RectifiedOption = None,
-    image_id: Annotated[int | None, IMAGE_ID] = None,
+    image_id: Annotated[str | None, IMAGE_ID] = None,
     formats: FormatsOption = "npz,label,ply,png",
     objects: ObjectsOption = None,
     picture: PictureOption = None,

@@ -14,6 +14,7 @@ import numpy as np
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, is_object
+from ldls.checks import as_python
 from ldls.errors import CorruptFileError, LeftOutWarning, MaskError, within
 from ldls.masks.instance_mask import InstanceMask
 from ldls.masks.pixels import check_same_size, checked_size
@@ -46,7 +47,7 @@ def arguments(
     chosen = [a for a in annotations if image_id is None or a.get("image_id") in (None, image_id)]
     no_objects = [category for category, name in names.items() if not is_object(name)]
     chosen = [a for a in chosen if a.get("category_id") not in no_objects]
-    drawn = [a for a in chosen if a.get("segmentation") != []]
+    drawn = [a for a in chosen if not _is_empty(a.get("segmentation"))]
     if len(drawn) < len(chosen):
         warnings.warn(
             f"{len(chosen) - len(drawn)} of {len(chosen)} annotations have an empty segmentation and are left out; "
@@ -115,7 +116,7 @@ def by_id(name: str, values: object, types: tuple[type, ...]) -> dict[Any, dict[
     """
     by_id: dict[Any, dict[str, Any]] = {}
     for i, record in enumerate(records(name, values)):
-        key = record.get("id")
+        key = as_python(record.get("id"))
         if type(key) not in types:
             expected = " or ".join(t.__name__ for t in types)
             raise CorruptFileError(f"{name}[{i}] has id {key!r}, expected {expected}")
@@ -142,12 +143,14 @@ def chosen_image(
 ) -> int | str | None:
     """The image that is chosen, or the only one there is; None where annotations do not say.
 
+    Text chooses the number that reads so where no id is that text.
+
     Raises:
         MaskError: There is no such image, or several and none was chosen.
         CorruptFileError: An annotation has an id that is none.
     """
     for i, annotation in enumerate(annotations):
-        own = annotation.get("image_id")
+        own = as_python(annotation.get("image_id"))
         if type(own) not in (int, str, type(None)):
             raise CorruptFileError(f"annotation {i}: image_id is {own!r}, expected int or str")
         if images and own is not None and own not in images:
@@ -156,11 +159,19 @@ def chosen_image(
                 f"found {list(images)[:10]}; mend the id, or leave the annotation out"
             )
     known = list(images) or sorted({a["image_id"] for a in annotations if a.get("image_id") is not None}, key=str)
+    if isinstance(image_id, str) and image_id not in known:
+        # of a command line, where numbers are text too
+        image_id = {str(each): each for each in known}.get(image_id, image_id)
     if image_id is not None and known and image_id not in known:
         raise MaskError(f"no image with id {image_id!r}; found {known[:10]}")
     if image_id is None and len(known) > 1:
         raise MaskError(f"holds {len(known)} images; pass image_id=, one of {known[:10]}")
     return image_id if image_id is not None else next(iter(known), None)
+
+
+def _is_empty(segmentation: object) -> bool:
+    """True for a list of polygons that are all empty, or of none."""
+    return isinstance(segmentation, list) and all(isinstance(polygon, list) and not polygon for polygon in segmentation)
 
 
 def _size_of(
@@ -170,20 +181,29 @@ def _size_of(
     image_size: tuple[int, int] | None,
 ) -> tuple[int, int]:
     """(height, width) of the image: what its record says, else what is given, else what the first RLE says."""
-    given = None if image_size is None else checked_size(image_size)
-    image = images.get(image_id, {})
-    if image.get("height") is not None and image.get("width") is not None:
-        own = checked_size((image["height"], image["width"]))
-        if given is not None:
-            check_same_size(own, given)
-        return own
-    if given is not None:
-        return given
+    known = size_of_record(images.get(image_id, {}), image_size)
+    if known is not None:
+        return known
     segmentations = (a.get("segmentation") for a in annotations)
     sizes = [s["size"] for s in segmentations if isinstance(s, dict) and "size" in s]
     if not sizes:
         raise MaskError("the image's size is not given; pass image_size=(height, width)")
     return checked_size(sizes[0])
+
+
+def size_of_record(image: Mapping[str, Any], image_size: tuple[int, int] | None) -> tuple[int, int] | None:
+    """(height, width) that the record of an image says, else the given one; None where neither does.
+
+    Raises:
+        MaskError: Both do, and differ.
+    """
+    given = None if image_size is None else checked_size(image_size)
+    if image.get("height") is None or image.get("width") is None:
+        return given
+    own = checked_size((image["height"], image["width"]))
+    if given is not None:
+        check_same_size(own, given)
+    return own
 
 
 def _rle(label: str, annotation: dict[str, Any], size: tuple[int, int]) -> _ldls.Rle:
@@ -221,14 +241,18 @@ def from_rle(rle: Mapping[str, Any], image_size: tuple[int, int] | None = None) 
 
 
 def _from_polygons(polygons: list[Any], image_size: tuple[int, int]) -> _ldls.Rle:
-    flat = all(isinstance(p, list) and all(type(c) in (int, float) for c in p) for p in polygons)
+    flat = all(isinstance(p, list) and all(_is_number(c) for c in p) for p in polygons)
     if not flat or not polygons:
         raise MaskError("polygons: expected lists of numbers x1, y1, x2, y2, ...")
     return _ldls.Rle.from_polygons(*image_size, polygons)
 
 
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float) or type(as_python(value)) in (int, float)
+
+
 def _category(label: str, annotation: dict[str, Any], names: Mapping[int, str]) -> int:
-    category = annotation.get("category_id")
+    category = as_python(annotation.get("category_id"))
     if category == 0 and type(category) is int:
         raise MaskError(f"{label}: category_id is 0, which stands for background in results; number categories from 1")
     if type(category) is not int or category not in names:
@@ -242,7 +266,7 @@ def _scores(labels: list[str], annotations: list[dict[str, Any]]) -> list[float]
     if not any("score" in a for a in annotations):
         return [1.0] * len(annotations)
     for label, annotation in zip(labels, annotations, strict=True):
-        score = annotation.get("score")
-        if type(score) not in (int, float) or not 0 <= score <= 1:  # type: ignore[operator]
+        score = as_python(annotation.get("score"))
+        if type(score) not in (int, float) or not 0 <= score <= 1:
             raise MaskError(f"{label}: score is {score!r}, expected a number from 0 to 1")
     return [float(a["score"]) for a in annotations]

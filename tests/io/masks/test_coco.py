@@ -189,3 +189,41 @@ def test_annotations_whose_image_id_no_image_has_are_refused(lost, image_id):
 def test_annotations_without_image_id_belong_to_the_only_image(given):
     annotation = {"id": 1, "category_id": 1, "segmentation": RLE} | given
     assert len(ldls.InstanceMasks.from_coco(document(annotations=[annotation]))) == 1
+
+
+@pytest.mark.parametrize(
+    ("ids", "chosen", "found"),
+    [
+        pytest.param([4, 5], "5", 5, id="a number as text"),
+        pytest.param(["a", "b"], "b", "b", id="text"),
+        pytest.param(["4", "5"], "5", "5", id="text of digits"),
+        pytest.param([5, "5"], "5", "5", id="both"),
+        pytest.param([4, -5], "-5", -5, id="below 0"),
+    ],
+)
+@pytest.mark.parametrize("bare", [False, True], ids=["data set", "results"])
+def test_text_chooses_an_image_by_its_number(ids, chosen, found, bare):
+    annotation = document()["annotations"][0]
+    annotations = [annotation | {"image_id": each, "score": 1 if each == found else 0} for each in ids]
+    images = [{"id": each, "height": 4, "width": 5} for each in ids]
+    content = annotations if bare else document(annotations=annotations, images=images)
+    assert ldls.InstanceMasks.from_coco(content, image_id=chosen).scores.tolist() == [1]
+    with pytest.raises(ldls.MaskError, match="no image with id '6'"):
+        ldls.InstanceMasks.from_coco(content, image_id="6")
+
+
+def test_numbers_of_numpy_are_understood():
+    numpy_s = {"image_id": np.int64(1), "category_id": np.int64(1), "score": np.float64(0.5)}
+    triangle = {"segmentation": [list(np.array([0, 0, 4, 0, 0, 4], np.float32))]}
+    content = document(
+        images=[{"id": np.int32(1), "height": np.int64(4), "width": np.int64(5)}],
+        categories=[{"id": np.int64(1), "name": "person"}],
+        annotations=[document()["annotations"][0] | numpy_s | each for each in ({}, triangle)],
+    )
+    for each in (content, content["annotations"]):
+        masks = ldls.InstanceMasks.from_coco(each)
+        assert (masks.scores.tolist(), masks.categories.tolist()) == ([0.5, 0.5], [1, 1])
+        assert {type(key) for key in masks.names} == {int}
+    annotation = content["annotations"][0] | {"score": np.bool_(True)}
+    with pytest.raises(ldls.MaskError, match=r"score is .*True.*, expected a number"):
+        ldls.InstanceMasks.from_coco([annotation])

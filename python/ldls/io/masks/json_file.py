@@ -80,8 +80,9 @@ def parse(
         return InstanceMasks(**labelled_polygons.from_objects(content, names=names))
     if isinstance(content, dict) and panoptic_png.is_panoptic(content):
         return panoptic_png.read(path, content, image_id=image_id)
-    if _is_sam(_records(content)):
-        return InstanceMasks(**adapters.from_sam(_records(content), names=names, image_size=image_size))
+    if _is_sam(content):
+        size = coco.size_of_record(_sam_image(content) or {}, image_size)
+        return InstanceMasks(**adapters.from_sam(_records(content), names=names, image_size=size))
     return InstanceMasks(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
 
 
@@ -95,8 +96,17 @@ def _records(content: Any) -> list[Any]:  # noqa: ANN401
     return found if isinstance(found, list) else []
 
 
-def _is_sam(records: list[Any]) -> bool:
-    """True for records with a predicted IoU and no category."""
-    return bool(records) and all(
+def _is_sam(content: Any) -> bool:  # noqa: ANN401
+    """True for records with a predicted IoU and no category, or none beside the record of their one image."""
+    records = _records(content)
+    if not records:
+        return _sam_image(content) is not None and "annotations" in content
+    return all(
         isinstance(record, dict) and "predicted_iou" in record and "category_id" not in record for record in records
     )
+
+
+def _sam_image(content: Any) -> dict[str, Any] | None:  # noqa: ANN401
+    """The record of the one image, as SA-1B has it beside the annotations; COCO lists images."""
+    image = content.get("image") if isinstance(content, dict) and "images" not in content else None
+    return image if isinstance(image, dict) else None
