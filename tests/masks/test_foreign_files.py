@@ -1,6 +1,8 @@
 """Mask files of other programs, beside what their own documentation says of them."""
 
+import base64
 import functools
+import io
 import json
 import re
 
@@ -145,6 +147,49 @@ def test_rectangles_of_labelme_may_have_four_corners(tmp_path, kind):
     (tmp_path / "a.json").write_text(json.dumps(content))
     with pytest.raises(ldls.MaskError, match=f"shape 0: {kind} of 3 points, expected .* a rectangle of 2 or 4, or"):
         ldls.read_masks(tmp_path / "a.json")
+
+
+def labelme_mask(values=None, **changes):
+    """labelme's content of one shape of pixels: the square's upper left triangle, and a polygon of its group."""
+    file = io.BytesIO()
+    Image.fromarray(np.tril(np.ones((15, 20), np.uint8)) if values is None else values).save(file, "PNG")
+    text = base64.b64encode(file.getvalue()).decode()
+    shape = {"label": "car", "points": [[20.0, 15.0], [39.0, 29.0]], "shape_type": "mask", "mask": text, "group_id": 1}
+    return {"shapes": [shape | changes], "imageHeight": 60, "imageWidth": 80}
+
+
+def test_pixels_of_labelme(tmp_path):
+    content = labelme_mask()
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    expected = np.zeros_like(SQUARE)
+    expected[15:30, 20:40] = np.tril(np.ones((15, 20)))
+    np.testing.assert_array_equal(pixels(ldls.read_masks(tmp_path / "a.json")), [expected])
+    beside = {"label": "car", "points": [[50, 5], [60, 15]], "shape_type": "rectangle", "group_id": 1}
+    (tmp_path / "a.json").write_text(json.dumps(content | {"shapes": [*content["shapes"], beside]}))
+    expected[5:15, 50:60] = True
+    np.testing.assert_array_equal(pixels(ldls.read_masks(tmp_path / "a.json")), [expected])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        pytest.param({"mask": None}, "mask: got None, expected a PNG in base64", id="no pixels"),
+        pytest.param({"mask": "a b"}, "mask: got 'a b', expected a PNG in base64", id="no base64"),
+        pytest.param({"mask": "AAAA"}, "mask: not a whole image: begins with", id="no PNG"),
+        pytest.param({"mask": ""}, "mask: ", id="no byte"),
+        pytest.param({"points": [[20, 15]]}, r"mask of 15 x 20 pixels .* got \[\[20.0, 15.0\]\]", id="one point"),
+        pytest.param({"points": [[70, 15], [89, 29]]}, "mask of 15 x 20 .* in an image of 60 x 80", id="outside"),
+        pytest.param({"points": [[-1, 15], [18, 29]]}, "mask of 15 x 20 .* in an image of 60 x 80", id="before it"),
+        pytest.param({"points": [[20, 15], [30, 29]]}, "mask of 15 x 20 pixels", id="box of another size"),
+        pytest.param({"group_id": [1]}, r"group_id is \[1\], expected a number or text", id="group of a list"),
+        pytest.param({"group_id": {}}, r"group_id is {}, expected a number or text", id="group of an object"),
+    ],
+)
+def test_faults_of_labelme_are_named(tmp_path, changes, message):
+    (tmp_path / "a.json").write_text(json.dumps(labelme_mask(**changes)))
+    with pytest.raises((ldls.MaskError, ldls.CorruptFileError, ldls.UnsupportedFormatError)) as caught:
+        ldls.read_masks(tmp_path / "a.json")
+    assert re.search(rf"a\.json: shape 0: {message}", str(caught.value)), str(caught.value)
 
 
 def test_what_labelme_calls_no_object_is_none(tmp_path):

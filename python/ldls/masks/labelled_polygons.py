@@ -6,7 +6,8 @@ https://www.mapillary.com/dataset/vistas.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from base64 import b64decode
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,10 @@ from numpy.typing import NDArray
 
 import ldls._ldls as _ldls
 from ldls.categories import COCO_NAMES, category_ids, class_id, folded, is_object
-from ldls.checks import numbers
+from ldls.checks import numbers, shown
 from ldls.errors import MaskError, within
 from ldls.masks.coco import records
-from ldls.masks.pixels import checked_size, uncovered
+from ldls.masks.pixels import check_pixels, checked_size, uncovered
 
 CIRCLE_CORNERS = 64
 RECTANGLES = ("rectangle", "oriented_rectangle")
@@ -31,7 +32,12 @@ MAPILLARY_THINGS = ("animal", "human", "object")
 """What the labels of Mapillary's things begin with: object--vehicle--car."""
 
 
-def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:
+def from_shapes(
+    content: Mapping[str, Any],
+    *,
+    decode: Callable[[bytes], NDArray[np.uint8]],
+    names: Mapping[int, str] | None = None,
+) -> dict[str, Any]:
     """Arguments of `InstanceMasks` from labelme's JSON of one image, without shapes of what is no object.
 
     Shapes of one label that share a group_id are parts of one instance. Labels with the name of one of COCO's
@@ -40,27 +46,57 @@ def from_shapes(content: Mapping[str, Any], *, names: Mapping[int, str] | None =
 
     Args:
         content: The parsed JSON.
+        decode: What makes (h, w, 3) pixels of a PNG file, for shapes of pixels.
         names: Name of each category id, for labels that COCO does not know.
 
     Raises:
-        MaskError: A shape that covers nothing, such as a line, or whose points are none.
+        MaskError: A shape that covers nothing, such as a line, or whose points, group_id or pixels are none.
         CorruptFileError: It is not labelme's.
     """
     size = checked_size((content.get("imageHeight"), content.get("imageWidth")))
-    parts: dict[tuple[str, object], tuple[str, list[list[float]]]] = {}
+    parts: dict[tuple[str, object], tuple[str, _ldls.Rle]] = {}
     for i, shape in enumerate(records("shapes", content["shapes"])):
         label, group = str(shape.get("label")), shape.get("group_id")
         if not is_object(label):
             continue
         with within(f"shape {i}"):
+            if isinstance(group, list | dict):
+                raise MaskError(f"group_id is {shown(group)}, expected a number or text for the parts of one instance")
             own = (folded(label), ("alone", i) if group is None else group)
-            corners = _corners(shape.get("shape_type") or "polygon", _points("points", shape))
-            parts.setdefault(own, (label, []))[1].append(corners)
-    rles = []
-    for label, polygons in parts.values():
-        with within(f"shape {label!r}"):
-            rles.append(_ldls.Rle.from_polygons(*size, polygons))
-    return _arguments(size, [label for label, _ in parts.values()], rles, names)
+            rle = _drawn(shape, size, decode)
+            parts[own] = (parts[own][0], parts[own][1].union(rle)) if own in parts else (label, rle)
+    return _arguments(size, [label for label, _ in parts.values()], [rle for _, rle in parts.values()], names)
+
+
+def _drawn(shape: Mapping[str, Any], size: tuple[int, int], decode: Callable[[bytes], NDArray[np.uint8]]) -> _ldls.Rle:
+    """The pixels of a shape of labelme."""
+    kind, points = shape.get("shape_type") or "polygon", _points("points", shape)
+    if kind != "mask":
+        return _ldls.Rle.from_polygons(*size, [_corners(kind, points)])
+    with within("mask"):
+        try:
+            png = b64decode(shape.get("mask"), validate=True)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            found = shown(shape.get("mask"))
+            raise MaskError(f"got {found}, expected a PNG in base64, as labelme writes it") from None
+        pixels: NDArray[np.bool_] = decode(png).max(axis=2) > 0
+    return _placed(pixels, points, size)
+
+
+def _placed(pixels: NDArray[np.bool_], points: NDArray[np.float64], size: tuple[int, int]) -> _ldls.Rle:
+    """The `pixels` of the box whose first and last pixel are the two `points`, in an image of that size."""
+    height, width = pixels.shape
+    left, top = points[0].tolist() if len(points) == 2 else (-1.0, -1.0)
+    fits = 0 <= left <= size[1] - width and 0 <= top <= size[0] - height
+    if not fits or np.abs(points[1] - points[0] + 1 - (width, height)).max() > 1:
+        raise MaskError(
+            f"mask of {height} x {width} pixels (height x width), expected as points its first and last pixel in an "
+            f"image of {size[0]} x {size[1]}, x y each, got {points.tolist()}"
+        )
+    check_pixels(*size)
+    whole = np.zeros(size, np.bool_)
+    whole[int(top) : int(top) + height, int(left) : int(left) + width] = pixels
+    return _ldls.Rle.from_pixels(whole)
 
 
 def from_objects(content: Mapping[str, Any], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:

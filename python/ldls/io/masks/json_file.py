@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ldls.checks import as_python
 from ldls.io.files import MAX_TEXT_BYTES, open_file, whole_file
+from ldls.io.images import decode
 from ldls.io.masks import panoptic_png
 from ldls.masks import InstanceMasks, adapters, coco, labelled_polygons
 
@@ -75,7 +80,7 @@ def parse(
 ) -> InstanceMasks:
     """The masks of one image of the parsed `content` of the file `path`; arguments and errors as of `read`."""
     if isinstance(content, dict) and "shapes" in content:
-        return InstanceMasks(**labelled_polygons.from_shapes(content, names=names))
+        return InstanceMasks(**labelled_polygons.from_shapes(content, decode=_decoded, names=names))
     if isinstance(content, dict) and "objects" in content:
         return InstanceMasks(**labelled_polygons.from_objects(content, names=names))
     if isinstance(content, dict) and panoptic_png.is_panoptic(content):
@@ -84,6 +89,10 @@ def parse(
         size = coco.size_of_record(_sam_image(content) or {}, image_size)
         return InstanceMasks(**adapters.from_sam(_records(content), names=names, image_size=size))
     return InstanceMasks(**coco.arguments(content, image_id=image_id, image_size=image_size, names=names))
+
+
+def _decoded(png: bytes) -> NDArray[np.uint8]:
+    return decode(BytesIO(png), len(png))
 
 
 def refuse_constant(name: str) -> None:
