@@ -101,7 +101,7 @@ def segment(
     --out results
     """
     from ldls.io import read_image, read_points, save
-    from ldls.io.files import check_outputs
+    from ldls.io.files import check_outputs, make_folder
     from ldls.io.objects import FrameObjects, objects_writer
     from ldls.label_diffusion import segment as label_points
     from ldls.segmenters.registry import segmenter_file
@@ -140,7 +140,7 @@ def segment(
     if PICTURE in wanted and _is_photo(drawn, chosen.image_size):
         raise ParameterError(f"--out: would write over {drawn}, which seems to be the camera's image; give another")
     result = label_points(cloud, [View(chosen, seen_by, called)], params=replace(params, threads=cores))
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     if save_masks is not None:
         save(chosen, save_masks)
     written = write_formats(result, out, name, wanted, [pixels])

@@ -10,20 +10,30 @@ ONE = 2048
 """Sum of weights of whole numbers."""
 
 
+def bilinear_taps(
+    source: int, target: int, window: slice = slice(None)
+) -> tuple[NDArray[np.int64], NDArray[np.int64], F32]:
+    """Place each of `target` cells among `source` cells: the cell before, the one after, the share of the latter.
+
+    This is what `align_corners=False` means in PyTorch and `INTER_LINEAR` in OpenCV, without a filter against
+    aliasing. Only the cells of `window` are reckoned.
+    """
+    cells = np.arange(*window.indices(target))
+    place = np.clip((cells + 0.5) * (source / target) - 0.5, 0, source - 1)
+    before = place.astype(np.int64)
+    return before, np.minimum(before + 1, source - 1), (place - before).astype(np.float32)
+
+
 def bilinear_weights(source: int, target: int, window: slice = slice(None)) -> F32:
     """(target, source) weights: `weights @ values` are `values` (source, ...) resampled to `target` rows.
 
-    This is what `align_corners=False` means in PyTorch and `INTER_LINEAR` in OpenCV, without a filter against
-    aliasing. Only the rows of `window` are made.
+    Only the rows of `window` are made.
     """
-    targets = np.arange(*window.indices(target))
-    place = np.clip((targets + 0.5) * (source / target) - 0.5, 0, source - 1)
-    before = place.astype(np.int64)
-    share = (place - before).astype(np.float32)
+    before, after, share = bilinear_taps(source, target, window)
     weights = np.zeros((len(share), source), np.float32)
     rows = np.arange(len(share))
     weights[rows, before] = 1 - share
-    weights[rows, np.minimum(before + 1, source - 1)] += share
+    weights[rows, after] += share
     return weights
 
 
