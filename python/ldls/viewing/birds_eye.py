@@ -113,26 +113,30 @@ def _draw_rings(draw: ImageDraw.ImageDraw, ground: Ground, step_m: int) -> None:
 
 
 def _write_ranges(picture: Image.Image, ground: Ground, step_m: int, covered: NDArray[np.bool_]) -> list[Box]:
-    """Write the range of each ring ahead of the lidar, or aside where no object is, and return the places taken."""
-    written = []
+    """Write the ranges of rings in a line ahead of the lidar, or aside where fewer hide objects; the places taken."""
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(size=15)
-    for range_m in _ranges(ground, step_m):
-        text = f"{range_m} m"
-        places = ground.at(range_m * _bearings(ground.forward)).tolist()
-        boxes = [_box_around(draw.textbbox(place, text, font, anchor="mm")) for place in places]
-        if boxes[0][1] <= 0:
-            continue
-        free = (
-            i
-            for i, (left, top, right, bottom) in enumerate(boxes)
-            if 0 < left < right < picture.width and not covered[top:bottom, left:right].any()
-        )
-        chosen = next(free, 0)
-        draw.rectangle(boxes[chosen], PAPER)
-        draw.text(places[chosen], text, RANGES, font, anchor="mm")
-        written.append(boxes[chosen])
-    return written
+    texts = [f"{range_m} m" for range_m in _ranges(ground, step_m)]
+    lines = []
+    for bearing in _bearings(ground.forward):
+        places = ground.at(np.outer(_ranges(ground, step_m), bearing)).tolist()
+        around = (draw.textbbox(place, text, font, anchor="mm") for place, text in zip(places, texts, strict=True))
+        lines.append((places, [_box_around(each) for each in around]))
+    inside = [i for i, (_, top, _, _) in enumerate(lines[0][1]) if top > 0]
+
+    def n_hiding(boxes: list[Box]) -> int:
+        """How many of them lie on an object, or beside the picture."""
+        count = 0
+        for left, top, right, bottom in (boxes[i] for i in inside):
+            is_beside = left <= 0 or right >= picture.width
+            count += is_beside or bool(covered[max(top, 0) : bottom, left:right].any())
+        return count
+
+    places, boxes = min(lines, key=lambda line: n_hiding(line[1]))
+    for i in inside:
+        draw.rectangle(boxes[i], PAPER)
+        draw.text(places[i], texts[i], RANGES, font, anchor="mm")
+    return [boxes[i] for i in inside]
 
 
 def _bearings(forward: NDArray[np.float64]) -> NDArray[np.float64]:
