@@ -87,6 +87,16 @@ def test_ctrl_c_counts_the_frames_of_earlier_runs(few, tmp_path, monkeypatch):
     assert "labelling" not in outcome.stdout, "a speed of frames of earlier runs"
 
 
+def test_ctrl_c_before_the_frames_of_earlier_runs_are_counted_says_no_number(few, tmp_path, monkeypatch):
+    words = runs.arguments(few, tmp_path / "out")
+    assert command(*words).exit_code == 0
+    monkeypatch.setattr(FrameWork, "judge_earlier", interrupt)
+    outcome = command(*words)
+    assert outcome.exit_code == 130
+    said = "stopped: before it was known which frames are done; give the same command again to go on\n"
+    assert outcome.stderr == said
+
+
 def test_ctrl_c_while_tracks_are_made_says_that_the_frames_are_done(drive, tmp_path, monkeypatch):
     monkeypatch.setattr(RunTracks, "write", interrupt)
     outcome = command(*runs.arguments(drive, tmp_path / "out"), "--track", "--map", tmp_path / "map.ply")

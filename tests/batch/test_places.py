@@ -213,6 +213,16 @@ def test_odometry_begins_in_no_folder_of_other_settings(drive, tmp_path, monkeyp
     assert runs.contents(out) == before
 
 
+def test_odometry_that_fails_leaves_no_new_folder(drive, tmp_path, monkeypatch):
+    def fail(_):
+        raise InputError("the way is lost")
+
+    monkeypatch.setattr(found_poses, "odometry_of", fail)
+    with pytest.raises(InputError, match="the way is lost"):
+        batch.run(drive, tmp_path / "out", runs.stored(drive, sweeps=1, poses="kiss-icp"))
+    assert not (tmp_path / "out").exists()
+
+
 def test_found_poses_that_are_gone_are_found_again(drive, tmp_path, monkeypatch):
     out, settings = tmp_path / "out", runs.stored(drive, sweeps=1, poses="kiss-icp")
     layouts.write_text(tmp_path / "told.txt", drives.tum_poses(8))

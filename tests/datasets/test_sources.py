@@ -406,6 +406,25 @@ def test_the_template_describes_a_folder(tmp_path):
     assert frame.truth.counts()["car"] == 100
 
 
+def test_a_size_of_an_image_that_its_calibration_contradicts_is_refused(tmp_path):
+    pytest.importorskip("yaml", reason="the extra yaml is not installed")
+    layouts.write_points(tmp_path / "lidar/a.bin")
+    layouts.write_image(tmp_path / "front/a.png")
+    matrix = "K: [50, 0, 40, 0, 50, 30, 0, 0, 1]\nD: []\n"
+    layouts.write_text(tmp_path / "camera.yaml", f"image_width: 80\nimage_height: 60\n{matrix}")
+    lines = (
+        'points = "lidar/{frame}.bin"',
+        "[cameras.front]",
+        'images = "front/{frame}.png"',
+        'calibration = "camera.yaml"',
+        f"T_camera_lidar = {layouts.T.tolist()}",
+        "image_size = [30, 40]",
+    )
+    layouts.write_text(tmp_path / "ldls.toml", "\n".join(lines))
+    with pytest.raises(ldls.CalibrationError, match=r"cameras.front: image_size is \(30, 40\), .* says \(60, 80\)"):
+        open_source(tmp_path)[0]
+
+
 def without(*paths):
     def change(folder):
         for path in paths:

@@ -73,8 +73,8 @@ def test_polygons_may_end_at_the_lower_edge(tmp_path, text):
         pytest.param(" 0.31", " 0.75", id="score"),
         pytest.param(" 0.31 4", " 0.75 3", id="score and track"),
         pytest.param(" 0.5 0.5 0.31", " 0.75", id="a corner"),
-        pytest.param(" 0.5 0.5 0.5 0.6", "", id="upright line"),
-        pytest.param(" 0.5 0.5 0.5125 0.5166667", "", id="diagonal line"),
+        pytest.param(" 0.5 0.5 0.5 0.508", "", id="upright line"),
+        pytest.param(" 0.5 0.5 0.506 0.508", "", id="diagonal line"),
     ],
 )
 def test_instances_of_yolo_too_small_for_an_outline_have_no_pixel(tmp_path, tiny, behind):
@@ -82,6 +82,12 @@ def test_instances_of_yolo_too_small_for_an_outline_have_no_pixel(tmp_path, tiny
     masks = ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))
     np.testing.assert_array_equal(pixels(masks), [np.zeros_like(SQUARE), SQUARE])
     np.testing.assert_array_equal(masks.scores, np.float32([0.31 if "0.31" in tiny else 1, 0.75 if behind else 1]))
+
+
+@pytest.mark.parametrize("text", ["2 0.31", "2 0.5 0.6", "2 0.31 1\n2 0.5 2"], ids=["score", "corner", "tracked"])
+def test_a_file_of_yolo_may_have_no_other(tmp_path, text):
+    (tmp_path / "a.txt").write_text(text)
+    assert not np.any(pixels(ldls.read_masks(tmp_path / "a.txt", image_size=(60, 80))))
 
 
 def test_a_class_of_yolo_that_is_named_background_has_no_objects(tmp_path):
@@ -97,8 +103,8 @@ def test_a_class_of_yolo_that_is_named_background_has_no_objects(tmp_path):
         pytest.param("2 0.5 0.5 0.1 0.2", {}, r"line 1: a box, expected a polygon", id="boxes"),
         pytest.param("2 0.5 0.5 0.1 0.2 0.9 3\n", {}, r"line 1: a box, expected a polygon", id="boxes of tracks"),
         pytest.param(f"0 {YOLO}\n2 0.5 0.5 0.1 0.2", {}, r"line 2: a box, expected", id="a box among polygons"),
-        pytest.param("2 0.31", {}, "line 1: expected a class and x y of three", id="no corner at all"),
-        pytest.param("2 0.5 0.6", {}, "line 1: expected a class and x y of three", id="one corner"),
+        pytest.param(f"0 {YOLO}\n2 0.5 0.5 1 1", {}, r"line 2: a box, expected", id="the whole image among polygons"),
+        pytest.param("2 1.31", {}, "line 1: expected a class and x y of three", id="no share"),
         pytest.param(f"2 {YOLO} 2 2", {}, "as shares of the image from 0 to 1", id="score above 1"),
         pytest.param(f"2 {YOLO} 2\n2 {YOLO} 2", {}, "as shares of the image from 0 to 1", id="a track twice"),
         pytest.param(f"80 {YOLO}", {}, "class 80 has no name; pass names=", id="unknown class"),

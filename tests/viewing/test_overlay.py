@@ -12,7 +12,7 @@ import ldls
 from ldls.palette import BACKGROUND, instance_colours
 from ldls.viewing import birds_eye_view, comparison, masks_overlay, overlay
 from ldls.viewing.drawing import MARK
-from ldls.viewing.overlay import overlays_of
+from ldls.viewing.overlay import overlays_of, pixel_of
 from ldls.viewing.shown import Shown, images_of, names_of
 from ldls.viewing.tags import place_tags, shortened
 
@@ -75,6 +75,9 @@ def test_pictures_of_high_images_are_narrower(small_scene) -> None:
     result = ldls.segment(points, masks, camera)
     assert overlay(result).size == (144, 3600)
     assert comparison(result).height < 5000
+    ring = ldls.segment(points, [ldls.View(masks, camera, name) for name in "ab"])
+    assert overlay(ring).height < 4000
+    assert pixel_of(ring, overlay(ring).size[::-1], (10, 100))[0] == 0
 
 
 def test_background_points_leave_the_image_visible(small_scene) -> None:

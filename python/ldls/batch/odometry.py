@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,9 +37,10 @@ def with_odometry(source: Source, settings: RunSettings, folder: Path, of_source
         return settings
     path = folder / FOUND_POSES
     found = replace(settings, poses=str(path))
+    is_new = not folder.exists()
     make_folder(folder)
     # all that may refuse the folder comes before the work, and before the file
-    with only_run(folder):
+    with _removed_on_error(folder if is_new else None), only_run(folder):
         if holds_found_poses(folder):
             return found
         if os.path.lexists(path):
@@ -48,3 +51,15 @@ def with_odometry(source: Source, settings: RunSettings, folder: Path, of_source
         check_goes_on(folder, {"settings": found.record(), "source": of_source})
         tum.write(path, odometry_of(source), comment=FOUND)
     return found
+
+
+@contextmanager
+def _removed_on_error(folder: Path | None) -> Iterator[None]:
+    """Remove a folder, if it is given and empty, that was made for what fails."""
+    try:
+        yield
+    except BaseException:
+        if folder is not None:
+            with suppress(OSError):
+                folder.rmdir()
+        raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -137,12 +138,12 @@ def run(
     opened = open_for_run(source, settings, kind=dataset, **options)
     chosen = parse_frames(frames)
     say_own_masks(opened, masks, segmenter)
-    finished = failed = 0
+    counted: tuple[int, ...] | None = None
     with frame_progress("labelling", resumes=True) as show_progress:
 
         def on_progress(*counts: int) -> None:
-            nonlocal finished, failed
-            finished, failed, _ = counts
+            nonlocal counted
+            counted = counts
             show_progress(*counts)
 
         try:
@@ -161,13 +162,8 @@ def run(
                 on_progress=on_progress,
             )
         except KeyboardInterrupt:
-            failures = f", {failed:,} failed (failures.jsonl)" if failed else ""
-            total = len(opened.names[chosen])
-            done = f"{finished - failed:,} of {total:,} frames are done{failures}"
             of_all = {"tracks": track, "map": map_file, "bag": "bag" in settings.formats, "table of objects": objects}
-            if finished == total and any(of_all.values()):
-                asked = ", ".join(word for word, value in of_all.items() if value)
-                done += f", but not all that is made of them together ({asked})"
+            done = _done(counted, [word for word, value in of_all.items() if value])
             typer.echo(f"stopped: {done}; give the same command again to go on", err=True)
             raise typer.Exit(STOPPED) from None
     show(summary, out)
@@ -233,3 +229,13 @@ def stage_times(summary: Summary) -> Table:
     for stage, seconds in summary.seconds.items():
         table.add_row(stage, f"{seconds / n_frames * 1e3:.1f}")
     return table
+
+
+def _done(counted: tuple[int, ...] | None, of_all: Sequence[str]) -> str:
+    """How far an interrupted run came: frames finished, failed and wanted, and what is made of all of them."""
+    if counted is None:
+        return "before it was known which frames are done"
+    finished, failed, total = counted
+    failures = f", {failed:,} failed (failures.jsonl)" if failed else ""
+    lacks = f", but not all that is made of them together ({', '.join(of_all)})" if finished == total and of_all else ""
+    return f"{finished - failed:,} of {total:,} frames are done{failures}{lacks}"

@@ -166,9 +166,9 @@ def segment(
 def _is_photo(path: Path, image_size: tuple[int, int]) -> bool:
     """True for the image of the camera, which often has the name of the sweep; those of ldls have a width."""
     from ldls.io.images import read_image_size
-    from ldls.viewing.overlay import WIDTH_PX
+    from ldls.viewing.overlay import usual_width_px
 
     try:
-        return read_image_size(path) == image_size and image_size[1] != WIDTH_PX
+        return read_image_size(path) == image_size and image_size[1] != usual_width_px(*image_size)
     except (LdlsError, FileNotFoundError):
         return False

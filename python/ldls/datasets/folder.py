@@ -18,7 +18,7 @@ from ldls.datasets.file_source import FileSource, described_in, image_from_file
 from ldls.datasets.folder_description import FILE, TEMPLATE, read_description
 from ldls.datasets.frame import CameraImage
 from ldls.datasets.stored_masks import FRAME
-from ldls.errors import CorruptFileError, ParameterError, SourceError, UnsafePathError, within
+from ldls.errors import CalibrationError, CorruptFileError, ParameterError, SourceError, UnsafePathError, within
 from ldls.io import read_camera, read_masks
 from ldls.io.cameras.extrinsic_file import as_extrinsic
 from ldls.io.cameras.kitti import RAW_FILES
@@ -125,7 +125,14 @@ class FolderSource(FileSource):
         extrinsic = self._one(given, name) if isinstance(given, str) else given
         if each.calibration is not None:
             made = read_camera(self._one(each.calibration, name), T_camera_lidar=extrinsic, **each.options)
-            return replace(made, image_size=each.image_size) if made.image_size is None else made
+            if made.image_size is None:
+                return replace(made, image_size=each.image_size)
+            if each.image_size is not None and tuple(each.image_size) != made.image_size:
+                raise CalibrationError(
+                    f"{self._file}, cameras.{key}: image_size is {tuple(each.image_size)}, the calibration says "
+                    f"{made.image_size}; leave it out"
+                )
+            return made
         # the description has both where there is no file
         assert each.K is not None
         assert extrinsic is not None

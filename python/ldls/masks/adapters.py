@@ -65,7 +65,8 @@ def from_supervision(
     Args:
         detections: `mask` (N, H, W), `confidence` (N,) or None, `class_id` (N,) or None, and `data["class_name"]`,
             which does without class ids.
-        names: Name of each class id, where `data` does not say; a class without one is called by its number.
+        names: Name of each class id, where `data` does not say; a class without one is called by its number. Without
+            class ids it is what keeps the categories of names the same from image to image.
         image_size: (height, width) of the image in pixels; only needed where there may be no detection, and no array of
             masks that has the size.
 
@@ -189,7 +190,19 @@ def _in_image(rle: _ldls.Rle, size: tuple[int, int]) -> _ldls.Rle:
     """A mask of a network's padded input as one of the image (`scale_masks` of Ultralytics 8.4, and more than half)."""
     box = Letterbox.fit(size, (rle.height, rle.width))
     grid = rle.crop(box.top, box.left, *box.scaled_size)
-    return _ldls.Rle.from_pixels(upsample(grid.astype(np.float32), *size) > 0.5)
+    # all else is zero, and images are large
+    rows, columns = (_window(np.flatnonzero(grid.any(axis=1 - axis)), grid.shape[axis], size[axis]) for axis in (0, 1))
+    pixels = np.zeros(size, np.bool_)
+    pixels[rows, columns] = upsample(grid.astype(np.float32), size, (rows, columns)) > 0.5
+    return _ldls.Rle.from_pixels(pixels)
+
+
+def _window(cells: NDArray[np.int64], source: int, target: int) -> slice:
+    """Which of `target` cells depend on `cells`, in ascending order, of `source` that are resampled to as many."""
+    if not len(cells):
+        return slice(0)
+    scale = target / source
+    return slice(max(int((cells[0] - 1) * scale) - 1, 0), min(int((cells[-1] + 2) * scale) + 1, target))
 
 
 def _from_outline(index: int, outline: Any, size: tuple[int, int]) -> _ldls.Rle:  # noqa: ANN401

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -161,7 +162,8 @@ def chosen_image(
     known = list(images) or sorted({a["image_id"] for a in annotations if a.get("image_id") is not None}, key=str)
     if isinstance(image_id, str) and image_id not in known:
         # of a command line, where numbers are text too
-        image_id = {str(each): each for each in known}.get(image_id, image_id)
+        with suppress(ValueError):
+            image_id = int(image_id) if int(image_id) in known else image_id
     if image_id is not None and known and image_id not in known:
         raise MaskError(f"no image with id {image_id!r}; found {known[:10]}")
     if image_id is None and len(known) > 1:

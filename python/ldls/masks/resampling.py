@@ -37,10 +37,10 @@ def bilinear_weights(source: int, target: int, window: slice = slice(None)) -> F
     return weights
 
 
-def upsample(grid: F32, height: int, width: int) -> F32:
-    """A grid (h, w) resampled to (height, width)."""
-    above, below, down = bilinear_taps(grid.shape[0], height)
-    left, right, across = bilinear_taps(grid.shape[1], width)
+def upsample(grid: F32, size: tuple[int, int], window: tuple[slice, slice]) -> F32:
+    """A grid (h, w) resampled to the (height, width) of `size`; only rows and columns of `window` are made."""
+    above, below, down = bilinear_taps(grid.shape[0], size[0], window[0])
+    left, right, across = bilinear_taps(grid.shape[1], size[1], window[1])
     columns = grid[:, left] * (1 - across) + grid[:, right] * across
     return np.asarray(columns[above] * (1 - down)[:, None] + columns[below] * down[:, None], np.float32)
 

@@ -56,7 +56,7 @@ def _overlays(pair: Sequence[Shown], images: Sequence[NDArray[np.uint8]], captio
     tiles = [
         tile
         for seen, image in of_cameras
-        for tile in overlays_of(pair, seen, image, min(each_px, usual_width_px(image)))
+        for tile in overlays_of(pair, seen, image, min(each_px, usual_width_px(*image.shape[:2])))
     ]
     return grid(tiles, captions, columns=1 if stacked else 2)
 

@@ -40,8 +40,8 @@ def overlay(
         images: (H, W, 3) uint8 RGB image, or one of Pillow's; for several cameras a list of one for each, None where
             there is none. Without an image masks and points stand on a dark one.
         stage: Labels to show: "direct" projection, "diffused", or "final" after outlier removal.
-        width_px: Width of the picture of each image; by default 1800 pixels, less for one that would be higher than
-            3600, or half of it where there are several, which then stand two by two.
+        width_px: Width of the picture of each image; by default 1800 pixels, or half of it where there are several,
+            which then stand two by two; less where one would be higher than 3600.
 
     Raises:
         InputError: There is no camera, there are more or fewer images than cameras, or one has not the size of the
@@ -52,9 +52,10 @@ def overlay(
         raise ParameterError(f"width_px: got {width_px}, expected 1 or more")
     shown, each = Shown.of(result, stage), images_of(result, images)
     if len(each) == 1:
-        return overlays_of([shown], result.views[0], each[0], width_px or usual_width_px(each[0]))[0]
+        return overlays_of([shown], result.views[0], each[0], width_px or usual_width_px(*each[0].shape[:2]))[0]
     pairs = zip(result.views, each, strict=True)
-    tiles = [overlays_of([shown], seen, image, width_px or half(WIDTH_PX))[0] for seen, image in pairs]
+    each_px = width_px or min(half(WIDTH_PX), *(usual_width_px(*image.shape[:2]) for image in each))
+    tiles = [overlays_of([shown], seen, image, each_px)[0] for seen, image in pairs]
     return grid(tiles, camera_names(result.views), columns=2)
 
 
@@ -94,16 +95,15 @@ def masks_overlay(masks: InstanceMasks, image: AnImage | None = None) -> Image.I
     colours = as_tuples(instance_colours(masks.categories.tolist()))
     names = [numbered(mask.name, label) for label, mask in enumerate(masks, start=1)]
     pixels = image_like(image, masks.image_size)
-    scale = usual_width_px(pixels) / pixels.shape[1]
+    scale = usual_width_px(*pixels.shape[:2]) / pixels.shape[1]
     picture, covered = _with_masks(pixels, masks, colours, scale)
     draw_tags(picture, _tags(masks, colours, names, scale), covered, _pen_px(picture))
     return picture
 
 
-def usual_width_px(image: NDArray[np.uint8]) -> int:
-    """Width of the picture of an image alone."""
-    height, width = image.shape[:2]
-    return int(max(min(WIDTH_PX, MOST_HEIGHT_PX * width // height), 1))
+def usual_width_px(height: int, width: int) -> int:
+    """Width of the picture of an image alone, of its height and width."""
+    return max(min(WIDTH_PX, MOST_HEIGHT_PX * width // height), 1)
 
 
 def overlays_of(each: Sequence[Shown], seen: SeenView, image: NDArray[np.uint8], width_px: int) -> list[Image.Image]:

@@ -23,6 +23,11 @@ FILES = [
     pytest.param("a.json", json.dumps(PARTS), id="JSON"),
     pytest.param("a.json", json.dumps({"T_lidar_camera": BACK.tolist()}), id="the matrix back"),
     pytest.param(
+        "a.json",
+        json.dumps({"K": [], "comment": "", "T_lidar_camera": BACK.tolist(), "T_camera_lidar": T.tolist()}),
+        id="both matrices, a camera and a comment",
+    ),
+    pytest.param(
         "a.yaml", "".join(f"{key}: {json.dumps(value)}\n" for key, value in ROS.items()), id="YAML, as ROS names them"
     ),
     pytest.param(
@@ -58,7 +63,9 @@ def test_a_transform_is_read_from_a_file(tmp_path, name, text):
             "a.json", json.dumps(PARTS | {"quat": 1}), "unknown key 'quat', expected T_camera_lidar", id="key"
         ),
         pytest.param("a.json", json.dumps({"T_lidar_camera": BACK.tolist(), "optical": False}),
-                     "found T_lidar_camera and 'optical' beside it; give the matrix alone", id="matrix and part"),
+                     "found optical beside a matrix; leave one of them out", id="matrix and part"),
+        pytest.param("a.json", json.dumps({"T_lidar_camera": T.tolist(), "T_camera_lidar": T.tolist()}),
+                     "T_camera_lidar and T_lidar_camera contradict each other", id="two matrices"),
         pytest.param("a.json", json.dumps({"R": 1}), "unknown key 'R'.*; name the parts, as translation: ", id="none"),
         pytest.param("a.json", '{"pose_of": "camera"}', "'translation' missing; .*; name the parts, as", id="no part"),
         pytest.param("a.json", json.dumps(ROS | {"translation": {"a": 1}}),

@@ -199,6 +199,7 @@ def test_annotations_without_image_id_belong_to_the_only_image(given):
         pytest.param(["4", "5"], "5", "5", id="text of digits"),
         pytest.param([5, "5"], "5", "5", id="both"),
         pytest.param([4, -5], "-5", -5, id="below 0"),
+        pytest.param([4, 7], "007", 7, id="zeros before it"),
     ],
 )
 @pytest.mark.parametrize("bare", [False, True], ids=["data set", "results"])

@@ -29,6 +29,8 @@ AXES = {"translation": "xyz", "quaternion_wxyz": "wxyz", "quaternion_xyzw": "xyz
 """Names of the numbers of parts, in their order."""
 EXAMPLE = "name the parts, as translation: [0.1, 0.0, -0.2], quaternion_xyzw: [0.0, 0.0, 0.0, 1.0], pose_of: camera"
 MATRICES = ("T_camera_lidar", "T_lidar_camera")
+SAME = 1e-3
+"""Largest difference between numbers of two matrices of one transform, which may be rounded."""
 
 Extrinsic = ArrayLike | str | PathLike[str] | Mapping[str, Any]
 """A (4, 4) `T_camera_lidar`, a file of it, or a table of its parts."""
@@ -98,14 +100,17 @@ def _from_numbers(place: str, numbers: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def _from_table(fields: Fields) -> NDArray[np.float64]:
-    for name in MATRICES:
-        if fields.find(name) is None:
-            continue
-        others = [str(key) for key in fields.entries if key != name]
-        if others:
-            raise CalibrationError(f"{fields.place}: found {name} and {others[0]!r} beside it; give the matrix alone")
-        matrix = rigid(f"{fields.place}: {name}", fields.matrix((4, 4), name))
-        return inverse(matrix) if name == "T_lidar_camera" else matrix
+    matrices = [_matrix(fields, name) for name in MATRICES if fields.find(name) is not None]
+    if matrices:
+        # a camera, a comment or names of frames may stand beside it
+        part = next((name for name in PARTS if fields.find(name) is not None), None)
+        if part is not None:
+            raise CalibrationError(f"{fields.place}: found {part} beside a matrix; leave one of them out")
+        if not np.allclose(matrices[0], matrices[-1], rtol=0, atol=SAME):
+            raise CalibrationError(
+                f"{fields.place}: {' and '.join(MATRICES)} contradict each other; leave one of them out"
+            )
+        return matrices[0]
     unknown = [str(key) for key in fields.entries if key not in PARTS]
     if unknown:
         raise CalibrationError(
@@ -128,6 +133,11 @@ def _from_table(fields: Fields) -> NDArray[np.float64]:
         # YAML takes 1e-05 for text, which `numbers` knows
         parts: dict[str, Any] = {name: v if name in WORDS else listed.numbers(name) for name, v in entries.items()}
         return extrinsic(**parts)
+
+
+def _matrix(fields: Fields, name: str) -> NDArray[np.float64]:
+    matrix = rigid(f"{fields.place}: {name}", fields.matrix((4, 4), name))
+    return inverse(matrix) if name == "T_lidar_camera" else matrix
 
 
 def _in_order(name: str, value: object) -> object:

@@ -28,6 +28,10 @@ CLASSES, DATA = "classes.txt", "data.yaml"
 """Files of class names: of labelling tools, a line each, and of ultralytics."""
 NUMBER = re.compile(r"[-+]?\d+(\.\d*)?")
 """The class of a line, as it is or as it may have become."""
+FAR = 0.1
+"""Share of the image from which on a corner does not go on where the last one was."""
+LONGEST_LINE = 0.01
+"""Share of the image up to which two corners are taken for an outline."""
 STRAIGHT_PX = 0.05
 """How far two corners may be from a line of pixels, across, down or diagonal, by the rounding of what is written."""
 CONTIGUOUS_NAMES = {index: COCO_NAMES[category] for index, category in enumerate(CONTIGUOUS_IDS)}
@@ -42,7 +46,8 @@ def is_yolo(lines: Sequence[str]) -> bool:
 def read(path: str | PathLike[str], *, image_size: tuple[int, int], names: Mapping[int, str] | None) -> InstanceMasks:
     """One mask for each line, but none for those of a class that is named background.
 
-    Among polygons a line of fewer than three corners is an instance without a pixel: it is too small for an outline.
+    A line without a corner, or with one, and among polygons one with two that lie close together, is an instance
+    without a pixel: it is too small for an outline.
 
     Args:
         path: `.txt` file.
@@ -147,10 +152,12 @@ def _are_tracked(lines: Sequence[Line]) -> bool:
 
 
 def _warn_of_a_track(line: Line) -> None:
-    """Warn of a last corner at the lower edge of the image that nothing else touches."""
+    """Warn of a last corner far from its neighbours, at the lower edge of the image, that nothing else touches."""
     corners, _ = line.outline(tracked=False)
     # a score before a 1 is a score, whatever the 1 is
     if len(line.words) % 2 or len(corners) < 3 or (corners[:-1, 1] > 0.999).any():
+        return
+    if np.abs(corners[[0, -2]] - corners[-1]).max(axis=1).min() < FAR:
         return
     pair = " ".join(line.words[-2:])
     warnings.warn(
@@ -162,13 +169,13 @@ def _warn_of_a_track(line: Line) -> None:
 
 
 def _check_outline(place: str, corners: NDArray[np.float64], score: float, image_size: tuple[int, int] | None) -> None:
-    """Refuse boxes, and what are no shares; with the `image_size` of a file of polygons fewer corners may be there."""
-    if len(corners) == 2 and (image_size is None or not _is_line_of_pixels(corners * image_size[::-1])):
+    """Refuse boxes, and what are no shares; with the `image_size` of a file of polygons two corners may be a line."""
+    if len(corners) == 2 and (image_size is None or not _is_line_of_pixels(corners, image_size)):
         raise MaskError(
             f"{place}: a box, expected a polygon of three corners or more; segment with a -seg model, or pass the "
             "boxes to InstanceMasks.from_boxes"
         )
-    if (image_size is None and len(corners) < 3) or not _are_shares(np.append(corners, score)):
+    if not _are_shares(np.append(corners, score)):
         raise CorruptFileError(
             f"{place}: expected a class and x y of three corners or more, as shares of the image from 0 to 1"
         )
@@ -178,10 +185,11 @@ def _are_shares(numbers: NDArray[np.float64]) -> bool:
     return bool(((numbers >= -1e-6) & (numbers <= 1 + 1e-6)).all())
 
 
-def _is_line_of_pixels(corners_px: NDArray[np.float64]) -> bool:
-    """True for two corners (2, 2) that an outline may be all of; those of a box are its centre and its sides."""
-    across, down = np.abs(corners_px[1] - corners_px[0])
-    return bool(min(across, down, abs(across - down)) < STRAIGHT_PX)
+def _is_line_of_pixels(corners: NDArray[np.float64], image_size: tuple[int, int]) -> bool:
+    """True for two corners (2, 2) that may be a whole outline; those of a box are its centre and its sides."""
+    apart = np.abs(corners[1] - corners[0])
+    across, down = apart * image_size[::-1]
+    return bool(apart.max() <= LONGEST_LINE and min(across, down, abs(across - down)) < STRAIGHT_PX)
 
 
 def _pixels(corners: NDArray[np.float64], image_size: tuple[int, int]) -> _ldls.Rle:

@@ -14,9 +14,8 @@ ANSWER_S = 1.0
 
 def has_display() -> bool:
     """Return True if a window can be opened: on macOS and Windows always, on Linux where X or Wayland is named."""
-    if sys.platform in ("darwin", "win32"):
-        return True
-    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    named = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return named or sys.platform in ("darwin", "win32")
 
 
 def is_open() -> bool:
