@@ -39,7 +39,8 @@ class Distortion:
             sensor's angles tx ty in radians; or k1 k2 k3 k4 of the fisheye.
 
     Raises:
-        CalibrationError: The model is unknown, or has another number of coefficients, or one is not finite.
+        CalibrationError: The model is unknown, or has another number of coefficients, or one is not finite, or that of
+            "none" not 0.
     """
 
     model: str = "none"

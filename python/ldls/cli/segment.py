@@ -164,7 +164,10 @@ def segment(
 
 
 def _is_photo(path: Path, image_size: tuple[int, int]) -> bool:
-    """True for the image of the camera, which often has the name of the sweep; those of ldls have a width."""
+    """True for what is the camera's image by its (height, width), and by its width no picture of `overlay`.
+
+    It often has the name of the sweep, which the picture would have too.
+    """
     from ldls.io.images import read_image_size
     from ldls.viewing.overlay import usual_width_px
 

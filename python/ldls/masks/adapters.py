@@ -187,7 +187,10 @@ def _ultralytics_rles(masks: Any, size: tuple[int, int]) -> list[_ldls.Rle]:  # 
 
 
 def _in_image(rle: _ldls.Rle, size: tuple[int, int]) -> _ldls.Rle:
-    """A mask of a network's padded input as one of the image (`scale_masks` of Ultralytics 8.4, and more than half)."""
+    """A mask of a network's padded input as one of the image of (height, width) `size`.
+
+    As `scale_masks` of Ultralytics 8.4, and a pixel is in it that is by more than half.
+    """
     box = Letterbox.fit(size, (rle.height, rle.width))
     grid = rle.crop(box.top, box.left, *box.scaled_size)
     # all else is zero, and images are large
