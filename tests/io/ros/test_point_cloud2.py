@@ -187,6 +187,12 @@ def test_what_makes_no_sense_is_refused(broken, error, match):
         decode(broken).points()
 
 
+def test_padding_that_pcl_names_underscore_is_no_field():
+    padded = changed()
+    padded.fields += [SimpleNamespace(name="_", offset=0, datatype=2, count=4)] * 2
+    assert decode(padded).fields.dtype == decode(changed()).fields.dtype
+
+
 def test_columns_must_fit_together():
     types = standard_types(ros2=True)
     with pytest.raises(InputError, match="one length"):

@@ -19,6 +19,8 @@ DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "
 POSITION = ("x", "y", "z")
 READ_FIELDS = (*POSITION, "intensity")
 """Columns of `PointCloud.points`, in this order."""
+PADDING = "_"
+"""What the Point Cloud Library calls the bytes between fields that hold nothing, however often there are some."""
 RELATIVE_TIMES = ("time", "t", "offset_time", "time_offset")
 """Fields with the times of points after the header's stamp: seconds if they are real numbers, else nanoseconds."""
 ABSOLUTE_TIMES = "timestamp"
@@ -33,7 +35,8 @@ class PointCloud:
 
     Attributes:
         header: Time and frame of the measurement.
-        fields: (N,) structured array with every field of the message under its name, in this machine's byte order.
+        fields: (N,) structured array with every field of the message under its name, but for padding, in this machine's
+            byte order.
     """
 
     header: Header
@@ -130,13 +133,14 @@ def decode(message: Message) -> PointCloud:
 
 def _layout(message: Message) -> np.dtype[np.void]:
     order = ">" if message.is_bigendian else "<"
-    names = [field.name for field in message.fields]
+    fields = [field for field in message.fields if field.name != PADDING]
+    names = [field.name for field in fields]
     if len(set(names)) != len(names):
         raise CorruptFileError(f"points: fields {', '.join(names)}, expected each name once")
     if message.point_step > MAX_POINT_BYTES:
         raise CorruptFileError(f"points: {message.point_step} bytes a point, expected at most {MAX_POINT_BYTES}")
-    formats = [_format(field, order, message.point_step) for field in message.fields]
-    offsets = [field.offset for field in message.fields]
+    formats = [_format(field, order, message.point_step) for field in fields]
+    offsets = [field.offset for field in fields]
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": message.point_step})
 
 
