@@ -87,6 +87,12 @@ def test_doubles_stay_doubles_and_intensity_may_miss(tmp_path):
     assert points.dtype == np.float64
 
 
+def test_digits_of_text_that_single_precision_loses_are_kept(tmp_path):
+    content = header("ascii", 1, [f"float {name}" for name in "xyz"]) + b"500000.123456 5000000.654321 1\n"
+    points = ldls.read_points(write(tmp_path, content))
+    np.testing.assert_array_equal(points, [[500000.123456, 5000000.654321, 1]])
+
+
 def test_a_file_of_results_reads_back(small_scene, tmp_path):
     points, masks, camera = small_scene
     ldls.save(ldls.segment(points, masks, camera), tmp_path / "a.ply")

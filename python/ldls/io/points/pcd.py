@@ -18,7 +18,7 @@ from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatE
 from ldls.io.files import MAX_POINT_BYTES, open_file, whole_file
 from ldls.io.labelled_points import Labelled, instances, packed_colors, positions
 from ldls.io.points.named_columns import NamedColumns
-from ldls.io.points.text_rows import Row, as_text, of_kind, read_rows, split_header, text_rows, whole_number
+from ldls.io.points.text_rows import Row, as_text, of_kinds, read_rows, split_header, text_rows, whole_number
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 TYPES = {
@@ -27,8 +27,6 @@ TYPES = {
 }  # fmt: skip
 COUNTS = ("POINTS", "WIDTH", "HEIGHT")
 PAGE_BYTES = 4096
-MOST_LOST_M = 5e-4
-"""What coordinates in text may lose in single precision; UTM's lose more, and are kept in doubles."""
 LZF_RATIO = 88
 """No stream of LZF unpacks to more than this many times its size: three bytes stand for at most 264."""
 
@@ -100,16 +98,7 @@ def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines
     positions = [int(first_cells[position]) for position in columns.positions]
     cells = read_rows(rows, positions, int(first_cells[-1]), delimiter)
     fields = [header.fields[position] for position in columns.positions]
-    stacked = [of_kind(f.name, column, f.kind) for f, column in zip(fields, cells.T, strict=True)]
-    if any(_lost_m(cells[:, axis], stacked[axis]) > MOST_LOST_M for axis in range(3)):
-        stacked[:3] = cells.T[:3]
-    return columns.stack(stacked)
-
-
-def _lost_m(written: NDArray[np.float64], kept: NDArray[np.number]) -> float:
-    """What a column of text loses in the type that the header gives it."""
-    finite = np.isfinite(written) & np.isfinite(kept)
-    return float(np.abs(written[finite] - kept[finite]).max(initial=0))
+    return columns.stack(of_kinds([field.name for field in fields], cells, [field.kind for field in fields]))
 
 
 def _without_padding(header: Header, body: bytes, n_header_bytes: int) -> bytes:

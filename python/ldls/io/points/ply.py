@@ -17,7 +17,7 @@ from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatE
 from ldls.io.files import open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances, positions
 from ldls.io.points.named_columns import NamedColumns
-from ldls.io.points.text_rows import Row, as_text, is_number, of_kind, read_rows, split_header, text_rows, whole_number
+from ldls.io.points.text_rows import Row, as_text, is_number, of_kinds, read_rows, split_header, text_rows, whole_number
 
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 TYPES = {
@@ -54,7 +54,9 @@ class Header:
 
 
 def read(path: Path) -> Points:
-    """(N, 3 or 4) points: x y z and, where there is one, intensity of the vertices; float32 unless doubles.
+    """(N, 3 or 4) points: x y z and, where there is one, intensity of the vertices; float32 unless more is needed.
+
+    Doubles need more, and text with digits that single precision loses.
 
     Raises:
         TruncatedFileError: The file ends before the vertices that the header says, or, in ascii, with the last number
@@ -138,7 +140,7 @@ def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines
     _refuse_more_lines(header, rows, start + count)
     cells = read_rows(rows[start : start + count], columns.positions, len(vertex.properties))
     names, kinds = ([each[position] for position in columns.positions] for each in (vertex.properties, vertex.types))
-    return columns.stack([of_kind(*each) for each in zip(names, cells.T, map(np.dtype, kinds), strict=True)])
+    return columns.stack(of_kinds(names, cells, [np.dtype(kind) for kind in kinds]))
 
 
 def _parse(lines: list[Row]) -> Header:

@@ -20,6 +20,8 @@ MAX_HEADER_BYTES = 1 << 16
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENTS = ("#", "//")
 DIGIT = re.compile("[0-9]")
+MOST_LOST_M = 5e-4
+"""What coordinates in text may lose in single precision; UTM's lose more, and are kept in doubles."""
 
 
 def split_header(content: bytes, last: str) -> tuple[list[Row], bytes]:
@@ -117,12 +119,28 @@ def read_rows(
     return numbers
 
 
-def of_kind(name: str, column: NDArray[np.float64], kind: np.dtype[np.number]) -> NDArray[np.number]:
-    """The numbers of a column of text in the type that the header gives it.
+def of_kinds(
+    names: Sequence[str], cells: NDArray[np.float64], kinds: Sequence[np.dtype[np.number]]
+) -> list[NDArray[np.number]]:
+    """The columns of text, x y z first, in the types that the header gives them.
+
+    Coordinates of which these lose digits stay in doubles.
 
     Raises:
-        CorruptFileError: The type is one of whole numbers, and one of them is none or too large for it.
+        CorruptFileError: A type is one of whole numbers, and a number is none or too large for it.
     """
+    columns = [_of_kind(*each) for each in zip(names, cells.T, kinds, strict=True)]
+    if any(_lost_m(cells[:, axis], columns[axis]) > MOST_LOST_M for axis in range(3)):
+        columns[:3] = cells.T[:3]
+    return columns
+
+
+def _lost_m(written: NDArray[np.float64], kept: NDArray[np.number]) -> float:
+    finite = np.isfinite(written) & np.isfinite(kept)
+    return float(np.abs(written[finite] - kept[finite]).max(initial=0))
+
+
+def _of_kind(name: str, column: NDArray[np.float64], kind: np.dtype[np.number]) -> NDArray[np.number]:
     if kind.kind == "f":
         with np.errstate(over="ignore"):  # too large a number is an infinite one, as for any reader
             return column.astype(kind)
