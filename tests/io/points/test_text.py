@@ -22,6 +22,8 @@ ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
         pytest.param("x,y,z\n1.5,-2,3e-3\n4,5,6\n", ROWS, id="header"),
         pytest.param("//X Y Z\n1.5 -2 3e-3\n4 5 6\n", ROWS, id="header of CloudCompare"),
         pytest.param("# x y z\n1.5 -2 3e-3\n4 5 6\n", ROWS, id="header behind a comment sign"),
+        pytest.param("# by hand\n\n# z y x\n3e-3 -2 1.5\n6 5 4\n", ROWS, id="header behind another comment"),
+        pytest.param("// by hand\nz,y,x\n3e-3,-2,1.5\n6,5,4\n", ROWS, id="header below a comment"),
         pytest.param("name;Z;Y;X\ncar;3e-3;-2;1.5\n;6;5;4\n", ROWS, id="header in another order"),
         pytest.param('"x","y","z"\n"1.5","-2","3e-3"\n4,5,6\n', ROWS, id="quotes"),
         pytest.param("intensity x y z ring\n9 1 2 3 7\n", [[1, 2, 3, 9]], id="intensity comes fourth"),
@@ -85,6 +87,7 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
         pytest.param(
             "x [m],y [m],z [m]\n1,2,3\n", ldls.CorruptFileError, r"column x is missing; found x \[m\] y", id="units"
         ),
+        pytest.param("# by hand\na b c\n1 2 3\n", ldls.CorruptFileError, "line 2: column x is missing", id="below"),
         pytest.param("x_m y_m z_m\n1 2 3\n", ldls.CorruptFileError, "column x is missing; found x_m y_m", id="names"),
         pytest.param("x y z X\n", ldls.CorruptFileError, "column x is there 2 times", id="name twice"),
         pytest.param("# nothing\n", ldls.TruncatedFileError, "only comments", id="comments"),

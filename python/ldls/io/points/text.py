@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,9 @@ DELIMITERS = (";", "\t", ",")
 def read(path: Path) -> NDArray[np.float64]:
     """(N, >= 3) float64 points of a text file, in its own units.
 
-    A first line with the names x, y and z, behind a comment sign or not, says which columns are meant; without one all
-    columns are taken as they stand, x y z first, up to three that are colours (whole numbers to 255) or normals. Other
-    lines that begin with # or // are comments.
+    A line with the names x, y and z before the numbers, behind a comment sign or not, says which columns are meant;
+    without one all columns are taken as they stand, x y z first, up to three that are colours (whole numbers to 255) or
+    normals. Other lines that begin with # or // are comments.
 
     Raises:
         TruncatedFileError: The file is empty, its last line has too few cells, or it ends with its last number, without
@@ -39,12 +40,19 @@ def _parse(text: str) -> NDArray[np.float64]:
     rows = text_rows(text)
     if not rows:
         raise TruncatedFileError("empty, expected a line x y z for each point")
-    names = _names(rows[0][1])
-    rows = [row for row in rows[names is not None :] if not row[1].lstrip().startswith(COMMENTS)]
+    # comments may stand above the names, which may be one themselves
+    n_comments = sum(1 for _ in takewhile(_is_comment, rows))
+    named = ((number, _names(line)) for number, line in rows[: n_comments + 1])
+    number, names = next((each for each in named if each[1] is not None), (0, None))
+    rows = [row for row in rows if row[0] > number and not _is_comment(row)]
     if names is None:
         return _parse_nameless(rows)
     delimiter = _delimiter(rows[0][1]) if rows else None
-    return read_rows(rows, NamedColumns.find("line 1", names).positions, len(names), delimiter)
+    return read_rows(rows, NamedColumns.find(f"line {number}", names).positions, len(names), delimiter)
+
+
+def _is_comment(row: Row) -> bool:
+    return row[1].lstrip().startswith(COMMENTS)
 
 
 def _names(line: str) -> list[str] | None:
