@@ -29,6 +29,7 @@ ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
         pytest.param("intensity x y z ring\n9 1 2 3 7\n", [[1, 2, 3, 9]], id="intensity comes fourth"),
         pytest.param("1 2 3 0.5 7\n", [[1, 2, 3, 0.5, 7]], id="more columns without names"),
         pytest.param("x,y,z\n1.5,-2,3e-3,\n4,5,6\n", ROWS, id="a comma behind the last cell"),
+        pytest.param("1.5\t-2\t3e-3\t\n4\t5\t6\t\n", ROWS, id="a tab behind the last cell without names"),
         pytest.param("x y z i\n1 2 3 0.5 parked car\n", [[1, 2, 3, 0.5]], id="more cells of text"),
         pytest.param("1 2 3\n4 5 6 parked car\n", [[1, 2, 3], [4, 5, 6]], id="more cells of text without names"),
         pytest.param("x,y,z,name\n1.0,2.0,3.0,hello, world\n", [[1, 2, 3]], id="a comma in text"),

@@ -71,7 +71,8 @@ def _parse_nameless(rows: list[Row]) -> NDArray[np.float64]:
         raise TruncatedFileError("only comments, expected a line x y z for each point")
     number, first = rows[0]
     delimiter = _delimiter(first)
-    n_columns = len(first.split(delimiter))
+    # some writers put one behind each number
+    n_columns = len(first.strip().rstrip(delimiter).split(delimiter))
     if n_columns < 3:
         raise CorruptFileError(f"line {number}: expected x y z or their names, got {first.strip()[:80]!r}")
     if n_columns > MAX_COLUMNS:
