@@ -1,5 +1,6 @@
 """`ldls demo`: without the extra `sim` on its sample, with it on any seed."""
 
+import shlex
 import sys
 
 import pytest
@@ -31,3 +32,11 @@ def test_a_seed_is_another_street(demo, tmp_path):
     direct, method = (float(cell) for cell in mean.replace("│", " ").split()[1:3])
     assert method > direct + 10
     assert (tmp_path / "demo.png").read_bytes() != (demo[0] / "demo.png").read_bytes()
+
+
+def test_the_command_for_its_files_can_be_pasted(tmp_path):
+    outcome = command("demo", "--out", tmp_path / "two words")
+    (line,) = (line for line in outcome.output.splitlines() if line.startswith("the same from files: ldls "))
+    outcome = command(*shlex.split(line.partition("ldls ")[2]))
+    assert outcome.exit_code == 0, outcome.output
+    assert (tmp_path / "two words/from-files").is_dir()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -110,10 +111,14 @@ def write_inputs(out: Path, points: Points, image: CameraImage, rgb: NDArray[np.
     save(image.masks, folder / "masks.npz")
     save_picture(folder / "image.png", Image.fromarray(rgb))
     write_lines(folder / "calib.txt", calibration_lines(image.camera))
-    return (
-        f"ldls segment --points {folder / 'points.bin'} --calib {folder / 'calib.txt'} "
-        f"--masks {folder / 'masks.npz'} --image {folder / 'image.png'} --out {out / 'from-files'}"
-    )
+    files = {
+        "points": folder / "points.bin",
+        "calib": folder / "calib.txt",
+        "masks": folder / "masks.npz",
+        "image": folder / "image.png",
+        "out": out / "from-files",
+    }
+    return "ldls segment " + " ".join(f"--{option} {quote(str(path))}" for option, path in files.items())
 
 
 def _iou(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
