@@ -28,6 +28,7 @@ ALPHA = np.full_like(GREY, 200)
         pytest.param("8UC3", RGB[..., ::-1], RGB, id="8UC3, in OpenCV's order"),
         pytest.param("rgba8", np.dstack([RGB, ALPHA]), RGB, id="rgba8"),
         pytest.param("bgra8", np.dstack([RGB[..., ::-1], ALPHA]), RGB, id="bgra8"),
+        pytest.param("8UC4", np.dstack([RGB[..., ::-1], ALPHA]), RGB, id="8UC4, in OpenCV's order"),
         pytest.param("mono8", GREY, np.repeat(GREY, 3, axis=2), id="mono8"),
         pytest.param("mono16", GREY.astype("<u2") * 256 + 13, np.repeat(GREY, 3, axis=2), id="mono16"),
         pytest.param("rgb16", RGB.astype("<u2") * 256 + 13, RGB, id="rgb16"),
@@ -59,6 +60,18 @@ def test_bayer_patterns_of_smooth_colours(pattern, depth):
     assert np.abs(found[inner].astype(int) - smooth[inner]).max() <= 1
 
 
+@pytest.mark.parametrize(
+    ("encoding", "conversion"),
+    [("yuv422", "UYVY"), ("uyvy", "UYVY"), ("yuv422_yuy2", "YUY2"), ("yuyv", "YUY2")],
+)
+def test_brightness_with_half_the_colours_is_that_of_opencv(encoding, conversion):
+    cv2 = pytest.importorskip("cv2")
+    samples = np.random.default_rng(0).integers(0, 256, (20, 30, 2), np.uint8)
+    expected = cv2.cvtColor(samples, getattr(cv2, f"COLOR_YUV2RGB_{conversion}"))
+    found = decode_image(image(TYPES, samples, encoding, padding=3))
+    assert np.abs(found.astype(int) - expected).max() <= 1
+
+
 @pytest.mark.parametrize(("format", "tolerance"), [("PNG", 0), ("JPEG", 40)])
 def test_compressed_images(format, tolerance):
     smooth = np.broadcast_to(np.arange(0, 240, 4, dtype=np.uint8)[:, None, None], (60, 80, 3))
@@ -79,6 +92,7 @@ def test_compressed_images(format, tolerance):
         pytest.param({"encoding": "bayer_rgbg8"}, UnsupportedFormatError, "bayer_rgbg8", id="no such pattern"),
         pytest.param({"step": 20}, CorruptFileError, "rows of 20, expected 9 rows of 33", id="rows too short"),
         pytest.param({"height": 10}, CorruptFileError, "297 bytes in rows of 33, expected 10", id="rows missing"),
+        pytest.param({"encoding": "yuyv", "step": 22}, CorruptFileError, "11 pixels a row.*even", id="half a pair"),
         pytest.param({"width": 0}, CorruptFileError, "9 x 0 pixels", id="no pixels"),
     ],
 )
