@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import takewhile
 from pathlib import Path
 
@@ -12,10 +13,11 @@ from ldls.cloud import MAX_COLUMNS
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file
 from ldls.io.points.named_columns import NamedColumns, plain_name
-from ldls.io.points.text_rows import COMMENTS, Row, is_number, read_rows, text_rows
+from ldls.io.points.text_rows import COMMENTS, Row, cells_of, is_number, read_rows, text_rows
 
 DELIMITERS = (";", "\t", ",")
 """Tried in this order; where none stands in the first line, blanks separate."""
+QUOTED = re.compile('"[^"]*"')
 
 
 def read(path: Path) -> NDArray[np.float64]:
@@ -57,7 +59,7 @@ def _is_comment(row: Row) -> bool:
 
 def _names(line: str) -> list[str] | None:
     bare = line.lstrip("#/ ")
-    names = [name.strip() for name in bare.split(_delimiter(bare))]
+    names = [name.strip() for name in cells_of(bare, _delimiter(bare))]
     return names if {"x", "y", "z"} <= {plain_name(name) for name in names} or _are_words(line, names) else None
 
 
@@ -102,4 +104,5 @@ def _are_normals(values: NDArray[np.float64]) -> bool:
 
 
 def _delimiter(line: str) -> str | None:
-    return next((sign for sign in DELIMITERS if sign in line.strip()), None)
+    bare = QUOTED.sub('""', line).strip()
+    return next((sign for sign in DELIMITERS if sign in bare), None)

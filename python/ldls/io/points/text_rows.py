@@ -167,7 +167,7 @@ def _refuse_long_row(rows: Sequence[Row], n_cells: int, delimiter: str | None) -
         behind = line.split(delimiter, n_cells)[n_cells:]
         if not behind or not DIGIT.search(behind[0]):
             continue
-        surplus = [*takewhile(lambda cell: not cell.lstrip().startswith(COMMENTS), _cells(line, delimiter)[n_cells:])]
+        surplus = [*takewhile(lambda cell: not cell.lstrip().startswith(COMMENTS), cells_of(line, delimiter)[n_cells:])]
         if any(map(is_number, surplus)):
             raise CorruptFileError(
                 f"line {number}: expected {n_cells} cells, got {n_cells + len(surplus)}: {line.strip()[:80]!r}; "
@@ -175,9 +175,10 @@ def _refuse_long_row(rows: Sequence[Row], n_cells: int, delimiter: str | None) -
             )
 
 
-def _cells(line: str, delimiter: str | None) -> list[str]:
+def cells_of(line: str, delimiter: str | None) -> list[str]:
+    """The cells of a line; a delimiter in quotes is none."""
     if delimiter is not None and '"' in line:
-        return next(csv.reader([line.strip()], delimiter=delimiter))
+        return next(csv.reader([line.strip(" \r\n")], delimiter=delimiter))
     return line.split(delimiter)
 
 
