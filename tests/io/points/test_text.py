@@ -40,6 +40,9 @@ ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
         pytest.param('name,x,y,z\n"a,b",1.5,-2,3e-3\n,4,5,6\n', ROWS, id="a comma in quotes"),
         pytest.param('"t, s",x,y,z,n\n0,1.5,-2,3e-3,7\n1,4,5,6,8\n', ROWS, id="a comma in quotes of the header"),
         pytest.param('"t; s",x,y,z\n"a; b",1.5,-2,3e-3\n,4,5,6\n', ROWS, id="a semicolon in quotes"),
+        pytest.param('"t s" "x"  y z n\n0 1.5 -2 3e-3 7\n1 4 5 6 8\n', ROWS, id="a blank in quotes of the header"),
+        pytest.param('x, y, "t, s", z\n1.5, -2, 0, 3e-3\n4, 5, 1, 6\n', ROWS, id="a comma in quotes behind a blank"),
+        pytest.param('a, b, x, y, z, n\n "5, 6", 7, 1, 2, 3, 9\n', [[1, 2, 3]], id="quotes behind a blank"),
         pytest.param('\t"x"\t"y"\t"z"\n0\t1.5\t-2\t3e-3\n1\t4\t5\t6\n', ROWS, id="a first column without a name"),
         pytest.param("nan 2 inf\n", [[np.nan, 2, np.inf]], id="not finite"),
         pytest.param("x,y,z\n", np.zeros((0, 3)), id="header alone"),
@@ -92,6 +95,12 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
             "x [m],y [m],z [m]\n1,2,3\n", ldls.CorruptFileError, r"column x is missing; found x \[m\] y", id="units"
         ),
         pytest.param("# by hand\na b c\n1 2 3\n", ldls.CorruptFileError, "line 2: column x is missing", id="below"),
+        pytest.param(
+            'n,x,y,z\n"a,b",1,oops,3\n',
+            ldls.CorruptFileError,
+            "line 2: .* column 3, got 'oops'",
+            id="word behind quotes",
+        ),
         pytest.param("x_m y_m z_m\n1 2 3\n", ldls.CorruptFileError, "column x is missing; found x_m y_m", id="names"),
         pytest.param("x y z X\n", ldls.CorruptFileError, "column x is there 2 times", id="name twice"),
         pytest.param("# nothing\n", ldls.TruncatedFileError, "only comments", id="comments"),

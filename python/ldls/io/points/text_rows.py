@@ -20,6 +20,7 @@ MAX_HEADER_BYTES = 1 << 16
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 COMMENTS = ("#", "//")
 DIGIT = re.compile("[0-9]")
+QUOTE_BEHIND_BLANKS = re.compile('(^|[;,\t]) +"')
 MOST_LOST_M = 5e-4
 """What coordinates in text may lose in single precision; UTM's lose more, and are kept in doubles."""
 
@@ -155,6 +156,9 @@ def _of_kind(name: str, column: NDArray[np.float64], kind: np.dtype[np.number]) 
 
 
 def _loaded(lines: Sequence[str], delimiter: str | None, positions: Sequence[int] | None) -> NDArray[np.float64]:
+    if delimiter is not None:
+        # NumPy takes a quote behind a blank for text
+        lines = [QUOTE_BEHIND_BLANKS.sub(r'\1"', line) if '"' in line else line for line in lines]
     return np.loadtxt(lines, np.float64, comments=None, delimiter=delimiter, usecols=positions, ndmin=2, quotechar='"')
 
 
@@ -177,8 +181,8 @@ def _refuse_long_row(rows: Sequence[Row], n_cells: int, delimiter: str | None) -
 
 def cells_of(line: str, delimiter: str | None) -> list[str]:
     """The cells of a line; a delimiter in quotes is none."""
-    if delimiter is not None and '"' in line:
-        return next(csv.reader([line.strip(" \r\n")], delimiter=delimiter))
+    if '"' in line:
+        return next(csv.reader([line.strip(" \r\n")], delimiter=delimiter or " ", skipinitialspace=True))
     return line.split(delimiter)
 
 
@@ -194,7 +198,7 @@ def is_number(cell: str) -> bool:
 def _refuse_wrong_cell(rows: Sequence[Row], positions: Sequence[int], delimiter: str | None) -> None:
     wanted = max(positions) + 1
     for number, line in rows:
-        cells = line.split(delimiter)
+        cells = cells_of(line, delimiter)
         if len(cells) < wanted:
             error = TruncatedFileError if number == rows[-1][0] else CorruptFileError
             raise error(f"line {number}: expected at least {wanted} cells, got {len(cells)}: {line.strip()[:80]!r}")
