@@ -43,9 +43,12 @@ def _parse(text: str) -> NDArray[np.float64]:
     if not rows:
         raise TruncatedFileError("empty, expected a line x y z for each point")
     # comments may stand above the names, which may be one themselves
-    n_comments = sum(1 for _ in takewhile(_is_comment, rows))
-    named = ((number, _names(line)) for number, line in rows[: n_comments + 1])
-    number, names = next((each for each in named if each[1] is not None), (0, None))
+    comments = [*takewhile(_is_comment, rows)]
+    first = rows[len(comments) : len(comments) + 1]
+    n_cells = max((len(cells_of(line, _delimiter(line))) for _, line in first), default=0)
+    told = [(number, names) for number, line in comments if _are_columns(names := _names(line), n_cells)]
+    told += [(number, _names(line)) for number, line in first]
+    number, names = next((each for each in told if each[1] is not None), (0, None))
     rows = [row for row in rows if row[0] > number and not _is_comment(row)]
     if names is None:
         return _parse_nameless(rows)
@@ -61,6 +64,14 @@ def _names(line: str) -> list[str] | None:
     bare = line.lstrip("#/ ")
     names = [name.strip() for name in cells_of(bare, _delimiter(bare))]
     return names if {"x", "y", "z"} <= {plain_name(name) for name in names} or _are_words(line, names) else None
+
+
+def _are_columns(names: list[str] | None, n_cells: int) -> bool:
+    """True for names of so many columns, or with x y z side by side, unlike a sentence: x ahead, y to the left."""
+    if names is None or len(names) == n_cells:
+        return names is not None
+    at = sorted(number for number, name in enumerate(names) if plain_name(name) in {"x", "y", "z"})
+    return at[-1] - at[0] == len(at) - 1
 
 
 def _are_words(line: str, cells: list[str]) -> bool:
