@@ -191,6 +191,14 @@ def test_what_gives_no_pose_is_named(tmp_path, topics, world, message):
     assert str(path) in str(caught.value)
 
 
+def test_a_robot_that_is_named_after_the_world_is_refused(tmp_path):
+    """As VINS-Fusion writes it: /tf leads from there to the lidar, and poses would count twice."""
+    path = written(tmp_path, {"/odom": drive(robot="odom")}, moving=(("odom", "base"),))
+    np.testing.assert_allclose(opened(path, "odom")[1].pose[2, 3], 2)
+    with pytest.raises(PoseError, match=r"/odom: child_frame_id is 'odom', expected .* another world, or give poses"):
+        opened(path, "/odom")[0]
+
+
 def test_a_world_that_is_not_there_is_refused_when_the_bag_is_opened(tmp_path):
     path = written(tmp_path, {}, moving=(("odom", "base"),))
     with pytest.raises(PoseError, match=r"the world 'map'; found odom <- base <- lidar; choose another") as caught:

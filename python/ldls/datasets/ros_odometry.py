@@ -92,13 +92,15 @@ def _in_frame(world: str, messages: Mapping[str, Mapping[str, list[bytes]]]) -> 
 
 
 def _way(topic: str, messages: Iterable[Message]) -> Odometry:
-    robots, stamps, poses = set(), [], []
+    robots, stamps, poses, world = set(), [], [], ""
     for message in messages:
+        world = plain(message.header.frame_id)
         robots.add(plain(message.child_frame_id))
         stamps.append(nanoseconds(message.header.stamp))
         poses.append(_pose(message))
     robot = next(iter(robots))
-    if len(robots) != 1 or not robot:
+    # some write the frame of the poses here, too
+    if len(robots) != 1 or robot in ("", world):
         raise PoseError(
             f"child_frame_id is {_listed(robots)}, expected the name of one frame that moves with the lidar; choose "
             "another world, or give poses of a file"
