@@ -165,6 +165,12 @@ def test_drives_that_cannot_be_are_refused(options):
         Drive(**options)
 
 
+@pytest.mark.parametrize("number", [3, -1, 1.0, True, "0", None])
+def test_frames_that_a_drive_does_not_have_are_refused(number):
+    with pytest.raises(ldls.ParameterError, match="number: got .*, expected"):
+        drive_frame(Drive(n_frames=3, lidar="vlp-16"), number)
+
+
 def _stored_masks(drive, name):
     return ldls.read_masks(drive / f"masks_02/{name}.json")
 

@@ -101,6 +101,7 @@ class Drive:
         return make_rig(lidar=self.lidar, camera=self.camera)
 
 
+@checked
 def drive_frame(drive: Drive, number: int) -> SimulatedFrame:
     """Frame `number` of a drive, from 0; the same every time.
 
