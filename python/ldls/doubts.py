@@ -58,10 +58,9 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
     low, high = report["bounds"]
     if low[0] <= high[0]:  # there is a finite point
         farthest = max(abs(bound) for bound in (*low, *high))
-        step = float(np.spacing(np.float32(farthest)))
-        if any(result.points.dtype == np.float32 for result in results) and step > COARSEST_STEP_M:
-            message = f"points: float32 spacing at {farthest:.1e} is {step:.2g} m; pass float64 or subtract an origin"
-            yield message, PrecisionWarning
+        coarse = doubt_of_precision("points", farthest)
+        if coarse is not None and any(result.points.dtype == np.float32 for result in results):
+            yield coarse, PrecisionWarning
         scale = doubt_of_scale(low, high)
         if scale is not None:
             yield scale, ScaleWarning
@@ -83,6 +82,14 @@ def _oddities(results: Sequence[Segmentation], report: Mapping[str, Any]) -> Ite
             )
             yield message, UprightWarning
     yield from dict.fromkeys(doubt for each in results for doubt in _doubts_of_views(each))
+
+
+def doubt_of_precision(name: str, farthest_m: float) -> str | None:
+    """What is odd about single-precision coordinates up to so many metres; None where nothing is."""
+    step_m = float(np.spacing(np.float32(farthest_m)))
+    if not step_m > COARSEST_STEP_M:
+        return None
+    return f"{name}: float32 spacing at {farthest_m:.1e} is {step_m:.2g} m; pass float64 or subtract an origin"
 
 
 def _named(views: Sequence[SeenView]) -> Iterator[tuple[str, SeenView]]:

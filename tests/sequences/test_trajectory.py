@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from ldls import DtypeError, PoseError, ShapeError, Trajectory
+from ldls import DtypeError, PoseError, ShapeError, Sweep, Trajectory
 from ldls.camera.rigid import to_quaternion
+from ldls.errors import PrecisionWarning
 from ldls.sequences.trajectory import LONGEST_GAP_S
 
 START_S = 1_317_042_145.951199
@@ -282,3 +283,16 @@ def test_times_that_cannot_be_are_refused(points, times, stamp, error, message):
 def test_moments_a_second_apart_are_of_two_clocks():
     with pytest.raises(PoseError, match=r"start: \+1\.5 s from the other moment, expected at most 1 s"):
         Trajectory([0, 1, 2], [moved(0), moved(1), moved(2)]).motion(1.75, 0.25)
+
+
+def test_poses_that_single_precision_rounds_are_warned_of():
+    poses = np.array([moved(0), moved(1)])
+    far = poses.copy()
+    far[:, 1, 3] = 5.4e6
+    Trajectory([0, 0.1], far)
+    Trajectory([0, 0.1], poses.astype(np.float32))
+    with pytest.warns(PrecisionWarning, match="^poses: float32 spacing at 5.4e\\+06 is 0.5 m; pass float64") as caught:
+        Trajectory([0, 0.1], far.astype(np.float32))
+    assert caught[0].filename == __file__
+    with pytest.warns(PrecisionWarning, match="^pose: float32 spacing at 5.4e\\+06 is 0.5 m; pass float64"):
+        Sweep(np.zeros((0, 3)), [], far[0].astype(np.float32), 0.0)

@@ -27,7 +27,7 @@ from ldls.errors import InputError, ShapeError, UprightWarning
 from ldls.label_diffusion import check_finite, diffuse_labels, result_of
 from ldls.params import Params
 from ldls.segmentation import Segmentation
-from ldls.sequences.trajectory import Trajectory
+from ldls.sequences.trajectory import Trajectory, warn_of_rounded
 from ldls.view import View, check_names
 
 SAME_OBJECT = 0.1
@@ -60,7 +60,8 @@ class Sweep:
             a copy where a buffer is used again.
         views: Masks and camera of each image; cameras from the lidar at this sweep.
         pose: (4, 4) T_world_lidar: from the lidar frame of this sweep to one that all sweeps share, whose z is up.
-            Where z of the lidar leans by more than 60 degrees there, an `UprightWarning` says so.
+            Where z of the lidar leans by more than 60 degrees there, an `UprightWarning` says so, and a
+            `PrecisionWarning` where single precision is too coarse for its place.
         stamp: Time of the sweep in seconds.
 
     Raises:
@@ -78,7 +79,9 @@ class Sweep:
         object.__setattr__(self, "points", as_points(self.points))
         _check_coordinates(self.points)
         object.__setattr__(self, "views", tuple(self.views))
-        object.__setattr__(self, "pose", rigid("pose", as_transform("pose", self.pose)))
+        given = self.pose
+        object.__setattr__(self, "pose", rigid("pose", as_transform("pose", given)))
+        warn_of_rounded("pose", given, self.pose[:3, 3])
         if self.pose[2, 2] < LEAST_UPRIGHT:
             warnings.warn(NOT_UPRIGHT, UprightWarning, stacklevel=4)
         as_seconds("stamp", self.stamp)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera.rigid import inverse, rigid
-from ldls.checks import checked, numbers
+from ldls.checks import as_array, checked, numbers
 from ldls.checks.values import as_seconds
-from ldls.cloud import Points, as_points
-from ldls.errors import PoseError, ShapeError
+from ldls.cloud import Floats, Points, as_points
+from ldls.doubts import doubt_of_precision
+from ldls.errors import PoseError, PrecisionWarning, ShapeError
 from ldls.sequences.step import Step
 
 LONGEST_GAP_S = 1.0
@@ -38,7 +40,7 @@ class Trajectory:
             microseconds.
         poses: (n, 4, 4) float64 `T_world_lidar` at each stamp: rigid transforms from lidar coordinates, in metres, to
             those of a frame that stays where it is, and whose z is up for tracks and maps. Translations lose digits far
-            from its origin.
+            from its origin: those in single precision come with a `PrecisionWarning` where these are centimetres.
 
     Raises:
         PoseError: There is no pose, stamps are not in seconds or do not ascend, a pose is no rigid transform, or two
@@ -61,6 +63,7 @@ class Trajectory:
         _check_stamps(stamps)
         _check_rigid(stamps, poses)
         _check_speeds(stamps, poses)
+        warn_of_rounded("poses", self.poses, poses[:, :3, 3])
         for name, values in (("stamps", stamps), ("poses", poses)):
             values.flags.writeable = False
             object.__setattr__(self, name, values)
@@ -199,6 +202,15 @@ class Trajectory:
                 f"stamp: no pose at {stamp:.6f} s, for poses have a gap of {end - begin:.3f} s from {begin:.6f} to "
                 f"{end:.6f} s, expected at most {LONGEST_GAP_S} s; add poses there, or leave this moment out"
             )
+
+
+def warn_of_rounded(name: str, given: ArrayLike, places: Floats) -> None:
+    """Warn of poses that were given in single precision, where that is too coarse for their places, in metres."""
+    if as_array(name, given).dtype != np.float32:
+        return
+    doubt = doubt_of_precision(name, float(np.abs(places).max()))
+    if doubt is not None:
+        warnings.warn(doubt, PrecisionWarning, stacklevel=5)
 
 
 def is_gap(step_s: float) -> bool:
