@@ -370,6 +370,16 @@ def test_a_scene_of_nuscenes_is_chosen_by_name(tmp_path):
         open_source(tmp_path, scene="scene-0003")
 
 
+def test_stamps_of_a_folder_may_have_comments_and_blank_lines(tmp_path):
+    layouts.plain_folder(tmp_path)
+    layouts.write_text(tmp_path / "stamps.txt", "# frame seconds\n\na 1.5\n#b 7.0\n\nb 1.6\n\n")
+    assert open_source(tmp_path).stamps == (1.5, 1.6)
+    for part in tmp_path.rglob("a.*"):
+        part.rename(part.with_stem("#a"))
+    layouts.write_text(tmp_path / "stamps.txt", "#a 1.5\nb 1.6\n")
+    assert open_source(tmp_path).stamps == (1.5, 1.6)
+
+
 def test_folder_has_distortion_stamps_and_masks(tmp_path):
     folder = layouts.plain_folder(tmp_path)
     pixels = np.zeros((1, *layouts.SIZE), bool)
@@ -515,6 +525,9 @@ def replaced(path, old, new):
                      "stamps.txt, line 1: stamp: got 17000.*, expected seconds", id="folder with milliseconds"),
         pytest.param("folder", with_text("stamps.txt", "c 0.0\na 1.0\nb 2.0\na 3.0\n"), ldls.CorruptFileError,
                      "stamps.txt, line 4: frame a has a stamp in line 2 already", id="folder with a stamp twice"),
+        pytest.param("folder", with_text("stamps.txt", "# frame seconds\na 1.0\n\na 3.0\n"), ldls.CorruptFileError,
+                     "stamps.txt, line 4: frame a has a stamp in line 2 already",
+                     id="folder with a stamp twice below a comment"),
         pytest.param("folder", with_text("stamps.txt", "a 1.0\nb inf\n"), ldls.CorruptFileError,
                      "stamps.txt, line 2: stamp: got inf, expected seconds", id="folder with an endless stamp"),
         pytest.param("folder", without("front"), ldls.SourceError, "points 2, cameras.front 0",

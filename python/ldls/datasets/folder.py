@@ -153,15 +153,18 @@ class FolderSource(FileSource):
             return (None,) * len(self.names)
         path = self._safe(pattern)
         stamps: dict[str, float] = {}
+        line_of: dict[str, int] = {}
         for number, line in enumerate(read_lines(path), start=1):
+            # a comment, unless a frame is called so
+            if not line.strip() or (line.startswith("#") and line.rsplit(None, 1)[0] not in self.names):
+                continue
             name, stamp = _stamp(path, number, line)
             if name in stamps:
-                first = [*stamps].index(name) + 1
                 raise CorruptFileError(
-                    f"{path}, line {number}: frame {name} has a stamp in line {first} already, expected one; remove "
-                    "one of these lines"
+                    f"{path}, line {number}: frame {name} has a stamp in line {line_of[name]} already, expected one; "
+                    "remove one of these lines"
                 )
-            stamps[name] = stamp
+            stamps[name], line_of[name] = stamp, number
         missing = [name for name in self.names if name not in stamps]
         if missing:
             others = [name for name in stamps if name not in self.names]
@@ -197,7 +200,7 @@ class FolderSource(FileSource):
 
 
 def _stamp(path: Path, number: int, line: str) -> tuple[str, float]:
-    name, *words = line.rsplit(None, 1) or [""]
+    name, *words = line.rsplit(None, 1)
     try:
         seconds = number_of("".join(words))
     except ValueError:

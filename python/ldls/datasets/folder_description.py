@@ -40,7 +40,7 @@ TEMPLATE = """\
 # Where the frames of this folder lie. {frame} stands for the name of a frame; paths are relative to this folder.
 points = "lidar/{frame}.bin"        # any format of docs/formats.md: x y z first, in metres
 columns = 4                         # floats a row of a .bin: 4 by default, 5 for .pcd.bin
-stamps = "lidar/stamps.txt"         # optional: lines `frame seconds`
+stamps = "lidar/stamps.txt"         # optional: lines `frame seconds`; # begins a comment
 truth = "labels/{frame}.label"      # optional: any format that `ldls evaluate` reads
 truth_format = "label"              # only where the file's ending does not tell
 
