@@ -18,6 +18,8 @@ ROWS = [[1.5, -2, 3e-3], [4, 5, 6]]
         pytest.param("  1.5   -2 3e-3\n4 5  6 \n\n", ROWS, id="blanks"),
         pytest.param("1.5, -2, 3e-3\n4, 5, 6\n", ROWS, id="commas and blanks"),
         pytest.param("\ufeff1.5,-2,3e-3\r\n4,5,6\r\n", ROWS, id="byte order mark, CRLF"),
+        pytest.param("2\n1.5 -2 3e-3\n4 5 6\n", ROWS, id="the count of points"),
+        pytest.param("//X Y Z\n2\n1.5 -2 3e-3\n4 5 6\n", ROWS, id="header and count of CloudCompare"),
         pytest.param("# made by hand\n1.5 -2 3e-3\n// half way\n4 5 6\n", ROWS, id="comments"),
         pytest.param("x,y,z\n1.5,-2,3e-3\n4,5,6\n", ROWS, id="header"),
         pytest.param("//X Y Z\n1.5 -2 3e-3\n4 5 6\n", ROWS, id="header of CloudCompare"),
@@ -66,6 +68,8 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
         pytest.param(
             "1 2 3\n\n4 5\n6 7 8\n", ldls.CorruptFileError, "line 3: expected at least 3 cells, got 2", id="short"
         ),
+        pytest.param("3\n1 2 3\n4 5 6\n", ldls.TruncatedFileError, "line 1: .* counts 3 points, got 2", id="fewer"),
+        pytest.param("1\n1 2 3\n4 5 6\n", ldls.CorruptFileError, "line 1: .* counts 1 points, got 2", id="more"),
         pytest.param("1 2 3\n4 5", ldls.TruncatedFileError, "line 2: expected at least 3 cells, got 2", id="cut"),
         pytest.param("1_5;2;3\n", ldls.CorruptFileError, "line 1: .* decimal point .* '1_5'", id="underscore"),
         pytest.param("1,5;2;3\n", ldls.CorruptFileError, "line 1: .* decimal point .* '1,5'", id="decimal comma"),
@@ -87,9 +91,6 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
         ),
         pytest.param("1,5;2,5;3,5\n", ldls.CorruptFileError, "decimal point .* '1,5'", id="decimal commas"),
         pytest.param("1,,3\n", ldls.CorruptFileError, "line 1: .* column 2, got ''", id="empty cell"),
-        pytest.param(
-            "17\n1 2 3\n", ldls.CorruptFileError, "line 1: expected x y z or their names, got '17'", id="count"
-        ),
         pytest.param(
             "x y z\n1 2\n3 4 5\n", ldls.CorruptFileError, "line 2: expected at least 3 cells", id="header, short"
         ),

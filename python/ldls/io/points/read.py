@@ -32,6 +32,8 @@ READERS: dict[str, Callable[..., Points]] = {
     ".csv": text.read,
     ".txt": text.read,
     ".xyz": text.read,
+    ".asc": text.read,
+    ".pts": text.read,
 }
 """Readers of clouds, by the suffix of the name."""
 
@@ -42,8 +44,8 @@ def read_points(path: str | PathLike[str], *, columns: int | None = None, recove
 
     Args:
         path: `.bin` (float32 little-endian rows: KITTI x y z reflectance; nuScenes `.pcd.bin` with a fifth column,
-            ring), `.npy`, `.pcd`, `.ply`, `.las` and `.laz`, or text: `.csv`, `.txt` and `.xyz`. docs/formats.md has
-            what each may hold.
+            ring), `.npy`, `.pcd`, `.ply`, `.las` and `.laz`, or text: `.csv`, `.txt`, `.xyz`, `.asc` and `.pts`.
+            docs/formats.md has what each may hold.
         columns: Floats a row of a `.bin` file; 4, and 5 for `.pcd.bin`, by default.
         recover: True if a truncated `.bin` yields its whole rows and a warning instead of an error.
 

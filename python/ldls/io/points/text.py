@@ -1,4 +1,4 @@
-"""Rows of text: `.csv`, `.txt` and `.xyz`."""
+"""Rows of text: `.csv`, `.txt`, `.xyz`, `.asc` and `.pts`."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def read(path: Path) -> NDArray[np.float64]:
 
     A line with the names x, y and z before the numbers, behind a comment sign or not, says which columns are meant;
     without one all columns are taken as they stand, x y z first, up to three that are colours (whole numbers to 255) or
-    normals. Other lines that begin with # or // are comments.
+    normals. Other lines that begin with # or // are comments. A number alone above the points, as in `.pts`, counts them.
 
     Raises:
-        TruncatedFileError: The file is empty, its last line has too few cells, or it ends with its last number, without
-            a line end: that number may be cut short.
-        CorruptFileError: Another line has too few cells, one has a number behind as many cells as the first, or a cell
+        TruncatedFileError: The file is empty, its last line has too few cells, there are fewer points than it counts,
+            or it ends with its last number, without a line end: that number may be cut short.
+        CorruptFileError: There are more points than it counts, another line has too few cells, one has a number behind as many cells as the first, or a cell
             is no number; the message names it. Or the first line has names, of which none are x, y and z.
         UnsupportedFormatError: There are more columns than clouds have.
     """
@@ -49,11 +49,23 @@ def _parse(text: str) -> NDArray[np.float64]:
     told = [(number, names) for number, line in comments if _are_columns(names := _names(line), n_cells)]
     told += [(number, _names(line)) for number, line in first]
     number, names = next((each for each in told if each[1] is not None), (0, None))
-    rows = [row for row in rows if row[0] > number and not _is_comment(row)]
+    rows = _behind_count([row for row in rows if row[0] > number and not _is_comment(row)])
     if names is None:
         return _parse_nameless(rows)
     delimiter = _delimiter(rows[0][1]) if rows else None
     return read_rows(rows, NamedColumns.find(f"line {number}", names).positions, len(names), delimiter)
+
+
+def _behind_count(rows: list[Row]) -> list[Row]:
+    """Rows of points, held against their count where a line of it stands above them."""
+    count = rows[0][1].strip() if len(rows) > 1 else ""
+    if not (count.isascii() and count.isdigit()):
+        return rows
+    found = len(rows) - 1
+    if found != int(count):
+        error = TruncatedFileError if found < int(count) else CorruptFileError
+        raise error(f"line {rows[0][0]}: the file counts {count} points, got {found}")
+    return rows[1:]
 
 
 def _is_comment(row: Row) -> bool:
