@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
-from ldls.camera import camera_info, nuscenes
+from ldls.camera import camera_info
 from ldls.camera.distortion import Distortion
-from ldls.camera.rigid import as_matrix, as_transform, from_parts
+from ldls.camera.fields import Fields
+from ldls.camera.rigid import as_matrix, as_transform, from_parts, from_quaternion, inverse
 from ldls.checks import as_image_size, checked_as, hold_python_values
 from ldls.errors import CalibrationError, within
 
@@ -49,8 +50,10 @@ def _taken_apart(projection: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     return np.column_stack([intrinsic, np.zeros(3)]), from_parts(rotation, translation)
 
 
-def _identity() -> NDArray[np.float64]:
-    return np.eye(4)
+def _pose(record: Fields) -> NDArray[np.float64]:
+    """(4, 4) of a record of nuScenes' `calibrated_sensor` or `ego_pose`."""
+    rotation = from_quaternion(f"{record.place}: rotation", record.matrix((4,), "rotation"))
+    return from_parts(rotation, record.matrix((3,), "translation"))
 
 
 @checked_as(CalibrationError)
@@ -75,7 +78,7 @@ class Camera:
 
     core: _ldls.Camera = field(init=False, repr=False)
     projection: NDArray[np.float64]
-    T_camera_lidar: NDArray[np.float64] = field(default_factory=_identity)
+    T_camera_lidar: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     image_size: tuple[int, int] | None = None
     min_depth_m: float = 0.1
     distortion: Distortion = field(default_factory=Distortion)
@@ -194,6 +197,9 @@ class Camera:
     ) -> Self:
         """Camera at the moment of its image, seen from the lidar at the moment of its sweep.
 
+        T_camera_lidar = T_ego_camera^-1 T_global_ego(camera)^-1 T_global_ego(lidar) T_ego_lidar, of the records that
+        https://www.nuscenes.org/nuscenes#data-format describes.
+
         Args:
             calibrated_camera: Record of `calibrated_sensor`: translation, rotation (w x y z) and camera_intrinsic.
             ego_pose_camera: Record of `ego_pose` of the image: translation and rotation.
@@ -204,7 +210,9 @@ class Camera:
         Raises:
             CalibrationError: A key is missing, or a value has the wrong size or is no rotation.
         """
-        records = (calibrated_camera, ego_pose_camera, calibrated_lidar, ego_pose_lidar)
-        arguments = nuscenes.arguments(*records)
+        camera = Fields("calibrated_camera", calibrated_camera)
+        from_ego = inverse(_pose(camera)) @ inverse(_pose(Fields("ego_pose_camera", ego_pose_camera)))
+        to_ego = _pose(Fields("ego_pose_lidar", ego_pose_lidar)) @ _pose(Fields("calibrated_lidar", calibrated_lidar))
+        projection = camera.matrix((3, 3), "camera_intrinsic", mend="is it the record of a lidar?")
         with within("calibrated_camera"):
-            return cls(**arguments, image_size=image_size)
+            return cls(projection=projection, T_camera_lidar=from_ego @ to_ego, image_size=image_size)

@@ -54,14 +54,10 @@ def extrinsic(
     given = [name for name, value in ways.items() if value is not None]
     if len(given) != 1:
         raise CalibrationError(f"extrinsic: expected one of {', '.join(ways)}, got {', '.join(given) or 'none'}")
-    if pose_of not in ("camera", "lidar"):
-        raise CalibrationError(
-            f"pose_of: got {pose_of!r}, expected 'camera', the pose of the camera in the lidar frame, or 'lidar', that "
-            "of the lidar in the camera frame"
-        )
-    name, value = given[0], ways[given[0]]
-    matrix = from_parts(_rotation(name, np.asarray(value)), as_matrix("translation", translation, ((3,),)))
-    from_lidar = inverse(rigid(name, matrix)) if pose_of == "camera" else rigid(name, matrix)
+    (name,) = given
+    turn = _rotation(name, np.asarray(ways[name]))
+    pose = rigid(name, from_parts(turn, as_matrix("translation", translation, ((3,),))))
+    from_lidar = inverse(pose) if pose_of == "camera" else pose
     return from_lidar if optical else OPTICAL_FROM_BODY @ from_lidar
 
 

@@ -66,7 +66,20 @@ class Fields:
         Raises:
             CalibrationError: There is no such entry, or it holds something else, or a number is not finite.
         """
-        return self._numbers(spellings[0], self.get(*spellings, mend=mend))
+        name, value = spellings[0], self.get(*spellings, mend=mend)
+        if isinstance(value, Mapping):
+            return Fields(f"{self.place}: {name}", value)._rows_and_columns()
+        try:
+            values = np.array(value, np.float64)
+        except (TypeError, ValueError):
+            raise CalibrationError(
+                f"{self.place}: {name}: expected numbers with a decimal point, got {shown(value)}"
+            ) from None
+        except OverflowError:  # a whole number that float64 has not
+            values = np.array(np.inf)
+        if not np.isfinite(values).all():
+            raise CalibrationError(f"{self.place}: {name}: expected finite numbers, got {shown(value)}")
+        return values
 
     def matrix(self, shape: tuple[int, ...], *spellings: str, mend: str = "") -> NDArray[np.float64]:
         """The numbers of an entry in `shape`.
@@ -105,26 +118,12 @@ class Fields:
         with within(self.place):
             return Distortion(model, tuple(coefficients.ravel().tolist()))
 
-    def _numbers(self, name: str, value: object) -> NDArray[np.float64]:
-        if isinstance(value, Mapping):
-            return self._rows_and_columns(Fields(f"{self.place}: {name}", value))
-        try:
-            values = np.array(value, np.float64)
-        except (TypeError, ValueError):
-            raise CalibrationError(
-                f"{self.place}: {name}: expected numbers with a decimal point, got {shown(value)}"
-            ) from None
-        except OverflowError:  # a whole number that float64 has not
-            values = np.array(np.inf)
-        if not np.isfinite(values).all():
-            raise CalibrationError(f"{self.place}: {name}: expected finite numbers, got {shown(value)}")
-        return values
-
-    def _rows_and_columns(self, matrix: Fields) -> NDArray[np.float64]:
-        values = matrix.numbers("data", mend="write a list of numbers, or rows: 1, cols: 2, data: [1.0, 0.5]")
-        rows, columns = matrix.whole_number("rows"), matrix.whole_number("cols")
+    def _rows_and_columns(self) -> NDArray[np.float64]:
+        """The matrix whose `rows`, `cols` and `data` these entries are."""
+        values = self.numbers("data", mend="write a list of numbers, or rows: 1, cols: 2, data: [1.0, 0.5]")
+        rows, columns = self.whole_number("rows"), self.whole_number("cols")
         if rows is None or columns is None:
             return values
         if values.size != rows * columns:
-            raise CalibrationError(f"{matrix.place}: {rows} rows x {columns} cols, got {values.size} numbers")
+            raise CalibrationError(f"{self.place}: {rows} rows x {columns} cols, got {values.size} numbers")
         return values.reshape(rows, columns)
