@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,40 +14,31 @@ INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "remission", "i")
 """Names of the intensity; the first that a file has is taken."""
 
 
-@dataclass(frozen=True)
-class NamedColumns:
-    """Positions of x, y, z and, where there is one, intensity among the columns of a file.
+def find_columns(place: str, names: Sequence[str]) -> tuple[int, ...]:
+    """Numbers, from 0, of x, y, z and, where there is one, intensity among the columns of these `names`.
 
-    Attributes:
-        positions: Three or four column numbers, from 0.
+    Names may be in capitals, and have CloudCompare's prefix `scalar_`.
+
+    Raises:
+        CorruptFileError: x, y or z is missing or stands there twice.
     """
+    plain = [plain_name(name) for name in names]
+    for axis in "xyz":
+        if plain.count(axis) != 1:
+            there = " ".join(names) or "none"
+            fault = "missing" if axis not in plain else f"there {plain.count(axis)} times"
+            raise CorruptFileError(f"{place}: column {axis} is {fault}; found {there}; expected one each of x y z")
+    intensity = [plain.index(name) for name in INTENSITY_NAMES if name in plain][:1]
+    return (*(plain.index(axis) for axis in "xyz"), *intensity)
 
-    positions: tuple[int, ...]
 
-    @classmethod
-    def find(cls, place: str, names: Sequence[str]) -> NamedColumns:
-        """The columns among `names`, in capitals or not, with CloudCompare's prefix `scalar_` or not.
-
-        Raises:
-            CorruptFileError: x, y or z is missing or stands there twice.
-        """
-        plain = [plain_name(name) for name in names]
-        for axis in "xyz":
-            if plain.count(axis) != 1:
-                there = " ".join(names) or "none"
-                fault = "missing" if axis not in plain else f"there {plain.count(axis)} times"
-                raise CorruptFileError(f"{place}: column {axis} is {fault}; found {there}; expected one each of x y z")
-        intensity = [plain.index(name) for name in INTENSITY_NAMES if name in plain][:1]
-        return cls((*(plain.index(axis) for axis in "xyz"), *intensity))
-
-    def stack(self, columns: Sequence[NDArray[np.number]]) -> Points:
-        """(N, 3 or 4) points from the columns found: float32 where that holds the coordinates exactly, else float64."""
-        exact = np.result_type(np.float32, *(column.dtype for column in columns[:3]))
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # an intensity in doubles may be too large for single precision
-            points: Points = np.stack([column.astype(exact) for column in columns], axis=1)
-        return points
+def stacked(columns: Sequence[NDArray[np.number]]) -> Points:
+    """(N, 3 or 4) points of x, y, z and intensity: float32 where that holds the coordinates exactly, else float64."""
+    exact = np.result_type(np.float32, *(column.dtype for column in columns[:3]))
+    # an intensity in doubles may be too large for single precision
+    with np.errstate(over="ignore", invalid="ignore"):
+        points: Points = np.stack([column.astype(exact) for column in columns], axis=1)
+    return points
 
 
 def plain_name(name: str) -> str:

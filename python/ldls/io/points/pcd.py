@@ -6,6 +6,7 @@ Source: https://pointclouds.org/documentation/tutorials/pcd_file_format.html.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import MAX_POINT_BYTES, open_file, whole_file
 from ldls.io.labelled_points import Labelled, instances, packed_colors, positions
-from ldls.io.points.named_columns import NamedColumns
+from ldls.io.points.named_columns import find_columns, stacked
 from ldls.io.points.text_rows import Row, as_text, of_kinds, read_rows, split_header, text_rows, whole_number
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
@@ -77,12 +78,12 @@ def read(path: Path) -> Points:
         content = file.read()
         lines, body = split_header(content, "DATA")
         header = _parse(lines)
-        columns = NamedColumns.find("FIELDS", [field.name for field in header.fields])
-        for field in (header.fields[position] for position in columns.positions[:3]):
+        columns = find_columns("FIELDS", [field.name for field in header.fields])
+        for field in (header.fields[position] for position in columns[:3]):
             if field.count != 1:
                 raise CorruptFileError(f"COUNT of {field.name} is {field.count}, expected 1")
         # several values are no intensity
-        columns = NamedColumns(tuple(at for at in columns.positions if header.fields[at].count == 1))
+        columns = tuple(at for at in columns if header.fields[at].count == 1)
         if header.encoding == "ascii":
             return _read_ascii(header, columns, as_text(body), len(lines))
         if header.encoding == "binary":
@@ -90,15 +91,15 @@ def read(path: Path) -> Points:
         return _read_compressed(header, columns, body)
 
 
-def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines: int) -> Points:
+def _read_ascii(header: Header, columns: Sequence[int], text: str, n_header_lines: int) -> Points:
     rows = text_rows(text, n_header_lines)
     _check_amount(header, "lines", header.n_points, len(rows), slack=0)
     first_cells = np.cumsum([0, *(field.count for field in header.fields)])
     delimiter = "," if rows and "," in rows[0][1] else None
-    positions = [int(first_cells[position]) for position in columns.positions]
+    positions = [int(first_cells[position]) for position in columns]
     cells = read_rows(rows, positions, int(first_cells[-1]), delimiter)
-    fields = [header.fields[position] for position in columns.positions]
-    return columns.stack(of_kinds([field.name for field in fields], cells, [field.kind for field in fields]))
+    fields = [header.fields[position] for position in columns]
+    return stacked(of_kinds([field.name for field in fields], cells, [field.kind for field in fields]))
 
 
 def _without_padding(header: Header, body: bytes, n_header_bytes: int) -> bytes:
@@ -108,31 +109,29 @@ def _without_padding(header: Header, body: bytes, n_header_bytes: int) -> bytes:
     return body[:size] if (n_header_bytes + len(padding)) % PAGE_BYTES == 0 and not any(padding) else body
 
 
-def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
+def _read_binary(header: Header, columns: Sequence[int], body: bytes) -> Points:
     size = header.point_bytes
     _check_amount(header, "bytes", header.n_points * size, len(body), slack=size - 1)
     starts = np.cumsum([0, *(field.n_bytes for field in header.fields)])
     point = np.dtype(
         {
-            "names": [f"f{position}" for position in columns.positions],
-            "formats": [header.fields[position].kind for position in columns.positions],
-            "offsets": [int(starts[position]) for position in columns.positions],
+            "names": [f"f{position}" for position in columns],
+            "formats": [header.fields[position].kind for position in columns],
+            "offsets": [int(starts[position]) for position in columns],
             "itemsize": size,
         }
     )
     points = np.frombuffer(body, point, header.n_points)
-    return columns.stack([points[f"f{position}"] for position in columns.positions])
+    return stacked([points[f"f{position}"] for position in columns])
 
 
-def _read_compressed(header: Header, columns: NamedColumns, body: bytes) -> Points:
+def _read_compressed(header: Header, columns: Sequence[int], body: bytes) -> Points:
     """Fields lie one behind the other, each of all points, packed by LZF as one."""
     unpacked = _unpack(header, body)
     starts = np.cumsum([0, *(field.n_bytes * header.n_points for field in header.fields)])
-
-    def column(position: int) -> NDArray[np.number]:
-        return np.frombuffer(unpacked, header.fields[position].kind, header.n_points, int(starts[position]))
-
-    return columns.stack([column(position) for position in columns.positions])
+    return stacked(
+        [np.frombuffer(unpacked, header.fields[at].kind, header.n_points, int(starts[at])) for at in columns]
+    )
 
 
 def _unpack(header: Header, body: bytes) -> bytes:

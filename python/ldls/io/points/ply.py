@@ -16,7 +16,7 @@ from ldls.cloud import Points
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file, whole_file
 from ldls.io.labelled_points import CHANNELS, Labelled, colors, instances, positions
-from ldls.io.points.named_columns import NamedColumns
+from ldls.io.points.named_columns import find_columns, stacked
 from ldls.io.points.text_rows import Row, as_text, is_number, of_kinds, read_rows, split_header, text_rows, whole_number
 
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
@@ -78,13 +78,13 @@ def _read(content: bytes) -> Points:
                 f"property list {element.list_properties[0]!r} of element {element.name}; expected numbers "
                 "alone in the vertices and whatever stands before them; write it again without"
             )
-    columns = NamedColumns.find("element vertex", header.vertex.properties)
+    columns = find_columns("element vertex", header.vertex.properties)
     if header.encoding == "ascii":
         return _read_ascii(header, columns, as_text(body), len(lines))
     return _read_binary(header, columns, body)
 
 
-def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
+def _read_binary(header: Header, columns: Sequence[int], body: bytes) -> Points:
     order = BYTE_ORDERS[header.encoding]
     start = sum(element.count * element.dtype(order).itemsize for element in header.before)
     kind, count = header.vertex.dtype(order), header.vertex.count
@@ -96,7 +96,7 @@ def _read_binary(header: Header, columns: NamedColumns, body: bytes) -> Points:
         )
     _refuse_more(header, body, needed)
     vertices = np.frombuffer(body, kind, count, start)
-    return columns.stack([vertices[f"f{position}"] for position in columns.positions])
+    return stacked([vertices[f"f{position}"] for position in columns])
 
 
 def _refuse_more(header: Header, body: bytes, needed: int) -> None:
@@ -129,7 +129,7 @@ def _has_lists(elements: Sequence[Element]) -> bool:
     return any(element.count and element.list_properties for element in elements)
 
 
-def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines: int) -> Points:
+def _read_ascii(header: Header, columns: Sequence[int], text: str, n_header_lines: int) -> Points:
     rows = text_rows(text, n_header_lines)
     vertex = header.vertex
     start, count = sum(element.count for element in header.before), vertex.count
@@ -138,9 +138,9 @@ def _read_ascii(header: Header, columns: NamedColumns, text: str, n_header_lines
             f"element vertex {count} needs as many lines, the file ends after {max(0, len(rows) - start)}"
         )
     _refuse_more_lines(header, rows, start + count)
-    cells = read_rows(rows[start : start + count], columns.positions, len(vertex.properties))
-    names, kinds = ([each[position] for position in columns.positions] for each in (vertex.properties, vertex.types))
-    return columns.stack(of_kinds(names, cells, [np.dtype(kind) for kind in kinds]))
+    cells = read_rows(rows[start : start + count], columns, len(vertex.properties))
+    names, kinds = ([each[position] for position in columns] for each in (vertex.properties, vertex.types))
+    return stacked(of_kinds(names, cells, [np.dtype(kind) for kind in kinds]))
 
 
 def _parse(lines: list[Row]) -> Header:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ldls.cloud import MAX_COLUMNS
 from ldls.errors import CorruptFileError, TruncatedFileError, UnsupportedFormatError
 from ldls.io.files import open_file
-from ldls.io.points.named_columns import NamedColumns, plain_name
+from ldls.io.points.named_columns import find_columns, plain_name
 from ldls.io.points.text_rows import COMMENTS, Row, cells_of, is_number, read_rows, text_rows
 
 DELIMITERS = (";", "\t", ",")
@@ -53,7 +53,7 @@ def _parse(text: str) -> NDArray[np.float64]:
     if names is None:
         return _parse_nameless(rows)
     delimiter = _delimiter(rows[0][1]) if rows else None
-    return read_rows(rows, NamedColumns.find(f"line {number}", names).positions, len(names), delimiter)
+    return read_rows(rows, find_columns(f"line {number}", names), len(names), delimiter)
 
 
 def _behind_count(rows: list[Row]) -> list[Row]:
