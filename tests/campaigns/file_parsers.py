@@ -59,7 +59,7 @@ from ldls.io.ros.messages import (
 )
 from ldls.io.ros.point_cloud2 import decode, encode
 from ldls.labeling import Labeling
-from ldls.segmentation.object_rows import COLUMNS
+from ldls.segmentation.objects import COLUMNS
 from ldls.segmenters.onnx_file import read_onnx
 from mask_samples import of_coco, random_masks
 from segmenters import graphs

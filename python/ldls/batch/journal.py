@@ -38,7 +38,7 @@ from typing import IO, Any
 from ldls.batch.poses import holds_found_poses
 from ldls.errors import BatchError, CorruptFileError
 from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
-from ldls.segmentation.object_rows import COLUMNS
+from ldls.segmentation.objects import COLUMNS
 from ldls.viewing.formats import ENDINGS, TRACKS
 
 JOURNAL_NAME = "journal.jsonl"

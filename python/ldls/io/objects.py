@@ -16,7 +16,7 @@ from ldls.checks import checked
 from ldls.io.files import whole_file
 from ldls.io.options import of_ending
 from ldls.segmentation import Segmentation
-from ldls.segmentation.object_rows import COLUMNS, Row
+from ldls.segmentation.objects import COLUMNS, Row
 from ldls.view import camera_names
 
 DECIMALS = 4

@@ -2,7 +2,6 @@
 
 from ldls.segmentation.objects import SegmentedObject
 from ldls.segmentation.oriented_box import OrientedBox, fit_upright_box
-from ldls.segmentation.report import Report
-from ldls.segmentation.segmentation import Instance, Segmentation
+from ldls.segmentation.segmentation import Instance, Report, Segmentation
 
 __all__ = ["Instance", "OrientedBox", "Report", "Segmentation", "SegmentedObject", "fit_upright_box"]

@@ -1,13 +1,29 @@
-"""One record for each segmented instance."""
+"""One record for each segmented instance, and rows of tables: plain values under names that carry their units."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.masks import InstanceMask
 from ldls.segmentation.oriented_box import OrientedBox
+from ldls.view import SeenView, camera_names
+
+Row = dict[str, Any]
+"""An object: a value for each of `COLUMNS`."""
+
+COLUMNS = (
+    "label", "track", "category", "name", "score", "n_points", "distance_m",
+    "centroid_x_m", "centroid_y_m", "centroid_z_m",
+    "box_x_m", "box_y_m", "box_z_m", "length_m", "width_m", "height_m", "yaw_rad",
+    "velocity_x_m_s", "velocity_y_m_s",
+    "camera", "mask_left_px", "mask_top_px", "mask_width_px", "mask_height_px",
+)  # fmt: skip
+"""Columns of a table of objects, in their order."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,3 +56,37 @@ class SegmentedObject:
     def distance_m(self) -> float | None:
         """Distance from the lidar's origin to the centroid, in metres; None without points."""
         return None if self.centroid is None else float(np.linalg.norm(self.centroid))
+
+
+def object_rows(
+    objects: Sequence[SegmentedObject], sources: Sequence[Sequence[tuple[int, int]]], views: Sequence[SeenView]
+) -> Iterator[Row]:
+    """Yield a row for each object with points.
+
+    Args:
+        objects: The objects of a result.
+        sources: View and mask of each, as `Segmentation.sources`.
+        views: The views of the result.
+    """
+    cameras = camera_names(views)
+    for each, own in zip(objects, sources, strict=True):
+        if each.centroid is None or each.box is None:
+            continue
+        shown = first_seen(own, views)
+        camera, box = ("", (None,) * 4) if shown is None else (cameras[shown[0]], shown[1].bounding_box)
+        top, left, height, width = box
+        values = (
+            each.label, each.track, each.category, each.name, float(each.score), each.n_points, each.distance_m,
+            *each.centroid.tolist(),
+            *each.box.center.tolist(), *each.box.size.tolist(), float(each.box.yaw),
+            *each.velocity,
+            camera, left, top, width, height,
+        )  # fmt: skip
+        yield dict(zip(COLUMNS, values, strict=True))
+
+
+def first_seen(sources: Sequence[tuple[int, int]], views: Sequence[SeenView]) -> tuple[int, InstanceMask] | None:
+    """Number of the first view that shows an object with points, and its mask there; None if none does."""
+    masks = ((view, views[view].view.masks[mask]) for view, mask in sorted(sources))
+    # of several masks of an object one may be empty
+    return next(((view, mask) for view, mask in masks if mask.area), None)

@@ -26,7 +26,7 @@ from ldls.io.files import read_lines, whole_file
 from ldls.io.objects import DECIMALS
 from ldls.labeling import BACKGROUND, Labeling
 from ldls.segmentation import Segmentation, fit_upright_box
-from ldls.segmentation.object_rows import first_seen
+from ldls.segmentation.objects import first_seen
 from ldls.stages import project
 
 KITTI: tuple[str, ...] = (
