@@ -86,14 +86,7 @@ class BoxSegmenter:
         """
         objects = kitti_boxes.read_boxes(path, names=names)
         try:
-            return cls(
-                objects.boxes,
-                categories=objects.categories,
-                scores=objects.scores,
-                names=objects.names,
-                grabcut=grabcut,
-                min_score=min_score,
-            )
+            return cls(**objects, grabcut=grabcut, min_score=min_score)
         except MaskError as error:
             raise MaskError(f"{path}: {error}") from None
 

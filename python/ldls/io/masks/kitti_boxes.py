@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
+from typing import Any
 
 from ldls.categories import COCO_NAMES, class_id, folded
 from ldls.errors import MaskError, within
@@ -20,25 +20,10 @@ KITTI_NAMES: dict[int, str] = COCO_NAMES | {101: "Van", 102: "Cyclist", 103: "Mi
 """Name of each category id: COCO's, and KITTI's for the rest."""
 
 
-@dataclass(frozen=True)
-class KittiBoxes:
-    """The objects of a label_2 file as a segmenter of boxes takes them.
+def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = None) -> dict[str, Any]:
+    """Arguments of `InstanceMasks.from_boxes` but for the size: boxes, categories, scores and names of a label_2 file.
 
-    Attributes:
-        boxes: Left, top, right, bottom of each in pixels.
-        categories: Category id of each.
-        scores: Score of each; 1 where there is none.
-        names: Name of each category id.
-    """
-
-    boxes: list[tuple[float, float, float, float]]
-    categories: list[int]
-    scores: list[float]
-    names: Mapping[int, str]
-
-
-def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = None) -> KittiBoxes:
-    """The boxes of a label_2 file; DontCare rows are left out, objects without a score get 1.
+    DontCare rows are left out, objects without a score get 1.
 
     Args:
         path: Label file, or a detector's results in its layout.
@@ -58,12 +43,12 @@ def read_boxes(path: str | PathLike[str], *, names: Mapping[int, str] | None = N
         _ids_by_type(all_names) | {folded(name): category for name, category in of_kitti.items()} | _ids_by_type(given)
     )
     with within(path):
-        return KittiBoxes(
-            boxes=[each.bbox for each in objects],
-            categories=[_category(i, each, ids) for i, each in enumerate(objects)],
-            scores=[_score(i, each) for i, each in enumerate(objects)],
-            names=all_names,
-        )
+        return {
+            "boxes": [each.bbox for each in objects],
+            "categories": [_category(i, each, ids) for i, each in enumerate(objects)],
+            "scores": [_score(i, each) for i, each in enumerate(objects)],
+            "names": all_names,
+        }
 
 
 def _ids_by_type(names: Mapping[int, str]) -> dict[str, int]:
@@ -86,13 +71,7 @@ def read(path: str | PathLike[str], *, image_size: tuple[int, int], names: Mappi
     """
     objects = read_boxes(path, names=names)
     with within(path):
-        return InstanceMasks.from_boxes(
-            objects.boxes,
-            image_size,
-            categories=objects.categories,
-            scores=objects.scores,
-            names=objects.names,
-        )
+        return InstanceMasks.from_boxes(image_size=image_size, **objects)
 
 
 def _category(index: int, box: KittiObject, ids: Mapping[str, int]) -> int:
