@@ -9,12 +9,13 @@ from ldls.checks.values import (
     as_array,
     as_image_size,
     as_python,
+    choice,
+    did_you_mean,
     hold_python_values,
     numbers,
     shown,
     whole_number,
 )
-from ldls.checks.words import choice, did_you_mean
 
 __all__ = [
     "as_array",

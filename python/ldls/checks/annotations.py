@@ -9,10 +9,9 @@ import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Real
 from os import PathLike
-from typing import Any, Literal, TypeGuard, TypeVar, Union, cast, get_args, get_origin
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin
 
-from ldls.checks.values import is_of_numpy, is_whole, loaded, shown
-from ldls.checks.words import did_you_mean
+from ldls.checks.values import did_you_mean, is_of_numpy, is_whole, loaded, shown
 from ldls.errors import InputError, ParameterError
 
 MAKERS = {
@@ -222,11 +221,8 @@ def _refused(name: str, value: object, kind: _Kind, error: type[InputError] | No
     if not kind.is_noun:
         return (error or ParameterError)(f"{name}: got {shown(value)}, expected {kind.name}")
     mend = next((f"; {MAKERS[word]}" for word in kind.name.split() if word in MAKERS), "")
-    inside = next((each for each in value if not kind.accepts([each])), None) if _is_list(value) else None
+    listed = value if isinstance(value, list | tuple) else ()
+    inside = next((each for each in listed if not kind.accepts([each])), None)
     found = type(value).__name__ if inside is None else f"{type(inside).__name__} in a {type(value).__name__}"
     of_kind = ParameterError if kind.name == "Params" else InputError
     return (error or of_kind)(f"{name}: expected {kind.name}, got {found}{mend}")
-
-
-def _is_list(value: object) -> TypeGuard[list[Any] | tuple[Any, ...]]:
-    return isinstance(value, list | tuple)

@@ -1,12 +1,13 @@
-"""Numbers, sizes and arrays of a type and shape, or an error that names the argument."""
+"""Words that are known, numbers, sizes and arrays of a type and shape, or an error that names the argument."""
 
 from __future__ import annotations
 
 import operator
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
+from difflib import get_close_matches
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ldls.errors import DtypeError, InputError, LdlsError, LimitError, ParameterError, ShapeError
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+_Word = TypeVar("_Word", bound=str)
 MAX_ROWS = 2**31 - 1
 """Most rows of an array: points and labels are numbered by 32 bits with sign."""
 LATEST_S = 9.2e9
@@ -22,6 +24,25 @@ PYTHONS: dict[type, Callable[[Any], object]] = {Integral: int, Real: float, str:
 """What makes Python's own of a kind of number, and of text."""
 LONGEST = 80
 """Characters of a value that a message shows."""
+
+
+def choice(name: str, value: _Word, known: Collection[str]) -> _Word:
+    """`value`, if it is one of those `known`.
+
+    Raises:
+        ParameterError: It is none; the message lists them and has the nearest.
+    """
+    if value not in known:
+        expected = f"expected one of {', '.join(known)}{did_you_mean(str(value), known)}"
+        raise ParameterError(f"{name}: got {value!r}, {expected}")
+    return value
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """The end of a message: "; did you mean 'label'?", of those `known` the nearest; empty where none is near."""
+    spelt = {each.lower(): each for each in known}
+    near = get_close_matches(word.lower(), spelt, n=1, cutoff=0.5)
+    return f"; did you mean {spelt[near[0]]!r}?" if near else ""
 
 
 def whole_number(name: str, value: object, low: int, high: int = MAX_ROWS) -> int:
