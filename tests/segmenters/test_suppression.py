@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from ldls.segmenters.suppression import suppress
+from ldls.segmenters.yolo import suppress
 
 NEAR = [[0, 0, 10, 10], [1, 0, 11, 10], [20, 0, 30, 10]]
 

@@ -19,7 +19,6 @@ from ldls.segmenters.classes import Classes, contiguous_coco_classes, named_clas
 from ldls.segmenters.crops import Crop, assemble
 from ldls.segmenters.onnx_graph import Signature, Value, image_input
 from ldls.segmenters.outputs import check_finite, check_scores, expect_shape
-from ldls.segmenters.suppression import suppress
 
 N_COCO = 80
 MAX_INSTANCES = 300
@@ -184,6 +183,32 @@ def _best(candidates: Candidates, max_iou: float, min_score: float) -> Ints:
     if max_iou >= 1:
         return sure[:MAX_INSTANCES]
     return sure[suppress(boxes, scores, classes, max_iou=max_iou, max_kept=MAX_INSTANCES)]
+
+
+def suppress(boxes: F32, scores: F32, classes: Ints, *, max_iou: float, max_kept: int) -> Ints:
+    """Indices of the boxes that no better box of their class overlaps by more than `max_iou`, best first.
+
+    Args:
+        boxes: (N, 4) left, top, right, bottom.
+        scores: (N,) scores; of equal ones the first is the better.
+        classes: (N,) classes.
+        max_iou: Largest overlap, as intersection over union, of two boxes that are both kept.
+        max_kept: How many are kept at most.
+    """
+    left, top, right, bottom = boxes.T.astype(np.float64)  # areas of huge boxes overflow in single precision
+    areas = (right - left) * (bottom - top)
+    waiting = np.argsort(-scores, kind="stable")
+    kept: list[int] = []
+    while waiting.size and len(kept) < max_kept:
+        best, waiting = waiting[0], waiting[1:]
+        kept.append(int(best))
+        wide = np.minimum(right[best], right[waiting]) - np.maximum(left[best], left[waiting])
+        tall = np.minimum(bottom[best], bottom[waiting]) - np.maximum(top[best], top[waiting])
+        shared = np.maximum(wide, 0) * np.maximum(tall, 0)
+        # no division: boxes without area overlap nothing
+        hidden = (shared > max_iou * (areas[best] + areas[waiting] - shared)) & (classes[waiting] == classes[best])
+        waiting = waiting[~hidden]
+    return np.array(kept, np.int64)
 
 
 def _check_prototypes(name: str, prototypes: F32) -> None:

@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from itertools import islice
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 from ldls._optional import require
 from ldls.errors import (
@@ -25,7 +26,6 @@ from ldls.errors import (
 )
 from ldls.io.files import opened, parsing
 from ldls.io.names import name_order
-from ldls.io.ros.known_types import KnownTypes
 from ldls.io.ros.messages import Message, RawMessage, Topic, Types, seconds, standard_types
 from ldls.io.ros.salvage import NO_LIMIT, Salvage, check_database_size, open_bag_file, salvage
 
@@ -200,7 +200,7 @@ def _indexed(path: Path) -> Bag:
         except highlevel.AnyReaderError:
             # a type that nobody may ask for must not cost the others
             reader = highlevel.AnyReader([_BagPath(path)], default_typestore=types)
-            reader.readers = [KnownTypes(each) for each in reader.readers]
+            reader.readers = [_KnownTypes(each) for each in reader.readers]
             reader.open()
         topics = {
             name: Topic(name, str(info.msgtype), int(info.msgcount), any(_is_latched(c.ext) for c in info.connections))
@@ -225,6 +225,51 @@ def _indexed(path: Path) -> Bag:
             )
 
     return Bag(path, reader.typestore, topics, read, reader.close, ros2=bool(reader.is2))
+
+
+class _KnownTypes:
+    """A reader of `rosbags` whose connections lack the definitions that cannot be parsed, or are none of their type."""
+
+    def __init__(self, reader: Any) -> None:  # noqa: ANN401
+        """Stand in for `reader`."""
+        self._reader = reader
+
+    @property
+    def connections(self) -> list[Any]:
+        """Those of the reader; where the definition is of no use, without it."""
+        interfaces = require("rosbags.interfaces", "ros")
+        none = interfaces.MessageDefinition(interfaces.MessageDefinitionFormat.NONE, "")
+        return [
+            connection if _is_known(connection) else connection._replace(msgdef=none, digest="")
+            for connection in self._reader.connections
+        ]
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+        return getattr(self._reader, name)
+
+    def __enter__(self) -> Self:
+        self._reader.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._reader.__exit__(kind, error, traceback)
+
+
+def _is_known(connection: Any) -> bool:  # noqa: ANN401
+    typesys = require("rosbags.typesys", "ros")
+    formats = require("rosbags.interfaces", "ros").MessageDefinitionFormat
+    if connection.msgdef.format != formats.MSG:
+        return True
+    store = typesys.get_typestore(typesys.Stores.EMPTY)
+    try:
+        store.register(typesys.get_types_from_msg(connection.msgdef.data, connection.msgtype))
+        ros2 = hasattr(connection.ext, "offered_qos_profiles")
+        digest = store.hash_rihs01(connection.msgtype) if ros2 else store.generate_msgdef(connection.msgtype)[1]
+    except Exception:
+        return False
+    return not connection.digest or bool(digest == connection.digest)
 
 
 def _is_latched(ext: Any) -> bool:  # noqa: ANN401
