@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ldls.camera.rigid import transformed
 from ldls.evaluation import ClassSet
 from ldls.io.labels import read_kitti_objects
-from ldls.io.labels.kitti_objects import in_camera_frame
 from ldls.simulation import (
     PixelTruth,
     SegmenterErrors,
@@ -95,7 +95,7 @@ def test_label_2_has_one_box_around_person_and_bicycle(frame, tmp_path):
     write_kitti(tmp_path, "000004", frame)
     (box,) = read_kitti_objects(tmp_path / "training/label_2/000004.txt")
     assert box.type == "Cyclist"
-    placed = in_camera_frame(frame.points, frame.images[0].camera)
+    placed = transformed(frame.points, frame.images[0].camera.T_camera_lidar)
     assert box.contains(placed)[frame.truth.instances == 1].mean() > 0.95
 
 

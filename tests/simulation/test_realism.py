@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ldls.camera.rigid import transformed
 from ldls.datasets import KittiObjectSource
 from ldls.io.labels import read_kitti_objects
-from ldls.io.labels.kitti_objects import in_camera_frame
 from ldls.labeling import Labeling
 from ldls.simulation import scene_frame
 from ldls.stages import direct_labels, project
@@ -35,7 +35,8 @@ def simulated():
 
 def labelled_by_boxes(frame, objects):
     """The frame with KITTI's boxes of cars and people as truth; their lowest 0.1 m is left out, as ground is there."""
-    placed, instances = in_camera_frame(frame.points, frame.images[0].camera), np.zeros(len(frame.points), np.int32)
+    placed = transformed(frame.points, frame.images[0].camera.T_camera_lidar)
+    instances = np.zeros(len(frame.points), np.int32)
     boxes = [one for one in objects if one.type in CLASSES]
     for number, box in enumerate(boxes, start=1):
         instances[box.contains(placed) & (box.in_box_frame(placed)[:, 1] >= GROUND_M)] = number

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ldls.camera import Camera
+from ldls.camera.rigid import transformed
 from ldls.checks import checked
 from ldls.cloud import as_points
-from ldls.io.labels.kitti_objects import KittiObject, in_camera_frame, label_by_boxes
+from ldls.io.labels.kitti_objects import KittiObject, label_by_boxes
 from ldls.labeling import Labeling
 
 GROUND_THICKNESS_M = 0.15
@@ -59,7 +60,7 @@ def annotate(objects: Sequence[KittiObject], points: ArrayLike, camera: Camera, 
     labeling = label_by_boxes(objects, points, camera)
     if not clean:
         return Annotation(labeling, 0)
-    placed = in_camera_frame(as_points(points), camera)
+    placed = transformed(as_points(points), camera.T_camera_lidar)
     ground = np.zeros(len(labeling), bool)
     for row, object_ in enumerate(objects, start=1):
         members = np.flatnonzero(labeling.instances == row)

@@ -24,11 +24,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ldls.camera import Camera
+from ldls.camera.rigid import transformed
 from ldls.errors import ParameterError
 from ldls.io.files import read_lines, whole_file
 from ldls.io.images import png_of
 from ldls.io.labels import write_annotations
-from ldls.io.labels.kitti_objects import in_camera_frame, wrapped
+from ldls.io.labels.kitti_objects import wrapped
 from ldls.masks import InstanceMasks
 from ldls.simulation.scene_object import KITTI_TYPES, SceneObject
 from ldls.simulation.simulated_frame import SimulatedFrame, SimulatedImage
@@ -153,7 +154,7 @@ def _label_rows(things: tuple[SceneObject, ...], image: SimulatedImage) -> list[
 
 def _row(thing: SceneObject, camera: Camera, visible: float) -> str:
     bottom = np.array([*thing.centre_m[:2], thing.centre_m[2] - thing.height_m / 2])
-    x, y, z = in_camera_frame(bottom[None], camera)[0]
+    x, y, z = transformed(bottom[None], camera.T_camera_lidar)[0]
     if z < NEAREST_M:
         return ""
     heading = np.array([np.cos(thing.yaw), np.sin(thing.yaw), 0.0])
@@ -169,7 +170,7 @@ def _row(thing: SceneObject, camera: Camera, visible: float) -> str:
 
 def _image_box(thing: SceneObject, camera: Camera) -> tuple[tuple[float, float, float, float], float]:
     """(left, top, right, bottom) within the image, and the share of the box outside it."""
-    corners = in_camera_frame(thing.corners_m(), camera)
+    corners = transformed(thing.corners_m(), camera.T_camera_lidar)
     corners[:, 2] = np.maximum(corners[:, 2], 0.2)
     homogeneous = np.column_stack([corners, np.ones(8)]) @ camera.projection.T
     uv = homogeneous[:, :2] / homogeneous[:, 2:]

@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 
 import ldls
+from ldls.camera.rigid import transformed
 from ldls.errors import CorruptFileError, InputError, TruncatedFileError
 from ldls.evaluation import ClassSet
-from ldls.io.labels.kitti_objects import (
-    KittiObject,
-    in_camera_frame,
-    label_by_boxes,
-    read_kitti_boxes,
-    read_kitti_objects,
-)
+from ldls.io.labels.kitti_objects import KittiObject, label_by_boxes, read_kitti_boxes, read_kitti_objects
 from ring_samples import as_views, random_ring
 
 ROW = "Car 0.25 1 -1.57 599.41 156.40 629.75 189.25 1.5 1.6 4.0 1.0 1.5 20.0 -1.56"
@@ -178,7 +173,7 @@ def test_boxes_that_are_written_hold_the_points_of_their_object(small_scene, tmp
     ldls.save(result, tmp_path / "a.txt")
     rows = read_kitti_objects(tmp_path / "a.txt")
     assert [row.type for row in rows] == ["Pedestrian", "Car"]
-    in_camera = in_camera_frame(placed, seen_by)
+    in_camera = transformed(placed, seen_by.T_camera_lidar)
     for row, found in zip(rows, result.objects, strict=True):
         own = result.labels == found.label
         assert found.n_points > 50 and row.contains(in_camera[own]).all()
@@ -251,7 +246,7 @@ def test_several_cameras_are_refused(tmp_path):
 def test_real_objects_lie_in_the_boxes_that_are_written(kitti_frame, tmp_path):
     result = ldls.segment(kitti_frame.points, kitti_frame.masks, kitti_frame.camera)
     ldls.save(result, tmp_path / "a.txt")
-    points = in_camera_frame(kitti_frame.points, kitti_frame.camera)
+    points = transformed(kitti_frame.points, kitti_frame.camera.T_camera_lidar)
     found = [each for each in result.objects if each.n_points]
     for row, each in zip(read_kitti_objects(tmp_path / "a.txt"), found, strict=True):
         assert row.contains(points[result.labels == each.label]).all()

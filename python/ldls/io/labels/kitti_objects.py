@@ -150,7 +150,8 @@ def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Ca
         left, top, right, bottom = region.bbox
         u, v = pixels.T
         classes[in_view[(u >= left) & (u <= right) & (v >= top) & (v <= bottom)]] = names.index(region.type)
-    seen = in_camera_frame(cloud[in_view], camera)
+    # infinite coordinates become NaN, which lies in no box
+    seen = transformed(cloud[in_view], camera.T_camera_lidar)
     boxes = [(number, row) for number, row in enumerate(objects, start=1) if not row.is_region]
     for number, row in sorted(boxes, key=lambda box: -math.prod(box[1].dimensions)):
         inside = in_view[row.contains(seen)]
@@ -158,12 +159,6 @@ def label_by_boxes(objects: Sequence[KittiObject], points: ArrayLike, camera: Ca
     ignored = np.ones(len(cloud), bool)
     ignored[in_view] = False
     return Labeling(classes, instances, ignored, names)
-
-
-def in_camera_frame(points: ArrayLike, camera: Camera) -> NDArray[np.float64]:
-    """(N, 3) `points` of the lidar frame in the rectified camera frame, in metres: x right, y down, z forward."""
-    # infinite coordinates become NaN, which lies in no box
-    return transformed(np.asarray(points), camera.T_camera_lidar)
 
 
 def write(path: Path, result: Segmentation) -> None:
@@ -192,7 +187,8 @@ def _from_result(result: Segmentation, label: int) -> KittiObject:
     if shown is not None:
         top, left, rows, columns = shown[1].bounding_box
         bbox = (left, top, left + columns - 1, top + rows - 1)
-    box = _upright_box(in_camera_frame(result.points[result.labels == label], result.views[0].view.camera))
+    own = result.points[result.labels == label]
+    box = _upright_box(transformed(own, result.views[0].view.camera.T_camera_lidar))
     x, _, z = box.location
     return replace(
         box,
