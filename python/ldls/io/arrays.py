@@ -41,7 +41,9 @@ PLAIN_BYTES = 1 << 28
 """Size up to which an array may be packed as well as it likes: masks without a pixel are."""
 MAX_RATIO = 700
 """Larger arrays unpack to at most so many times the bytes of their archive; 40 masks of ellipses reach 650."""
-BEST_RATIOS = {zipfile.ZIP_STORED: 1, zipfile.ZIP_DEFLATED: 1032}
+DEFLATE_RATIO = 1032
+"""Nothing unpacks to more than so many times its size."""
+BEST_RATIOS = {zipfile.ZIP_STORED: 1, zipfile.ZIP_DEFLATED: DEFLATE_RATIO}
 """The ways of packing that NumPy has, and how many times its size what they pack can have at most."""
 LISTED = 20
 _parsing_header = threading.Lock()
@@ -199,15 +201,10 @@ def _read_header(start: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], in
     head = io.BytesIO(start)
     try:
         with _parsing_header:
-            return _parsed_header(head)
+            version = npy.read_magic(head)
+            read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+            return (*read_header(head), head.tell())
     except LdlsError:
         raise
     except (Exception, MemoryError) as error:  # the parser of Python calls too many brackets a lack of memory
         raise CorruptFileError(f"not a whole .npy file ({error})") from None
-
-
-def _parsed_header(head: io.BytesIO) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
-    version = npy.read_magic(head)
-    read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, in_columns, dtype = read_header(head)
-    return shape, in_columns, dtype, head.tell()

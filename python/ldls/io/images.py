@@ -15,6 +15,7 @@ from PIL.Image import Transpose
 import ldls._ldls as _ldls
 from ldls.checks import checked
 from ldls.errors import CorruptFileError, LimitError, TruncatedFileError, UnsupportedFormatError
+from ldls.io.arrays import DEFLATE_RATIO
 from ldls.io.files import open_file, parsing
 
 MAX_BYTES = 1 << 30
@@ -22,8 +23,6 @@ SIGNATURES = {"PNG": b"\x89PNG\r\n\x1a\n", "JPEG": b"\xff\xd8\xff"}
 """First bytes of each format that is opened: Pillow knows more of them, and starts programs for some."""
 CHANNELS = {"L": 1, "LA": 2, "RGB": 3, "RGBA": 4}
 """Bytes of a pixel by the mode of a picture."""
-DEFLATE_RATIO = 1032
-"""Nothing in a PNG unpacks to more than so many times its size."""
 PIXELS_A_BYTE = 1024
 """Most pixels that a byte of a JPEG can hold: a block of 64 takes a bit, and often more."""
 TURNS = {

@@ -48,8 +48,7 @@ def _rows(content: IO[bytes]) -> Iterator[dict[str, Any]]:
             raise json.JSONDecodeError("Expecting '['", text, 0)
         at = start.end()
         while True:
-            between = BETWEEN.match(text, at)
-            at = at if between is None else between.end()
+            at = BETWEEN.match(text, at).end()  # type: ignore[union-attr]  # it matches nothing, too
             if text.startswith("]", at):
                 return
             if at < len(text) and text[at] != "{":

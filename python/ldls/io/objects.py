@@ -122,10 +122,11 @@ def _annotations(
         ids = {}
         for camera, height, width in each.images:
             ids[camera] = len(images) + 1
+            parts = (each.frame,) if each.frame and len(each.images) == 1 else (camera, each.frame)
             images.append(
                 {
                     "id": ids[camera],
-                    "file_name": each.frame if each.frame and len(each.images) == 1 else _joined(camera, each.frame),
+                    "file_name": "/".join(filter(None, parts)),
                     "height": height,
                     "width": width,
                     "frame": each.frame,
@@ -163,10 +164,6 @@ def _annotation(number: int, frame: str, image: int | None, row: Row) -> dict[st
             "yaw": row["yaw_rad"],
         },
     }
-
-
-def _joined(*parts: str) -> str:
-    return "/".join(part for part in parts if part)
 
 
 def _rounded(value: object) -> object:

@@ -23,7 +23,8 @@ def entries_of(text: str, path: str) -> object:
         ImportError: The extra `yaml` is not installed.
     """
     yaml = require("yaml", "yaml")
-    text = _without_opencv_directive(text)
+    # OpenCV's %YAML:1.0 is no directive of YAML; as a comment it keeps the numbers of the lines
+    text = f"#{text}" if text.startswith("%YAML:") else text
     try:
         _check_growth(yaml, text)
         return next(iter(yaml.load_all(text, _loader(yaml))), None)
@@ -33,11 +34,6 @@ def entries_of(text: str, path: str) -> object:
         if "nesting" in str(problem):
             problem = TOO_DEEP
         raise CalibrationError(f"{path}{_line_of(error)}: not YAML ({problem})") from None
-
-
-def _without_opencv_directive(text: str) -> str:
-    """`text` with OpenCV's `%YAML:1.0`, which is no directive of YAML, as a comment: lines keep their numbers."""
-    return f"#{text}" if text.startswith("%YAML:") else text
 
 
 def _check_growth(yaml: Any, text: str) -> None:  # noqa: ANN401

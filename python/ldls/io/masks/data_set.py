@@ -203,8 +203,7 @@ class MaskDataSet:
         return at + 1
 
     def _skip(self, at: int) -> int:
-        blank = BLANK.match(self._text, at)
-        return at if blank is None else blank.end()
+        return BLANK.match(self._text, at).end()  # type: ignore[union-attr]  # it matches nothing, too
 
     def _expect(self, character: str, at: int) -> int:
         """The place after a character and what is blank behind it."""

@@ -10,7 +10,6 @@ import struct
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,18 +191,14 @@ def write(path: Path, result: Labelled) -> None:
     header.add_extra_dims([laspy.ExtraBytesParams(name, kind) for name, kind in DIMENSIONS.items()])
     las = laspy.LasData(header, laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header))
     las.intensity = _intensities(result.points)
-    _fill(las, xyz, result)
-    with whole_file(path) as file:
-        las.write(file, do_compress=path.suffix.lower() == ".laz")
-
-
-def _fill(las: Any, xyz: NDArray[np.float64], result: Labelled) -> None:  # noqa: ANN401
     las.x, las.y, las.z = xyz.T
     for channel, column in zip(CHANNELS, colors(result).T, strict=True):
         las[channel] = column.astype(np.uint16) * MAX_COLOR
     las["instance"] = instances(result)
     las["category"] = result.categories.astype(np.uint16)
     las["confidence"] = result.confidence
+    with whole_file(path) as file:
+        las.write(file, do_compress=path.suffix.lower() == ".laz")
 
 
 def _check_writable(path: Path, xyz: NDArray[np.float64], categories: NDArray[np.int32]) -> None:
