@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from ldls.errors import MaskError
 from ldls.io.masks import kitti_boxes
 from ldls.masks import InstanceMasks
-from ldls.segmenters.classes import Classes
 from ldls.segmenters.crops import Crop, assemble
 from ldls.segmenters.grabcut import cut
 from ldls.segmenters.segmenter import check_image, check_min_score
@@ -105,7 +104,7 @@ class BoxSegmenter:
         crops = (
             Crop(cut(pixels, *mask.bounding_box), *mask.bounding_box[:2], mask.category, mask.score) for mask in masks
         )
-        return assemble(crops, masks.image_size, Classes({}, masks.names))
+        return assemble(crops, masks.image_size, masks.names)
 
     def __repr__(self) -> str:
         return f"BoxSegmenter({len(self.boxes)} boxes, grabcut={self.grabcut}, min_score={self.min_score})"

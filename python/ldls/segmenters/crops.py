@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 import ldls._ldls as _ldls
 from ldls.categories import is_object
 from ldls.masks import InstanceMasks
-from ldls.segmenters.classes import Classes
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +32,12 @@ class Crop:
     score: float
 
 
-def assemble(crops: Iterable[Crop], image_size: tuple[int, int], classes: Classes) -> InstanceMasks:
+def assemble(crops: Iterable[Crop], image_size: tuple[int, int], names: Mapping[int, str]) -> InstanceMasks:
     """Masks of an image of (height, width) pixels; instances without a pixel, and of no object, are left out."""
     canvas = np.zeros(image_size, np.bool_)
     rles, categories, scores = [], [], []
     for crop in crops:  # one at a time: a crop may be as large as the image
-        if crop.pixels.any() and is_object(classes.names[crop.category]):
+        if crop.pixels.any() and is_object(names[crop.category]):
             rles.append(_encode(crop, canvas))
             categories.append(crop.category)
             scores.append(crop.score)
@@ -47,7 +46,7 @@ def assemble(crops: Iterable[Crop], image_size: tuple[int, int], classes: Classe
         image_size,
         categories=np.array(categories, np.int32),
         scores=np.array(scores, np.float32),
-        names=classes.names,
+        names=names,
     )
 
 

@@ -63,7 +63,7 @@ class MaskRcnn:
         else:
             grids = _small_grids(outputs[3], detections, image_size)
             crops = _pasted(padded_paste, detections, grids, image_size, HALF)
-        return assemble(crops, image_size, self.classes)
+        return assemble(crops, image_size, self.classes.names)
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class ZooMaskRcnn:
         detections = [replace(one, box=one.box / ratio) for one in _detections(outputs, self.classes, min_score)]
         grids = _small_grids(outputs[3], detections, image_size)
         crops = _pasted(plain_paste, detections, grids, image_size, np.nextafter(HALF, np.float32(1)))
-        return assemble(crops, image_size, self.classes)
+        return assemble(crops, image_size, self.classes.names)
 
 
 def detection_outputs(signature: Signature) -> tuple[str, ...] | None:

@@ -96,9 +96,10 @@ class OnnxSegmenter:
         self.min_score = check_min_score(min_score)
         file = read_onnx(path)
         signature = Signature.of(str(file.path), file.model)
+        named = names if names is None or isinstance(names, Mapping) else dict(enumerate(names))
         self._image = image_input(signature)
         self.kind = _kind(signature) if kind is None else choice("kind", kind, KINDS)
-        self._family = KINDS[self.kind].family(signature, _by_class(names))
+        self._family = KINDS[self.kind].family(signature, named)
         classes = self._family.classes
         self.names = None if classes is None else classes.names
         self._source = signature.source
@@ -151,7 +152,7 @@ def _mask_rcnn(signature: Signature, names: Names | None) -> Family:
 
 
 def _zoo_mask_rcnn(signature: Signature, names: Names | None) -> Family:
-    classes: Classes = contiguous_coco_classes(1) if names is None else named_classes(names)
+    classes = contiguous_coco_classes(1) if names is None else named_classes(names)
     return ZooMaskRcnn(_detection_names(signature), classes)
 
 
@@ -181,10 +182,6 @@ def _kind(signature: Signature) -> str:
             "docs/segmenters.md says how to export one"
         )
     return family
-
-
-def _by_class(names: Mapping[int, str] | Sequence[str] | None) -> Names | None:
-    return names if names is None or isinstance(names, Mapping) else dict(enumerate(names))
 
 
 def _session(file: OnnxFile, providers: Sequence[str] | None, threads: int | None) -> Any:  # noqa: ANN401

@@ -91,7 +91,7 @@ def _parse(content: bytes) -> Any:  # noqa: ANN401
 
 
 def _check_fields(content: bytes) -> None:
-    """Walks the outermost fields: these alone tell a file that was cut off from one that is something else."""
+    """Refuse what is cut off or no model, which the outermost fields alone tell apart."""
     at = 0
     try:
         while at < len(content):

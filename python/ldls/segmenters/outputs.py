@@ -30,10 +30,10 @@ def check_scores(scores: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def check_finite(what: str, values: NDArray[Any], instances: NDArray[np.int64]) -> None:
-    """Holds one row of `values` for each of `instances` to be finite.
+    """Refuse `values`, a row for each of `instances`, that are not finite.
 
     Raises:
-        MaskError: It is not; the message names the instance and `what`.
+        MaskError: A row is not; the message names the instance and `what`.
     """
     wrong = np.flatnonzero(~np.isfinite(values).all(axis=tuple(range(1, values.ndim))))
     if wrong.size:
@@ -44,7 +44,7 @@ def check_finite(what: str, values: NDArray[Any], instances: NDArray[np.int64]) 
 
 
 def expect_shape(name: str, values: NDArray[Any], shape: tuple[int | None, ...]) -> None:
-    """Holds an output to `shape`, where None stands for any length.
+    """Refuse an output of another shape than `shape`, where None stands for any length.
 
     Raises:
         FileFormatError: It has another.

@@ -83,7 +83,7 @@ class TorchvisionSegmenter:
             )
             for i in np.flatnonzero(scores >= np.float32(self.min_score)).tolist()
         )
-        return assemble(crops, (pixels.shape[0], pixels.shape[1]), self._classes)
+        return assemble(crops, (pixels.shape[0], pixels.shape[1]), self.names)
 
     def __repr__(self) -> str:
         return f"TorchvisionSegmenter({self.name!r}, device={self.device!r}, min_score={self.min_score})"

@@ -134,7 +134,7 @@ class YoloSeg:
         letterbox = self._letterbox(image_size)
         boxes = letterbox.boxes_in_image(candidates.boxes[kept])
         crops = _drawn(candidates, kept, boxes, prototypes, letterbox, classes)
-        return assemble(crops, image_size, classes)
+        return assemble(crops, image_size, classes.names)
 
     def _letterbox(self, image_size: tuple[int, int]) -> Letterbox:
         return Letterbox.fit(image_size, self.input_size, stride=self.stride)
