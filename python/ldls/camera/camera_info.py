@@ -36,21 +36,21 @@ def arguments(fields: Fields, T_camera_lidar: NDArray[np.float64], *, rectified:
     Raises:
         CalibrationError: The camera is not calibrated, or a field is missing or cannot be a camera's.
     """
-    crop = _Crop.of(fields)
+    offset, binning, size = _part(fields)
     if rectified:
         rotation = np.eye(3)
         if fields.find("R", "rectification_matrix") is not None:
             rotation = fields.matrix((3, 3), "R", "rectification_matrix")
         return {
-            "projection": crop.apply(_not_zero(fields, (3, 4), "P", "projection_matrix")),
+            "projection": _cropped(_not_zero(fields, (3, 4), "P", "projection_matrix"), offset, binning),
             "T_camera_lidar": rigid(f"{fields.place}: R", from_parts(rotation)) @ T_camera_lidar,
-            "image_size": crop.image_size,
+            "image_size": size,
         }
     return {
-        "projection": crop.apply(_not_zero(fields, (3, 3), "K", "camera_matrix")),
+        "projection": _cropped(_not_zero(fields, (3, 3), "K", "camera_matrix"), offset, binning),
         "T_camera_lidar": T_camera_lidar,
         "distortion": _distortion(fields),
-        "image_size": crop.image_size,
+        "image_size": size,
     }
 
 
@@ -85,34 +85,31 @@ def _distortion(fields: Fields) -> Distortion:
     return fields.distortion(model, coefficients)
 
 
-class _Crop:
-    """The part of the full image that is left: cut to a region, then shrunk by binning."""
+def _part(fields: Fields) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, int] | None]:
+    """Offset x, y and binning x, y of the part of the full image that is left, and its (height, width) if known."""
+    roi = fields.find("roi")
+    region = roi if isinstance(roi, Mapping) else _attributes(roi, ROI_FIELDS)
+    roi_fields = Fields(f"{fields.place}: roi", region)
+    offset = np.array([roi_fields.whole_number(name) or 0 for name in ("x_offset", "y_offset")])
+    binning = np.array([fields.whole_number(name) or 1 for name in ("binning_x", "binning_y")])
+    full, cut = fields.image_size(), roi_fields.image_size()
+    kept = cut or full
+    if full and cut and not (offset[::-1] + cut <= full).all():
+        raise CalibrationError(
+            f"{roi_fields.place}: {cut} (height, width) at x {offset[0]}, y {offset[1]} is not inside {full}"
+        )
+    size = (kept[0] // int(binning[1]), kept[1] // int(binning[0])) if kept else None
+    return offset.astype(np.float64), binning.astype(np.float64), size
 
-    def __init__(self, offset: NDArray[np.float64], binning: NDArray[np.float64], size: tuple[int, int] | None) -> None:
-        self.offset, self.binning, self.image_size = offset, binning, size
 
-    @classmethod
-    def of(cls, fields: Fields) -> _Crop:
-        roi = fields.find("roi")
-        region = roi if isinstance(roi, Mapping) else _attributes(roi, ROI_FIELDS)
-        roi_fields = Fields(f"{fields.place}: roi", region)
-        offset = np.array([roi_fields.whole_number(name) or 0 for name in ("x_offset", "y_offset")])
-        binning = np.array([fields.whole_number(name) or 1 for name in ("binning_x", "binning_y")])
-        full, cut = fields.image_size(), roi_fields.image_size()
-        kept = cut or full
-        if full and cut and not (offset[::-1] + cut <= full).all():
-            raise CalibrationError(
-                f"{roi_fields.place}: {cut} (height, width) at x {offset[0]}, y {offset[1]} is not inside {full}"
-            )
-        size = (kept[0] // int(binning[1]), kept[1] // int(binning[0])) if kept else None
-        return cls(offset.astype(np.float64), binning.astype(np.float64), size)
-
-    def apply(self, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`matrix`, (3, 3) or (3, 4), to pixels of what is left of the full image."""
-        cropped = matrix.copy()
-        with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is then not finite
-            # a pixel of a binned image has its centre in the middle of those it is made of
-            cropped[:2] += (0.5 - self.offset[:, None]) * matrix[2]
-            cropped[:2] /= self.binning[:, None]
-            cropped[:2] -= 0.5 * matrix[2]
-        return cropped
+def _cropped(
+    matrix: NDArray[np.float64], offset: NDArray[np.float64], binning: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """`matrix`, (3, 3) or (3, 4), to pixels of what is left of the full image."""
+    cropped = matrix.copy()
+    with np.errstate(over="ignore", invalid="ignore"):  # the camera refuses what is then not finite
+        # a pixel of a binned image has its centre in the middle of those it is made of
+        cropped[:2] += (0.5 - offset[:, None]) * matrix[2]
+        cropped[:2] /= binning[:, None]
+        cropped[:2] -= 0.5 * matrix[2]
+    return cropped
