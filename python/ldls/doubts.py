@@ -30,7 +30,7 @@ COARSEST_STEP_M = 0.01
 EXPECTED_ON_MASKS = 20.0
 """Points that masks of this area would have on them by chance, from which on none at all is no chance."""
 STEEPEST = 0.97
-"""The same up to which a camera may look up, where a leaning wall in the image passes for ground."""
+"""Share of z of the lidar along a camera's axis up to which a leaning wall in the image may pass for ground."""
 RESIZED = 1.5
 """Times the middle of an image that a principal point is at, or the reverse, beyond which it is that of another."""
 ALIKE = 1.25

@@ -122,7 +122,9 @@ def _sequence(path: Path, wanted: str | int | None) -> Path:
 
 
 def _read_stamps(path: Path, names: Sequence[str]) -> tuple[float | None, ...]:
-    return read_stamps(path / TIMES, names, _seconds, example="0.103736, in seconds")
+    return read_stamps(
+        path / TIMES, names, lambda line: as_seconds("stamp", number_of(line)), example="0.103736, in seconds"
+    )
 
 
 def _poses_file(path: Path) -> Path | None:
@@ -139,7 +141,3 @@ def _trajectory(path: Path, poses: Path | None, camera: Camera) -> Trajectory | 
     lines = [str(number) for number in range(len(read_lines(path / TIMES)))]
     stamps = np.array(_read_stamps(path, lines), np.float64)
     return read_poses(poses, format="kitti", stamps=stamps, T_camera_lidar=camera.T_camera_lidar)
-
-
-def _seconds(line: str) -> float:
-    return as_seconds("stamp", number_of(line))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ldls.camera import Distortion
 from ldls.camera.rigid import from_parts, from_quaternion
-from ldls.datasets.file_source import choose
+from ldls.datasets.file_source import check_folders, choose
 from ldls.errors import CalibrationError, CorruptFileError, LeftOutWarning, SourceError, some, within
 from ldls.io.files import parsing
 from ldls.io.json_rows import read_json_rows
@@ -77,8 +77,7 @@ def find_tables(path: Path, version: str | None) -> Path:
         SourceError: There is none, there are several, or one lacks a table.
         FileNotFoundError: There is no folder `path`.
     """
-    if not path.exists():
-        raise FileNotFoundError(f"{path}: there is no such folder")
+    check_folders(path, ())
     versions = sorted(table.parent.name for table in path.glob("v1.0-*/sample_data.json"))
     if not versions:
         there = some(sorted(each.name for each in path.glob("*"))) or "nothing"

@@ -39,9 +39,13 @@ def explain(result: Segmentation, point: int) -> Explanation:
             with other sweeps, whose points it does not hold; or the point has the label of another sweep, by a tracker.
         ImportError: The extra `eval` is not installed.
     """
-    point = _checked_row(point, len(result.points))
-    if len(result.labels) != len(result.points):
-        raise InputError(f"result: {len(result.labels)} labels, expected one for each of {len(result.points)} points")
+    count = len(result.points)
+    if not 0 <= point < count:
+        expected = f"expected 0 to {count - 1}, its row in the cloud" if count else "the cloud is empty"
+        raise ParameterError(f"point: got {shown(point)}, {expected}")
+    point = operator.index(point)
+    if len(result.labels) != count:
+        raise InputError(f"result: {len(result.labels)} labels, expected one for each of {count} points")
     label, diffused = int(result.labels[point]), int(result.diffused_labels[point])
     if label > 0 and label != diffused:
         raise InputError(
@@ -63,13 +67,6 @@ def explain(result: Segmentation, point: int) -> Explanation:
         names={-1: "out of view", 0: "background", **{each.label: each.name for each in result.instances}},
         **seen,
     )
-
-
-def _checked_row(point: int, count: int) -> int:
-    if not 0 <= point < count:
-        expected = f"expected 0 to {count - 1}, its row in the cloud" if count else "the cloud is empty"
-        raise ParameterError(f"point: got {shown(point)}, {expected}")
-    return operator.index(point)
 
 
 def _in_view(result: Segmentation, system: Rebuilt, at: int) -> dict[str, Any]:
@@ -96,11 +93,12 @@ def _in_the_graph(result: Segmentation, system: Rebuilt, row: int) -> dict[str, 
     neighbors = _neighbors(result, system, row, distances)
     own = float(_entries(system.A, row)[row])
     flowing = sum(each.share for each in neighbors)
+    column = system.b[:, [int(diffused[row])]].toarray()[:, 0].astype(np.float64)
     return {
         "edges": Edges(own=own, neighbors=flowing, pixels=max(0.0, 1.0 - own - flowing)),
         "neighbors": neighbors,
         "likelihoods": _likelihoods(z, int(diffused[row])),
-        "provenance": _provenance(weights * _column(system.b, int(diffused[row])), distances, row),
+        "provenance": _provenance(weights * column, distances, row),
         "components": _components(system, result, row) if diffused[row] else None,
         "island": _island(system.graph, row),
     }
@@ -110,10 +108,6 @@ def _entries(matrix: csr_array, row: int) -> dict[int, float]:
     """Columns and values of a row."""
     own = slice(matrix.indptr[row], matrix.indptr[row + 1])
     return dict(zip(matrix.indices[own].tolist(), matrix.data[own].tolist(), strict=True))
-
-
-def _column(matrix: csr_array, column: int) -> NDArray[np.float64]:
-    return np.asarray(matrix[:, [column]].toarray()[:, 0], np.float64)
 
 
 def _neighbors(result: Segmentation, system: Rebuilt, row: int, distances: NDArray[np.float64]) -> tuple[Neighbor, ...]:

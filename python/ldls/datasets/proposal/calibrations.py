@@ -19,15 +19,13 @@ from ldls.camera.rigid import inverse, rigid
 from ldls.cloud import Points, finite_rows
 from ldls.errors import LdlsError, LimitError, SourceError
 from ldls.io import read_camera
-from ldls.io.cameras.extrinsic_file import as_extrinsic
+from ldls.io.cameras.extrinsic_file import SAME, as_extrinsic
 from ldls.io.cameras.field_file import read_fields
 from ldls.io.cameras.opencv import MATRIX, camera_of
 from ldls.stages import project
 
 NEARLY = 0.8
 """Share of the most points in view from which on a transform shows about as many."""
-SAME = 1e-3
-"""Difference of numbers up to which two transforms are one."""
 QUATERNIONS = ("quaternion_xyzw", "quaternion_wxyz")
 TRANSLATIONS = ("translation", "t", "T", "position", "trans")
 WAYS = ("rotation", *QUATERNIONS, "roll_pitch_yaw_deg")

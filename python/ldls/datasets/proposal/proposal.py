@@ -16,14 +16,7 @@ from ldls.camera.rigid import doubt_of_distance
 from ldls.cloud import Points, doubt_of_scale, finite_rows
 from ldls.datasets.file_source import IMAGE_SUFFIXES
 from ldls.datasets.folder_description import FILE
-from ldls.datasets.proposal.calibrations import (
-    FoundCamera,
-    camera_in,
-    plausible_transforms,
-    quoted,
-    transforms_in,
-    view_of,
-)
+from ldls.datasets.proposal.calibrations import camera_in, plausible_transforms, quoted, transforms_in, view_of
 from ldls.datasets.proposal.patterns import Pattern, patterns_of
 from ldls.datasets.stored_masks import FRAME
 from ldls.errors import FileFormatError, LdlsError, ScaleWarning, SourceError
@@ -238,7 +231,9 @@ def _add_calibration(
     # of several cameras each has a file that is named like it, if there is one
     own = [pattern for pattern in small if _owner(pattern, cameras) is picture]
     small.sort(key=lambda pattern: pattern not in own)
-    found = next((each for pattern in small if (each := _camera_of(pattern, sweeps, name)) is not None), None)
+    hint = name.rpartition("_")[2]
+    read = (camera_in(_file(pattern, sweeps), pattern.text, hint) for pattern in small)
+    found = next((each for each in read if each is not None), None)
     if found is None:
         made.missing.append(f"calibration of {name}: found none; docs/formats.md has the files that are read")
         made.lines += ['# calibration = "camera.yaml"', "# or K = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"]
@@ -291,10 +286,6 @@ def _by_frame_or_camera(pattern: Pattern, frames: Set[str], cameras: Sequence[Pa
     are_of_cameras = any(not _place(owner).name.isdigit() for owner in owners if owner is not None)
     of_frames = len(frames & pattern.files.keys())
     return [pattern] if not are_of_cameras and (of_frames == len(frames) or of_frames > len(cameras)) else files
-
-
-def _camera_of(pattern: Pattern, sweeps: Pattern, name: str) -> FoundCamera | None:
-    return camera_in(_file(pattern, sweeps), pattern.text, name.rpartition("_")[2])
 
 
 def _file(pattern: Pattern, sweeps: Pattern) -> Path:
