@@ -17,13 +17,10 @@ from ldls.masks.letterbox import Letterbox
 from ldls.masks.pixels import checked_size, encode
 from ldls.masks.resampling import upsample
 
-Arguments = dict[str, Any]
-"""Keyword arguments of `InstanceMasks`."""
-
 
 def from_torchvision(
     output: Mapping[str, Any], *, threshold: float = 0.5, names: Mapping[int, str] | None = None
-) -> Arguments:
+) -> dict[str, Any]:
     """Masks of one element of the list that an instance segmentation network of torchvision returns.
 
     Source: https://docs.pytorch.org/vision/stable/models/generated/torchvision.models.detection.maskrcnn_resnet50_fpn.html
@@ -57,7 +54,7 @@ def from_supervision(
     *,
     names: Mapping[int, str] | None = None,
     image_size: tuple[int, int] | None = None,
-) -> Arguments:
+) -> dict[str, Any]:
     """Masks of `supervision.Detections`.
 
     Source: https://supervision.roboflow.com/latest/detection/core/
@@ -127,7 +124,7 @@ def _numbered(class_names: Sequence[str], names: Mapping[int, str]) -> list[int]
     return [numbers[name] for name in class_names]
 
 
-def from_ultralytics(result: Any) -> Arguments:  # noqa: ANN401
+def from_ultralytics(result: Any) -> dict[str, Any]:  # noqa: ANN401
     """Masks of the `Results` of Ultralytics' segmentation networks for one image.
 
     Source: https://docs.ultralytics.com/reference/engine/results/
@@ -221,7 +218,7 @@ def from_sam(
     categories: ArrayLike | None = None,
     names: Mapping[int, str] | None = None,
     image_size: tuple[int, int] | None = None,
-) -> Arguments:
+) -> dict[str, Any]:
     """Masks of the list of records that an automatic mask generator of Segment Anything returns for one image.
 
     Source: https://github.com/facebookresearch/segment-anything
