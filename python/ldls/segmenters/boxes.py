@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from os import PathLike
 from typing import Self
 
@@ -54,7 +55,9 @@ class BoxSegmenter:
         self.boxes = np.array(boxes, np.float64)
         self.min_score = check_min_score(min_score)
         self.grabcut = grabcut
-        self._categories, self._scores, self._names = categories, scores, names
+        self._rectangles = partial(
+            InstanceMasks.from_boxes, self.boxes, categories=categories, scores=scores, names=names
+        )
         # refuses what cannot be before an image is there
         self.names = self._rectangles((1, 1)).names
         self.boxes.flags.writeable = False
@@ -108,8 +111,3 @@ class BoxSegmenter:
 
     def __repr__(self) -> str:
         return f"BoxSegmenter({len(self.boxes)} boxes, grabcut={self.grabcut}, min_score={self.min_score})"
-
-    def _rectangles(self, image_size: tuple[int, int]) -> InstanceMasks:
-        return InstanceMasks.from_boxes(
-            self.boxes, image_size, categories=self._categories, scores=self._scores, names=self._names
-        )
