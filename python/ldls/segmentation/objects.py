@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ldls.masks import InstanceMask
 from ldls.segmentation.oriented_box import OrientedBox
-from ldls.view import SeenView, camera_names
+from ldls.view import SeenView
 
 Row = dict[str, Any]
 """An object: a value for each of `COLUMNS`."""
@@ -56,33 +56,6 @@ class SegmentedObject:
     def distance_m(self) -> float | None:
         """Distance from the lidar's origin to the centroid, in metres; None without points."""
         return None if self.centroid is None else float(np.linalg.norm(self.centroid))
-
-
-def object_rows(
-    objects: Sequence[SegmentedObject], sources: Sequence[Sequence[tuple[int, int]]], views: Sequence[SeenView]
-) -> Iterator[Row]:
-    """Yield a row for each object with points.
-
-    Args:
-        objects: The objects of a result.
-        sources: View and mask of each, as `Segmentation.sources`.
-        views: The views of the result.
-    """
-    cameras = camera_names(views)
-    for each, own in zip(objects, sources, strict=True):
-        if each.centroid is None or each.box is None:
-            continue
-        shown = first_seen(own, views)
-        camera, box = ("", (None,) * 4) if shown is None else (cameras[shown[0]], shown[1].bounding_box)
-        top, left, height, width = box
-        values = (
-            each.label, each.track, each.category, each.name, float(each.score), each.n_points, each.distance_m,
-            *each.centroid.tolist(),
-            *each.box.center.tolist(), *each.box.size.tolist(), float(each.box.yaw),
-            *each.velocity,
-            camera, left, top, width, height,
-        )  # fmt: skip
-        yield dict(zip(COLUMNS, values, strict=True))
 
 
 def first_seen(sources: Sequence[tuple[int, int]], views: Sequence[SeenView]) -> tuple[int, InstanceMask] | None:

@@ -17,9 +17,9 @@ from ldls.cloud import Points
 from ldls.errors import DtypeError, InputError, ShapeError
 from ldls.masks import InstanceMasks
 from ldls.params import Params
-from ldls.segmentation.objects import Row, SegmentedObject, object_rows
+from ldls.segmentation.objects import COLUMNS, Row, SegmentedObject, first_seen
 from ldls.segmentation.oriented_box import fit_upright_box
-from ldls.view import SeenView
+from ldls.view import SeenView, camera_names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,7 +239,22 @@ class Segmentation:
         - `camera`: name of the first camera that shows it, and `mask_left_px`, `mask_top_px`, `mask_width_px`,
           `mask_height_px`: the smallest box around its mask there.
         """
-        return list(object_rows(self.objects, self.sources, self.views))
+        cameras, rows = camera_names(self.views), []
+        for each, sources in zip(self.objects, self.sources, strict=True):
+            if each.centroid is None or each.box is None:
+                continue
+            shown = first_seen(sources, self.views)
+            camera, box = ("", (None,) * 4) if shown is None else (cameras[shown[0]], shown[1].bounding_box)
+            top, left, height, width = box
+            values = (
+                each.label, each.track, each.category, each.name, float(each.score), each.n_points, each.distance_m,
+                *each.centroid.tolist(),
+                *each.box.center.tolist(), *each.box.size.tolist(), float(each.box.yaw),
+                *each.velocity,
+                camera, left, top, width, height,
+            )  # fmt: skip
+            rows.append(dict(zip(COLUMNS, values, strict=True)))
+        return rows
 
     def _object(self, instance: Instance, rows: NDArray[np.int64]) -> SegmentedObject:
         xyz = self.points[rows, :3].astype(np.float64)
