@@ -143,16 +143,6 @@ def described_in(path: str | PathLike[str], name: str) -> Path:
     return Path(path) / name if Path(path).is_dir() else Path(path)
 
 
-def find_points(folder: Path) -> dict[str, Path]:
-    """Sweeps of `folder` by frame; see `find_files`."""
-    return find_files(folder, POINT_SUFFIXES)
-
-
-def find_images(folder: Path) -> dict[str, Path]:
-    """Images of `folder` by frame; see `find_files`."""
-    return find_files(folder, IMAGE_SUFFIXES)
-
-
 def warn_left_out(path: Path, reasons: Iterable[str], n_sweeps: int) -> None:
     """Warn of sweeps that are left out, if there are any, by what they lack."""
     counted = Counter(reasons)

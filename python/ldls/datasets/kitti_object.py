@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 from ldls.checks import checked
-from ldls.datasets.file_source import FileSource, choose, find_files, find_images, find_points, image_from_file
+from ldls.datasets.file_source import IMAGE_SUFFIXES, POINT_SUFFIXES, FileSource, choose, find_files, image_from_file
 from ldls.datasets.frame import CameraImage
 from ldls.errors import ParameterError, SourceError
 from ldls.io import read_camera, read_masks
@@ -70,11 +70,11 @@ class KittiObjectSource(FileSource):
         self._masks = masks
         self.stored_masks = {} if masks is None else dict.fromkeys(self._numbers, masks)
         parts = {
-            "velodyne": find_points(path / "velodyne"),
+            "velodyne": find_files(path / "velodyne", POINT_SUFFIXES),
             "calib": find_files(path / "calib", (".txt",)),
         }
         there = [name for name in self._numbers if masks is None or (path / name).is_dir()]
-        self._images = {name: find_images(path / name) for name in there}
+        self._images = {name: find_files(path / name, IMAGE_SUFFIXES) for name in there}
         if masks is None:
             parts |= self._images
         elif len(self._numbers) == 1:

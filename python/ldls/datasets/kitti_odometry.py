@@ -16,7 +16,7 @@ import numpy as np
 from ldls.camera import Camera
 from ldls.checks import checked
 from ldls.checks.values import as_seconds, number_of
-from ldls.datasets.file_source import FileSource, choose, find_images, find_points, image_from_file
+from ldls.datasets.file_source import IMAGE_SUFFIXES, POINT_SUFFIXES, FileSource, choose, find_files, image_from_file
 from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
 from ldls.io import read_camera, read_poses
 from ldls.io.cameras.kitti import camera_numbers
@@ -72,8 +72,8 @@ class KittiOdometrySource(FileSource):
         """
         path = _sequence(Path(path), sequence)
         cameras = camera_numbers(camera)
-        points = find_points(path / "velodyne")
-        images = {name: find_images(path / name) for name in cameras}
+        points = find_files(path / "velodyne", POINT_SUFFIXES)
+        images = {name: find_files(path / name, IMAGE_SUFFIXES) for name in cameras}
         super().__init__(path, {"velodyne": points, **images}, cameras, truth=truth)
         calib = path / CALIBRATION
         self._cameras = {name: read_camera(calib, format="kitti", camera=n) for name, n in cameras.items()}

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from ldls.checks import checked
 from ldls.cloud import Points
 from ldls.datasets.file_source import (
+    IMAGE_SUFFIXES,
+    POINT_SUFFIXES,
     FileSource,
     check_folders,
     choose,
     find_files,
-    find_images,
-    find_points,
     image_from_file,
 )
 from ldls.datasets.frame import POSES_LEFT_OUT, CameraImage
@@ -96,8 +96,8 @@ class KittiRawSource(FileSource):
         cameras = camera_numbers(camera, digits=2)
         check_folders(path, [LIDAR, *cameras])
         self._cameras = {name: read_camera(path.parent, camera=n) for name, n in cameras.items()}
-        points = find_points(path / LIDAR / "data")
-        images = {name: find_images(path / name / "data") for name in cameras}
+        points = find_files(path / LIDAR / "data", POINT_SUFFIXES)
+        images = {name: find_files(path / name / "data", IMAGE_SUFFIXES) for name in cameras}
         super().__init__(path, {LIDAR: points, **images}, cameras, truth=truth)
         self.stamps = _stamps(path / LIDAR / STAMPS, self.names)
         self._trajectory = _trajectory(path) if poses else None
