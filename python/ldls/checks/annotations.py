@@ -117,7 +117,7 @@ def _kind(hint: Any) -> _Kind:  # noqa: ANN401
         type(None): _Kind(lambda value: value is None, "None"),
     }
     origin, parts = get_origin(hint), get_args(hint)
-    if hint is Any or hint is object or _is_array_like(hint):
+    if hint is Any or hint is object or hint == loaded("numpy.typing", "ArrayLike"):
         return _ANYTHING
     if origin is None:
         if hint in simple:
@@ -135,10 +135,6 @@ def _kind(hint: Any) -> _Kind:  # noqa: ANN401
     if origin is Callable:
         return _Kind(callable, "a function", is_noun=True)
     return _container(origin, [_kind(part) for part in parts if part is not Ellipsis], Ellipsis in parts)
-
-
-def _is_array_like(hint: Any) -> bool:  # noqa: ANN401
-    return bool(hint == loaded("numpy.typing", "ArrayLike"))
 
 
 def _either(choices: Sequence[object]) -> str:

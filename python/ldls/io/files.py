@@ -189,7 +189,7 @@ def read_lines(path: str | PathLike[str], what: str = "text file", *, limit: int
 
 @contextmanager
 def names_file(path: str | PathLike[str]) -> Iterator[None]:
-    """Gives errors of the system the name of the file, which those of writing and syncing lack."""
+    """Give errors of the system the name of the file, which those of writing and syncing lack."""
     try:
         yield
     except OSError as error:

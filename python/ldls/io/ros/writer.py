@@ -124,7 +124,7 @@ class BagWriter:
 
 @contextmanager
 def _names_bag(path: Path) -> Iterator[None]:
-    """Gives errors of writing the name of the bag; those of SQLite become errors of the system."""
+    """Give errors of writing the name of the bag; those of SQLite become errors of the system."""
     try:
         yield
     except sqlite3.Error as error:
