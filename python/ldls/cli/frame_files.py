@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 EXISTING: dict[str, Any] = {"exists": True, "dir_okay": False, "readable": True}
 POINTS = typer.Option(
-    metavar="FILE", help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, .csv, .txt or .xyz.", **EXISTING
+    metavar="FILE",
+    help="Lidar sweep: .bin, .npy, .pcd, .ply, .las, .laz, or text (.csv, .txt, .xyz, .asc, .pts).",
+    **EXISTING,
 )
 ColumnsOption = Annotated[
     int | None,

@@ -25,13 +25,15 @@ def read(path: Path) -> NDArray[np.float64]:
 
     A line with the names x, y and z before the numbers, behind a comment sign or not, says which columns are meant;
     without one all columns are taken as they stand, x y z first, up to three that are colours (whole numbers to 255) or
-    normals. Other lines that begin with # or // are comments. A number alone above the points, as in `.pts`, counts them.
+    normals. Other lines that begin with # or // are comments. A number alone above the points, as in `.pts`, is their
+    count.
 
     Raises:
         TruncatedFileError: The file is empty, its last line has too few cells, there are fewer points than it counts,
             or it ends with its last number, without a line end: that number may be cut short.
-        CorruptFileError: There are more points than it counts, another line has too few cells, one has a number behind as many cells as the first, or a cell
-            is no number; the message names it. Or the first line has names, of which none are x, y and z.
+        CorruptFileError: There are more points than it counts, another line has too few cells, one has a number behind
+            as many cells as the first, or a cell is no number; the message names it. Or the first line has names, of
+            which none are x, y and z.
         UnsupportedFormatError: There are more columns than clouds have.
     """
     with open_file(path, "text file of points") as file:
