@@ -12,7 +12,7 @@ from batch import runs
 from command import process
 from ldls import batch
 from ldls.batch import ray_engine
-from ldls.batch.engines import EngineOptions
+from ldls.batch.engines import open_engine
 from ldls.batch.frame_work import FrameWork
 from ldls.batch.lock import HOLDER_NAME
 from ldls.batch.ray_worker import RayWorker
@@ -202,7 +202,7 @@ def test_a_worker_that_was_given_up_writes_nothing(worker, tmp_path):
 @pytest.mark.parametrize("gpus", [-1.0, 1.5, float("nan")])
 def test_gpus_out_of_range(gpus):
     with pytest.raises(ParameterError, match="gpus"):
-        EngineOptions(gpus=gpus)
+        open_engine("ray", gpus=gpus)
 
 
 def test_options_of_ray_are_refused_on_the_local_engine(few, tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import ldls._ldls as _ldls
@@ -22,50 +21,28 @@ Engine = Callable[[FrameWork, Sequence[Frames]], Generator[Outcome]]
 It is closed when the run ends, however it does, and is at work no more then."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class EngineOptions:
-    """Options of the engines; each takes those that concern it.
+def open_engine(
+    engine: str | Engine, *, workers: int | None = None, ray_address: str | None = None, gpus: float = 0.0
+) -> Engine:
+    """The engine of a name, with the options that concern it.
 
-    Attributes:
+    Args:
+        engine: "local", "ray", or an engine, which is opened already.
         workers: Workers at a time; as many as there are cores, or GPUs where workers need them, by default.
         ray_address: Address of a Ray cluster to join; by default one is started on this machine.
         gpus: GPUs of each worker of a Ray cluster; a part of one is shared.
 
     Raises:
-        ParameterError: One is out of its range.
+        ParameterError: There is no such engine, or an option is out of its range or for another.
     """
-
-    workers: int | None = None
-    ray_address: str | None = None
-    gpus: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.workers is not None and not 1 <= self.workers <= MAX_WORKERS:
-            raise ParameterError(f"workers: got {self.workers}, expected 1 to {MAX_WORKERS}")
-        if not (0 <= self.gpus < 1 or (self.gpus >= 1 and float(self.gpus).is_integer())):
-            raise ParameterError(f"gpus: got {self.gpus}, expected a number below 1, or a whole one")
-
-
-def _local(options: EngineOptions) -> Engine:
-    if options.ray_address is not None or options.gpus:
-        raise ParameterError("ray_address, gpus: are for engine 'ray', got engine 'local'")
-    return partial(run_local, workers=options.workers or _ldls.default_threads())
-
-
-def _ray(options: EngineOptions) -> Engine:
-    return partial(run_ray, address=options.ray_address, workers=options.workers, gpus=options.gpus)
-
-
-ENGINES: dict[str, Callable[[EngineOptions], Engine]] = {"local": _local, "ray": _ray}
-"""Makers of the engines, by name."""
-
-
-def open_engine(engine: str | Engine, options: EngineOptions) -> Engine:
-    """The engine of a name.
-
-    Raises:
-        ParameterError: There is no such engine, or an option is for another.
-    """
+    if workers is not None and not 1 <= workers <= MAX_WORKERS:
+        raise ParameterError(f"workers: got {workers}, expected 1 to {MAX_WORKERS}")
+    if not (0 <= gpus < 1 or (gpus >= 1 and float(gpus).is_integer())):
+        raise ParameterError(f"gpus: got {gpus}, expected a number below 1, or a whole one")
     if not isinstance(engine, str):
         return engine
-    return ENGINES[choice("engine", engine, ENGINES)](options)
+    if choice("engine", engine, ("local", "ray")) == "ray":
+        return partial(run_ray, address=ray_address, workers=workers, gpus=gpus)
+    if ray_address is not None or gpus:
+        raise ParameterError("ray_address, gpus: are for engine 'ray', got engine 'local'")
+    return partial(run_local, workers=workers or _ldls.default_threads())

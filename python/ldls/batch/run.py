@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import ldls._ldls as _ldls
-from ldls.batch.engines import Engine, EngineOptions, open_engine
+from ldls.batch.engines import Engine, open_engine
 from ldls.batch.frame_work import Earlier, FrameWork
 from ldls.batch.journal import Journal, Record, formats_begun
 from ldls.batch.lock import only_run
@@ -126,7 +126,7 @@ def run(
     """
     options = dict(options or {})
     opened = open_for_run(source, settings, **options) if isinstance(source, str | PathLike) else source
-    runner = open_engine(engine, EngineOptions(workers=workers, ray_address=ray_address, gpus=gpus))
+    runner = open_engine(engine, workers=workers, ray_address=ray_address, gpus=gpus)
     chosen = chosen_of(opened, frames)
     names = [name for _, name in chosen]
     check_names(names, settings.frame_formats)
