@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import ldls
 from benches.frames import Frame
-from benches.tables import new_table
+from benches.measuring import new_table
 from ldls.datasets import open_source
 from ldls.evaluation import ClassSet, Evaluation, Pair, TrackingScores, evaluate
 from ldls.labeling import Labeling

@@ -13,7 +13,7 @@ from rich.progress import track
 
 import ldls
 from ldls import datasets
-from ldls.simulation import FrameOrder, SimulatedFrame, make_frames, sample_frame, suite_folder, suite_orders
+from ldls.simulation import FrameOrder, make_frames, sample_frame, suite_folder, suite_orders
 
 TILE_M = 100.0
 """Distance of the copies of a sweep in a tiled cloud: no copy touches another."""
@@ -38,7 +38,7 @@ def frame() -> Frame:
     """KITTI object frame 000571 where `LDLS_TEST_DATA` names the folder of real frames, else a simulated street."""
     folder = os.environ.get("LDLS_TEST_DATA")
     if folder is None:
-        return _simulated()
+        return _of_one_image("simulated street (LDLS_TEST_DATA is not set)", sample_frame())
     training = Path(folder) / "kitti/training"
     return Frame(
         name="KITTI object 000571",
@@ -140,11 +140,7 @@ def overlapping_boxes(frame: Frame, seed: int) -> ldls.InstanceMasks:
     return ldls.InstanceMasks.from_array(masks)
 
 
-def _simulated() -> Frame:
-    return _of_one_image("simulated street (LDLS_TEST_DATA is not set)", sample_frame())
-
-
-def _of_one_image(name: str, frame: datasets.Frame | SimulatedFrame) -> Frame:
+def _of_one_image(name: str, frame: datasets.Frame) -> Frame:
     (image,) = frame.images
     assert image.masks is not None
     return Frame(name, np.asarray(frame.points, np.float32), image.masks, image.camera)

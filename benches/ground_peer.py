@@ -15,8 +15,7 @@ from rich.table import Table
 import ldls
 from benches.frames import Frame
 from benches.ground_scenes import LIDARS, SLOPES, GroundScene, ground_scene
-from benches.measuring import medians
-from benches.tables import new_table
+from benches.measuring import medians, new_table
 
 WARM_UP = 3
 """Sweeps after which Patchwork++, which adapts its thresholds from sweep to sweep, is asked."""

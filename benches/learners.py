@@ -14,9 +14,8 @@ from sklearn.semi_supervised import LabelSpreading
 
 import ldls
 from benches.frames import Frame
-from benches.measuring import medians
+from benches.measuring import add_ratio, medians, new_table
 from benches.scipy_pipeline import project
-from benches.tables import add_ratio, new_table
 from ldls.evaluation.clusters import largest_clusters
 
 

@@ -13,8 +13,7 @@ from rich.table import Table
 
 import ldls
 from benches.frames import Frame
-from benches.measuring import medians
-from benches.tables import add_ratio, new_table
+from benches.measuring import add_ratio, medians, new_table
 
 HEIGHT, WIDTH, COUNT = 1080, 1920, 100
 
@@ -32,13 +31,6 @@ def outlines() -> NDArray[np.bool_]:
     return masks
 
 
-def encoded(masks: NDArray[np.bool_]) -> list[dict[str, Any]]:
-    """Compressed RLE of each mask by the COCO tools."""
-    from pycocotools import mask as coco_tools
-
-    return [coco_tools.encode(np.asfortranarray(mask, np.uint8)) for mask in masks]
-
-
 def results(rles: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The masks as a list of results, as a JSON file holds them."""
     return [
@@ -53,9 +45,9 @@ def masks(_measured: Frame, options: argparse.Namespace) -> Table:
 
     warnings.filterwarnings("ignore", "__array__ implementation", DeprecationWarning)
     pixels = outlines()
-    rles = encoded(pixels)
-    listed = results(rles)
     columns_first = [np.asfortranarray(mask, np.uint8) for mask in pixels]
+    rles = [coco_tools.encode(mask) for mask in columns_first]
+    listed = results(rles)
     sides: dict[str, tuple[Callable[[], object], Callable[[], object]]] = {
         "results to pixels": (
             lambda: coco_tools.decode(rles),

@@ -11,8 +11,7 @@ from rich.table import Table
 
 import ldls
 from benches.frames import Frame, tiled_points
-from benches.measuring import medians
-from benches.tables import new_table
+from benches.measuring import medians, new_table
 
 K = 10
 

@@ -14,8 +14,7 @@ from rich.table import Table
 
 import ldls
 from benches.frames import Frame
-from benches.measuring import medians
-from benches.tables import new_table
+from benches.measuring import medians, new_table
 from ldls import batch
 
 

@@ -15,8 +15,7 @@ from scipy.spatial import cKDTree
 
 import ldls
 from benches.frames import Frame
-from benches.measuring import medians
-from benches.tables import add_ratio, new_table
+from benches.measuring import add_ratio, medians, new_table
 from ldls import Params
 
 STAGES = ("project", "pixel_labels", "neighbors", "graph", "diffusion", "components")

@@ -14,10 +14,9 @@ from rich.table import Table
 
 import ldls
 from benches.frames import Frame, overlapping_boxes, random_frame, street_frame, suite_frames, tiled_frame
-from benches.measuring import medians
+from benches.measuring import medians, new_table
 from benches.memory import extra_bytes
 from benches.runs import one_a_thread
-from benches.tables import new_table
 
 
 def suite(measured: Frame, options: argparse.Namespace) -> Table:
@@ -59,7 +58,7 @@ def growth(measured: Frame, options: argparse.Namespace) -> Table:
     base = 0.0
     for n in (n for n in (10_000, 100_000, 1_000_000, 10_000_000) if n <= options.most):
         tiled = tiled_frame(measured.in_view(), n)
-        run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
+        run = {"ldls": partial(ldls.segment, tiled.points, tiled.masks, tiled.camera, params=params)}
         seconds = medians(run, runs=options.runs if n <= 100_000 else 3)["ldls"]
         base = seconds if n == 100_000 else base
         ratio = f"{seconds / base:.1f} x" if base else ""
@@ -73,7 +72,7 @@ def instances(measured: Frame, options: argparse.Namespace) -> Table:
     table = new_table("time against instances, 100,000 points", ["instances", "ms"], f"{options.threads} threads")
     for count in (0, 1, 5, 20, 100, 500):
         tiled = tiled_frame(measured.in_view(), 100_000, count)
-        run = {"ldls": lambda tiled=tiled: ldls.segment(tiled.points, tiled.masks, tiled.camera, params=params)}  # type: ignore[misc]
+        run = {"ldls": partial(ldls.segment, tiled.points, tiled.masks, tiled.camera, params=params)}
         table.add_row(str(count), f"{medians(run, runs=min(options.runs, 5))['ldls'] * 1e3:.1f}")
     return table
 
