@@ -84,21 +84,8 @@ def sets_of(folder: Path, part: str) -> dict[str, list[Frame]]:
     """The frames of each set of a part, made where they are not there yet."""
     orders = {"suite": suite_orders(part)} if part in SUITE_SEEDS else {}
     for lidar, first in FIRST_SEEDS[part].items():
-        orders[lidar] = orders_of(range(first, first + FRAMES[part]), lidar=lidar)
+        orders[lidar] = seeded_orders(range(first, first + FRAMES[part]), lidar=lidar)
     return {name: list(simulated_frames(folder / "frames" / part / name, own)) for name, own in orders.items()}
-
-
-def orders_of(
-    seeds: Sequence[int],
-    *,
-    lidar: str = "hdl-64e",
-    segmenter: SegmenterErrors | None = None,
-    sensors: SensorErrors | None = None,
-) -> list[FrameOrder]:
-    """The frames of some seeds, with the usual errors where none are given."""
-    return seeded_orders(
-        seeds, lidar=lidar, segmenter=segmenter or SegmenterErrors(), sensors=sensors or SensorErrors()
-    )
 
 
 def scores_of(frames: Sequence[Frame], labeller: Labeller, classes: ClassSet) -> Evaluation:
@@ -207,16 +194,17 @@ def curves(folder: Path, _part: str) -> Iterator[tuple[str, Table]]:
     none = replace(SegmenterErrors(), bleed_px=0.0, bleed_cells=0.0)
     errors: dict[str, dict[float, list[FrameOrder]]] = {
         "calibration error (degrees)": {
-            x: orders_of(CURVE_SEEDS, sensors=replace(exact, rotation_deg=x)) for x in (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)
+            x: seeded_orders(CURVE_SEEDS, sensors=replace(exact, rotation_deg=x))
+            for x in (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)
         },
         "mask error (mean bleed, pixels)": {
-            x: orders_of(CURVE_SEEDS, segmenter=replace(none, bleed_px=x)) for x in (0.0, 2.0, 4.0, 8.0, 12.0)
+            x: seeded_orders(CURVE_SEEDS, segmenter=replace(none, bleed_px=x)) for x in (0.0, 2.0, 4.0, 8.0, 12.0)
         },
         "time offset (s)": {
-            x: orders_of(CURVE_SEEDS, sensors=replace(exact, delay_s=x)) for x in (0.0, 0.05, 0.1, 0.2, 0.3)
+            x: seeded_orders(CURVE_SEEDS, sensors=replace(exact, delay_s=x)) for x in (0.0, 0.05, 0.1, 0.2, 0.3)
         },
         "beams": {
-            beams: orders_of(CURVE_SEEDS, lidar=lidar)
+            beams: seeded_orders(CURVE_SEEDS, lidar=lidar)
             for beams, lidar in ((16.0, "vlp-16"), (32.0, "hdl-32e"), (64.0, "hdl-64e"), (128.0, "os1-128"))
         },
     }

@@ -37,7 +37,8 @@ def scene() -> Scene:
     plain = Ground((Strip(-60, 60, 0.0, (0.3, 0.3, 0.3), Material.ASPHALT),), (0.0, 0.0), 0.0, 0.0)
     plan, rng = Plan(plain), np.random.default_rng(4)
     bicycle = vehicles.bicycle(rng)
-    assert plan.put_cyclist(figures.rider(bicycle, rng), bicycle, 8, 0, yaw=np.pi / 2, speed_m_s=SPEED_M_S)
+    parts = {PERSON: figures.rider(bicycle, rng), BICYCLE: bicycle}
+    assert plan.put(CYCLIST, parts, 8, 0, yaw=np.pi / 2, speed_m_s=SPEED_M_S)
     return build(plan)
 
 

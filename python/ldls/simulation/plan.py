@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ldls.simulation.ground import Ground
-from ldls.simulation.scene_object import BICYCLE, CYCLIST, PERSON, SceneObject
+from ldls.simulation.scene_object import SceneObject
 from ldls.simulation.shapes.shape import Shape, join
 
 CLEAR_M = 3.2
@@ -42,26 +42,27 @@ class Plan:
         self.placed.append((0, 0, self._stand(shape, x_m, y_m, yaw)))
 
     def put(
-        self, category: int, shape: Shape, x_m: float, y_m: float, *, yaw: float = 0.0, speed_m_s: float = 0.0
+        self,
+        category: int,
+        shape: Shape | Mapping[int, Shape],
+        x_m: float,
+        y_m: float,
+        *,
+        yaw: float = 0.0,
+        speed_m_s: float = 0.0,
     ) -> bool:
-        """Put an object there that moves along its heading; False where there is no room."""
-        return self._put(category, {category: shape}, x_m, y_m, yaw, speed_m_s)
+        """Put an object there that moves along its heading; False where there is no room.
 
-    def put_cyclist(self, body: Shape, bicycle: Shape, x_m: float, y_m: float, *, yaw: float, speed_m_s: float) -> bool:
-        """Put a person on a bicycle there, who moves along the heading; False where there is no room."""
-        return self._put(CYCLIST, {PERSON: body, BICYCLE: bicycle}, x_m, y_m, yaw, speed_m_s)
-
-    def _put(
-        self, category: int, parts: Mapping[int, Shape], x_m: float, y_m: float, yaw: float, speed_m_s: float
-    ) -> bool:
-        """Put an object of parts, each by the COCO id that it looks like."""
-        shape = join([*parts.values()])
-        discs = _footprint(shape, x_m, y_m, yaw)
+        An object of several parts has each by the COCO id that it looks like.
+        """
+        parts = {category: shape} if isinstance(shape, Shape) else shape
+        whole = join([*parts.values()])
+        discs = _footprint(whole, x_m, y_m, yaw)
         if not self._free(discs):
             return False
         self._discs = np.vstack([self._discs, discs])
-        length, width, height = shape.size_m
-        low, high = shape.vertices_m.min(axis=0), shape.vertices_m.max(axis=0)
+        length, width, height = whole.size_m
+        low, high = whole.vertices_m.min(axis=0), whole.vertices_m.max(axis=0)
         c, s = np.cos(yaw), np.sin(yaw)
         middle = (low + high) / 2
         x, y = x_m + c * middle[0] - s * middle[1], y_m + s * middle[0] + c * middle[1]

@@ -173,17 +173,21 @@ def suite_orders(part: str = "validation") -> list[FrameOrder]:
 
 
 def seeded_orders(
-    seeds: Sequence[int], *, lidar: str = "hdl-64e", segmenter: SegmenterErrors, sensors: SensorErrors
+    seeds: Sequence[int],
+    *,
+    lidar: str = "hdl-64e",
+    segmenter: SegmenterErrors | None = None,
+    sensors: SensorErrors | None = None,
 ) -> list[FrameOrder]:
-    """A frame for each seed, streets of even ones and campuses of odd ones, numbered from 0."""
+    """A frame for each seed with the usual errors or others, streets of even and campuses of odd ones, from 0."""
     return [
         FrameOrder(
             name=f"{number:06d}",
             seed=seed,
             kind="campus" if seed % 2 else "street",
             lidar=lidar,
-            segmenter=segmenter,
-            sensors=sensors,
+            segmenter=segmenter or SegmenterErrors(),
+            sensors=sensors or SensorErrors(),
         )
         for number, seed in enumerate(seeds)
     ]

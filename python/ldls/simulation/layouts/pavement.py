@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ldls.simulation.plan import Plan
-from ldls.simulation.scene_object import BENCH, BICYCLE, CHAIR, DOG, MOTORCYCLE, PERSON, POTTED_PLANT
+from ldls.simulation.scene_object import BENCH, BICYCLE, CHAIR, CYCLIST, DOG, MOTORCYCLE, PERSON, POTTED_PLANT
 from ldls.simulation.shapes import figures, scenery, vehicles
 from ldls.simulation.shapes.shape import Shape
 
@@ -70,8 +70,8 @@ def cyclists(plan: Plan, across_m: Range, *, rng: np.random.Generator) -> None:
         x, y = _place(across_m, CYCLISTS_ALONG_M, rng)
         yaw = (0.0 if y < np.mean(across_m) else np.pi) + rng.normal(0, 0.05)
         bicycle = vehicles.bicycle(rng)
-        body = figures.rider(bicycle, rng)
-        plan.put_cyclist(body, bicycle, x, y, yaw=yaw, speed_m_s=rng.uniform(3, 6))
+        parts = {PERSON: figures.rider(bicycle, rng), BICYCLE: bicycle}
+        plan.put(CYCLIST, parts, x, y, yaw=yaw, speed_m_s=rng.uniform(3, 6))
 
 
 def _place(across_m: Range, along_m: Range, rng: np.random.Generator) -> tuple[float, float]:
