@@ -8,7 +8,7 @@ moved. What lies low keeps the way level afterwards (`ground_level`).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -77,57 +77,32 @@ class Way:
 
     def __init__(self) -> None:
         """A way without a sweep."""
-        self._laid = _Laid()
         self._first: list[Parts] = []
+        self._begin(Trajectory(np.array([0, PERIOD_S]), np.array([np.eye(4)] * 2)))
 
-    def __len__(self) -> int:
-        """Number of sweeps that are laid."""
-        return len(self._laid.stamps)
-
-    def usable(self, stamp: float, points: Points, times: NDArray[np.float64] | None) -> Usable:
-        """What of a sweep says how the lidar moved: where that fails the way stays what it was."""
-        return self._laid.usable(stamp, points, times)
-
-    def lay(self, sweep: Parts, usable: Usable) -> None:
-        """Take the way to the next sweep, of which so much is usable; no more can be laid after an error."""
-        self._laid.lay(sweep[0], usable)
-        if len(self) <= 2:
-            self._first.append(sweep)
-        if len(self) == 2:
-            self._laid, self._first = _begun(self._laid, self._first), []
-
-    def trajectory(self) -> Trajectory:
-        """Return the poses at the sweeps."""
-        if len(self) < 2:
-            raise InputError(f"sweeps: got {len(self)}, expected 2 or more")
-        stamps = np.array(self._laid.stamps)
-        _warn_of_gaps(stamps)
-        return Trajectory(stamps, np.array(self._laid.poses))
-
-
-class _Laid:
-    """Stamps and poses so far, and what is known of the last sweep."""
-
-    def __init__(self, begin: Trajectory | None = None) -> None:
-        """A way that begins, with a motion as from the first to the last pose of `begin`; at rest without it."""
-        self.stamps: list[float] = []
-        self.poses: list[NDArray[np.float64]] = []
-        at_rest = Trajectory(np.array([0, PERIOD_S]), np.array([np.eye(4)] * 2))
-        self._begin = at_rest if begin is None else begin
+    def _begin(self, motion: Trajectory) -> None:
+        """Begin the way anew, without a sweep, with a motion as from the first to the last pose of `motion`."""
+        self._before = motion
+        self._stamps: list[float] = []
+        self._poses: list[NDArray[np.float64]] = []
         self._registration = _registration()
         self._low = np.zeros((0, 3))
         self._places = np.zeros(0, np.int64)
 
+    def __len__(self) -> int:
+        """Number of sweeps that are laid."""
+        return len(self._stamps)
+
     def usable(self, stamp: float, points: Points, times: NDArray[np.float64] | None) -> Usable:
-        """What of the next sweep says how the lidar moved."""
+        """What of the next sweep says how the lidar moved: where that fails the way stays what it was."""
         points = as_points(points)
-        if self.stamps and not stamp > self.stamps[-1]:
+        if self._stamps and not stamp > self._stamps[-1]:
             raise PoseError(
-                f"its stamp {stamp:.6f} s is not after that before it, {self.stamps[-1]:.6f} s; sort them, and leave "
+                f"its stamp {stamp:.6f} s is not after that before it, {self._stamps[-1]:.6f} s; sort them, and leave "
                 "out one of two with the same"
             )
         if times is not None:
-            points = self.motion(stamp).deskew(points, times, stamp)
+            points = self._motion(stamp).deskew(points, times, stamp)
         xyz = points[finite_rows(points), :3].astype(np.float64)
         ranges_m = np.linalg.norm(xyz, axis=1)
         standing, low = split_standing(xyz[(ranges_m > 0) & (ranges_m < FARTHEST_M)])
@@ -138,24 +113,49 @@ class _Laid:
             )
         return standing, low
 
-    def lay(self, stamp: float, usable: Usable) -> None:
-        """Take the way to the next sweep."""
+    def lay(self, sweep: Parts, usable: Usable) -> None:
+        """Take the way to the next sweep, of which so much is usable; no more can be laid after an error."""
+        self._lay(sweep[0], usable)
+        if len(self) <= 2:
+            self._first.append(sweep)
+        if len(self) == 2:
+            self._begin_again()
+
+    def trajectory(self) -> Trajectory:
+        """Return the poses at the sweeps."""
+        if len(self) < 2:
+            raise InputError(f"sweeps: got {len(self)}, expected 2 or more")
+        stamps = np.array(self._stamps)
+        _warn_of_gaps(stamps)
+        return Trajectory(stamps, np.array(self._poses))
+
+    def _begin_again(self) -> None:
+        """Lay the first two sweeps again so that they know each other's motion."""
+        first, self._first = self._first, []
+        if all(times is None for _, _, times in first):
+            return
+        for _ in range(BEGINNINGS):
+            self._begin(self._motion(0.0))
+            for parts in first:
+                self._lay(parts[0], self.usable(*parts))
+
+    def _lay(self, stamp: float, usable: Usable) -> None:
         standing, low = usable
         before: NDArray[np.float64] = self._registration.last_pose
         self._registration.register_frame(standing, np.zeros(0))
         pose: NDArray[np.float64] = self._registration.last_pose
         self._check_common(stamp, standing, pose)
-        if self.poses:
+        if self._poses:
             # what was corrected in earlier poses goes on, for the library does not know of it
-            moved = self.poses[-1] @ inverse(before) @ pose
-            pose = levelled(moved, low, self.poses[-1], self._low)
-        self.stamps.append(stamp)
-        self.poses.append(pose)
+            moved = self._poses[-1] @ inverse(before) @ pose
+            pose = levelled(moved, low, self._poses[-1], self._low)
+        self._stamps.append(stamp)
+        self._poses.append(pose)
         self._low = low
 
-    def motion(self, stamp: float) -> Trajectory:
+    def _motion(self, stamp: float) -> Trajectory:
         """The way around `stamp`, as it was between the last two sweeps; at rest where these are too far apart."""
-        poses, stamps = (self.poses, self.stamps) if len(self.poses) > 1 else (self._begin.poses, self._begin.stamps)
+        poses, stamps = (self._poses, self._stamps) if len(self) > 1 else (self._before.poses, self._before.stamps)
         back, period_s = inverse(poses[-1]) @ poses[-2], float(stamps[-1] - stamps[-2])
         if is_gap(period_s):
             back, period_s = np.eye(4), PERIOD_S
@@ -164,10 +164,10 @@ class _Laid:
     def _check_common(self, stamp: float, standing: NDArray[np.float64], pose: NDArray[np.float64]) -> None:
         places = np.unique(cell_keys(transformed(standing, pose), PLACE_M))
         common = len(np.intersect1d(places, self._places, assume_unique=True))
-        if self.stamps and common < LEAST_SHARE * min(len(places), len(self._places)):
+        if self._stamps and common < LEAST_SHARE * min(len(places), len(self._places)):
             raise PoseError(
                 f"the way is lost at {stamp:.6f} s: of {len(places)} places {common} are those of the sweep at "
-                f"{self.stamps[-1]:.6f} s; take sweeps of one drive without gaps, or poses of another origin"
+                f"{self._stamps[-1]:.6f} s; take sweeps of one drive without gaps, or poses of another origin"
             )
         self._places = places
 
@@ -185,17 +185,6 @@ def _warn_of_gaps(stamps: NDArray[np.float64]) -> None:
             LdlsWarning,
             stacklevel=5,
         )
-
-
-def _begun(laid: _Laid, first: Sequence[Parts]) -> _Laid:
-    """The first two sweeps, laid again so that they know each other's motion."""
-    if all(times is None for _, _, times in first):
-        return laid
-    for _ in range(BEGINNINGS):
-        laid = _Laid(laid.motion(0.0))
-        for parts in first:
-            laid.lay(parts[0], laid.usable(*parts))
-    return laid
 
 
 def _registration() -> Any:  # noqa: ANN401
