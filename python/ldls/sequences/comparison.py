@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,28 +29,20 @@ Seen = tuple[int, Sequence[Sighting]]
 """The category of an object, and its sightings."""
 
 
-class Comparison(NamedTuple):
-    """Objects against tracks.
-
-    Attributes:
-        apart: (o, t) distance of each from each, as a share of the largest that they may have; infinite beyond it, and
-            where categories differ.
-        same: (o, t) True where they are too near to be two objects.
-        part: (o, t) True where at first the object is of a few points, which lie on the track.
-    """
-
-    apart: Floats
-    same: NDArray[np.bool_]
-    part: NDArray[np.bool_]
-
-
-def compared(objects: Sequence[Seen], tracks: Sequence[Track], stamp: float) -> Comparison:
-    """The comparison of objects that are first seen at a moment with tracks, brought there by their velocity.
+def compared(
+    objects: Sequence[Seen], tracks: Sequence[Track], stamp: float
+) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    """How o objects that are first seen at a moment lie to t tracks, brought there by their velocity.
 
     Args:
         objects: The objects, with what is seen of each then and soon after.
         tracks: The tracks.
         stamp: The moment, in seconds.
+
+    Returns:
+        (o, t) distance of each from each, as a share of the largest that they may have, infinite beyond it and where
+        categories differ; (o, t) True where they are too near to be two objects; and (o, t) True where at first the
+        object is of a few points, which lie on the track.
     """
     reach = _reach_of_few(objects, tracks)
     near = np.maximum(NEAR_M, reach)
@@ -72,7 +63,7 @@ def compared(objects: Sequence[Seen], tracks: Sequence[Track], stamp: float) -> 
     longer = np.maximum.outer([own.length for own in first], [own.length for own in last])
     same = (apart < np.minimum(SAME_M, SAME * longer)) | (apart < reach)
     few = np.array([len(own.points) <= FEW_POINTS for own in first], bool)
-    return Comparison(apart / near, same, on & few[:, None])
+    return apart / near, same, on & few[:, None]
 
 
 def _apart(one: Footprint, other: Footprint, near: float) -> tuple[float, bool]:

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
-from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -62,10 +61,6 @@ class _Rows(NamedTuple):
     counts: Ints
     sums: Floats
     confidence: Floats
-
-    def selected(self, keep: NDArray[np.bool_]) -> _Rows:
-        """The rows that are to be kept."""
-        return _Rows(*map(itemgetter(keep), self))
 
 
 class _Voxels(NamedTuple):
@@ -133,7 +128,8 @@ class LabelledMap:
             raise ParameterError(f"voxel_m: got {voxel_m}, expected metres above 0, at most {LARGEST_VOXEL_M:g}")
         self.voxel_m = float(voxel_m)
         self._origin: Floats | None = None
-        self._rows = _no_rows()
+        none = np.zeros(0, np.int64)
+        self._rows = _Rows(none, none, none, np.zeros((0, 3)), np.zeros(0))
         self._new: list[_Rows] = []
         self._numbers: dict[tuple[int, int], int] = {(0, 0): 0}
         self._rooms: dict[int, _Room] = {}
@@ -229,7 +225,7 @@ class LabelledMap:
             stays = ~np.isin(self._rows.objects, moved)
             names = np.array(sorted(self._numbers, key=self._numbers.__getitem__), np.int32)
             origin = np.zeros(3) if self._origin is None else self._origin
-            self._voxels = _voted(self._rows.selected(stays), names, origin)
+            self._voxels = _voted(_Rows._make(column[stays] for column in self._rows), names, origin)
         return self._voxels
 
 
@@ -260,11 +256,6 @@ def _merged(parts: Sequence[_Rows]) -> _Rows:
     voxels, objects = all_rows.voxels[order], all_rows.objects[order]
     starts = np.flatnonzero((np.diff(voxels, prepend=-1) != 0) | (np.diff(objects, prepend=-1) != 0))
     return _Rows(voxels[starts], objects[starts], *(np.add.reduceat(column[order], starts) for column in all_rows[2:]))
-
-
-def _no_rows() -> _Rows:
-    none = np.zeros(0, np.int64)
-    return _Rows(none, none, none, np.zeros((0, 3)), np.zeros(0))
 
 
 def _origin(pose: Floats, voxel_m: float) -> Floats:

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ldls.camera.rigid import inverse, rigid
+from ldls.camera.rigid import from_parts, from_quaternion, inverse, rigid, to_quaternion, transformed
 from ldls.checks import as_array, checked, numbers
 from ldls.checks.values import as_seconds
 from ldls.cloud import Floats, Points, as_points
 from ldls.doubts import doubt_of_precision
 from ldls.errors import PoseError, PrecisionWarning, ShapeError
-from ldls.sequences.step import Step
 
 LONGEST_GAP_S = 1.0
 """Between poses farther apart in time, nothing is interpolated."""
@@ -158,13 +157,13 @@ class Trajectory:
                     moved[some[part], :3] = step.moved(points[some[part], :3].astype(np.float64), shares)
         return moved
 
-    def _steps(self, times: NDArray[np.float64], stamp: float) -> dict[int, Step]:
+    def _steps(self, times: NDArray[np.float64], stamp: float) -> dict[int, _Step]:
         """The steps in which there are times after `stamp`, as seen from where the lidar was then."""
         here = inverse(self._at(stamp, self._reach_s))
         starts = np.flatnonzero(np.bincount(self._starts(times, stamp))).tolist()
         for start in starts:
             self._check_gap(start, stamp)
-        return {start: Step.between(here @ self.poses[start], here @ self.poses[start + 1]) for start in starts}
+        return {start: _Step.between(here @ self.poses[start], here @ self.poses[start + 1]) for start in starts}
 
     def _starts(self, times: NDArray[np.float64], stamp: float) -> NDArray[np.intp]:
         """Number of the pose with which the step of each time after `stamp` starts."""
@@ -185,7 +184,7 @@ class Trajectory:
         start = min(max(after - 1, 0), len(self) - 2)
         self._check_gap(start, stamp)
         begin, end = float(self.stamps[start]), float(self.stamps[start + 1])
-        return Step.between(self.poses[start], self.poses[start + 1]).at((stamp - begin) / (end - begin))
+        return _Step.between(self.poses[start], self.poses[start + 1]).at((stamp - begin) / (end - begin))
 
     def _check_reach(self, stamp: float, reach_s: float) -> None:
         first, last = float(self.stamps[0]), float(self.stamps[-1])
@@ -211,6 +210,51 @@ def warn_of_rounded(name: str, given: ArrayLike, places: Floats) -> None:
     doubt = doubt_of_precision(name, float(np.abs(places).max()))
     if doubt is not None:
         warnings.warn(doubt, PrecisionWarning, stacklevel=5)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """The motion from one pose to another: even along a line, and by the shortest turn.
+
+    Attributes:
+        pose: (4, 4) the one.
+        shift: (3,) from its place to that of the other, in metres.
+        axis: (3,) of the turn, in coordinates of the one; zeros for none.
+        half_turn: Half of the angle, in radians.
+    """
+
+    pose: Floats
+    shift: Floats
+    axis: Floats
+    half_turn: float
+
+    @classmethod
+    def between(cls, one: Floats, other: Floats) -> _Step:
+        """The motion from the pose `one` to the pose `other`, both (4, 4)."""
+        w, *vector = to_quaternion(one[:3, :3].T @ other[:3, :3]).tolist()
+        sine = float(np.linalg.norm(vector))
+        axis = np.array(vector) / sine if sine > 0 else np.zeros(3)
+        return cls(one, other[:3, 3] - one[:3, 3], axis, float(np.arctan2(sine, w)))
+
+    def at(self, share: float) -> Floats:
+        """The pose at this share of the way; below 0 and above 1 the motion goes on."""
+        half_turn = share * self.half_turn
+        turn = from_quaternion("turn", np.array([np.cos(half_turn), *(np.sin(half_turn) * self.axis)]))
+        return from_parts(self.pose[:3, :3] @ turn, self.pose[:3, 3] + share * self.shift)
+
+    def moved(self, xyz: Floats, shares: Floats) -> Floats:
+        """(n, 3) points, each moved by the pose at its own share of the way.
+
+        It is `at` for many, with the turn by Rodrigues' formula: 1 + sin(a) K + (1 - cos(a)) K K, K x = axis cross x.
+        """
+        angles = 2 * self.half_turn * shares[:, None]
+        x, y, z = self.axis
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        turn = self.pose[:3, :3]
+        moved = transformed(xyz, self.pose) + shares[:, None] * self.shift
+        moved += np.sin(angles) * transformed(xyz, from_parts(turn @ cross))
+        moved += (1 - np.cos(angles)) * transformed(xyz, from_parts(turn @ cross @ cross))
+        return moved
 
 
 def is_gap(step_s: float) -> bool:
