@@ -28,7 +28,7 @@ from ldls.segmenters import Segmenter, open_segmenter
 from ldls.segmenters.registry import OF_ONE_IMAGE
 from ldls.sequences import LabelDiffusion, Sweep, segment_sweeps
 from ldls.view import View
-from ldls.viewing.formats import PICTURE, RESULT, file_name, file_names, write_formats, written_formats
+from ldls.viewing.formats import ENDINGS, PICTURE, RESULT, file_name, file_names, write_formats
 
 
 class Earlier(Enum):
@@ -193,7 +193,8 @@ class FrameWork:
             }
         elif record is not None:
             # nothing of the labels that are no longer true stays
-            words = written_formats((name.removeprefix(work.name) for name in record["files"]), words)
+            old = (word for word in ENDINGS if file_name(work.name, word) in record["files"])
+            words = tuple(dict.fromkeys([*words, *old]))
         work.kept, work.missing = kept, [word for word in words if file_name(work.name, word) not in kept]
         return kept
 

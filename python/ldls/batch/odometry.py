@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,26 +39,21 @@ def with_odometry(source: Source, settings: RunSettings, folder: Path, of_source
     is_new = not folder.exists()
     make_folder(folder)
     # all that may refuse the folder comes before the work, and before the file
-    with _removed_on_error(folder if is_new else None), only_run(folder):
-        if holds_found_poses(folder):
-            return found
-        if os.path.lexists(path):
-            raise BatchError(
-                f"{path}: is there, no run here wrote it, and poses by {KISS_ICP} would take its place; take them from "
-                f"it by --poses {path}, or give another --out"
-            )
-        check_goes_on(folder, {"settings": found.record(), "source": of_source})
-        tum.write(path, odometry_of(source), comment=FOUND)
-    return found
-
-
-@contextmanager
-def _removed_on_error(folder: Path | None) -> Iterator[None]:
-    """Remove a folder, if it is given and empty, that was made for what fails."""
     try:
-        yield
+        with only_run(folder):
+            if holds_found_poses(folder):
+                return found
+            if os.path.lexists(path):
+                raise BatchError(
+                    f"{path}: is there, no run here wrote it, and poses by {KISS_ICP} would take its place; take them "
+                    f"from it by --poses {path}, or give another --out"
+                )
+            check_goes_on(folder, {"settings": found.record(), "source": of_source})
+            tum.write(path, odometry_of(source), comment=FOUND)
     except BaseException:
-        if folder is not None:
+        if is_new:
+            # what holds something stays
             with suppress(OSError):
                 folder.rmdir()
         raise
+    return found

@@ -178,14 +178,14 @@ def run(
                     n_failed += sum("error" in record for record in outcome.records)
                     report(n_finished, n_failed, len(names))
         except KeyboardInterrupt:
-            write_failures(folder, failures_of(journal.records(opened.names)))
+            write_failures(folder, journal.records(opened.names))
             raise
         finally:
             journal.close()
         elapsed = time.perf_counter() - start
         journal.finish(opened.names)
         failures = failures_of(journal.records(names))
-        write_failures(folder, failures_of(journal.records(opened.names)))
+        write_failures(folder, journal.records(opened.names))
         # workers of a killed run may have outlived it for a moment
         remove_unfinished(folder)
         # results of the frames of this run were looked at before, or written

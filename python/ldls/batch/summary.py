@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -81,9 +81,9 @@ def doubts_of(records: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
     return dict(doubts)
 
 
-def write_failures(folder: Path, failures: Sequence[Failure]) -> None:
-    """Write a line of JSON for each failure to `folder`; no file where there is none."""
-    path = folder / FAILURES_NAME
+def write_failures(folder: Path, records: Iterable[Mapping[str, Any]]) -> None:
+    """Write a line of JSON for each frame that failed to `folder`; no file where none did."""
+    path, failures = folder / FAILURES_NAME, failures_of(records)
     if not failures:
         path.unlink(missing_ok=True)
         return

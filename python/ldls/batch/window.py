@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.batch.known_files import State
 from ldls.datasets import CameraImage, Frame
 from ldls.masks import InstanceMasks
 from ldls.segmentation import Segmentation
@@ -60,8 +61,7 @@ class Work:
         views: Masks and camera of each image.
         sweep: What is labelled together with other frames.
         together: Names of the frames that were labelled together, its own among them.
-        inputs: Size, time of change and digest of the files that it is made of, by path; None for one that is not
-            there, and for the digest of one that is not read.
+        inputs: States of the files that it is made of, by path.
         earlier: What the journal says of it, if an earlier run did it.
         kept: Its files of earlier runs that need not be written again, with size and digest; None as long as nobody
             has looked.
@@ -82,7 +82,7 @@ class Work:
     views: tuple[View, ...] = ()
     sweep: Sweep | None = None
     together: Sequence[str] = ()
-    inputs: dict[str, list[int | str | None] | None] = field(default_factory=dict)
+    inputs: dict[str, State] = field(default_factory=dict)
     earlier: Mapping[str, Any] | None = None
     kept: Mapping[str, list[int | str]] | None = None
     missing: Sequence[str] = ()

@@ -256,8 +256,7 @@ def _check_out(out: Path, files: Iterable[LabelFiles], folders: FrameFolders) ->
     from ldls.evaluation.tables import table_files
     from ldls.io.files import check_outputs
 
-    written = [path for stem in TABLES for path in table_files(out, stem)]
-    written += [out / name for name in RELIABILITY_FIGURES]
+    written = table_files(out, *TABLES) + [out / name for name in RELIABILITY_FIGURES]
     read = (path for each in files for path in (each.prediction.path, each.truth.path, *folders.files(each.name)))
     check_outputs({"--out": written}, read, made=out)
 

@@ -78,8 +78,7 @@ def reproduce(
 
     frames = KittiObjectSource(_folder(folder, suite), masks="masks", truth=truth.value)
     scored = ClassSet.kitti(words(categories))
-    written = [path for stem in TABLES for path in table_files(out, stem)]
-    written += [out / name for name in (*FIGURES, *RELIABILITY_FIGURES)]
+    written = table_files(out, *TABLES) + [out / name for name in (*FIGURES, *RELIABILITY_FIGURES)]
     check_outputs({"--out": written}, (path for k in range(len(frames)) for path in frames.files(k)), made=out)
     labelled = progress(label(frames, classes=scored, params=Params(threads=cores)), len(frames), "labelling")
     pairs = list(labelled)

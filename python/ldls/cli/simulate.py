@@ -53,9 +53,6 @@ class Layout(StrEnum):
     MCAP = "mcap"
 
 
-BAGS = (Layout.ROSBAG1, Layout.ROSBAG2, Layout.MCAP)
-
-
 @speaks_plainly
 def simulate(
     out: Annotated[
@@ -151,9 +148,7 @@ def simulate(
     processes = cores or default_threads()
     segmenter = SegmenterErrors() if errors else SegmenterErrors.none()
     sensors = SensorErrors() if errors else SensorErrors.none()
-    if layout in BAGS:
-        _write_bag(out, layout, count, seed, None if errors else segmenter, spinning=spinning)
-    elif layout is Layout.KITTI_RAW:
+    if layout is Layout.KITTI_RAW:
         drive = Drive(
             n_frames=count,
             seed=seed,
@@ -165,7 +160,7 @@ def simulate(
             spinning=spinning,
         )
         _follow(write_drive(out, drive, processes=processes), count, drive_folder(out, drive))
-    else:
+    elif layout is Layout.KITTI:
         orders = [
             FrameOrder(
                 name=f"{number:06d}",
@@ -181,6 +176,8 @@ def simulate(
         if suite:
             orders = suite_orders(suite.value)
         _follow(make_frames(out, orders, processes=processes), len(orders), out / "training")
+    else:
+        _write_bag(out, layout, count, seed, None if errors else segmenter, spinning=spinning)
 
 
 def summary_table(made: list[FrameSummary]) -> Table:

@@ -117,7 +117,8 @@ def evaluate(
             reliability = None
         elif reliability is not None:
             reliability.add(pair.prediction, pair.truth, pair.confidence)
-        frames.append(_frame_counts(pair, of_frame))
+        counts = {name: of_frame[name] for name in of_frame.names}
+        frames.append(FrameCounts(pair.name, len(pair.truth), int(of_frame.confusion.sum()), counts))
     reliability = reliability if frames else None
     return Evaluation(classes.names, semantic, instance, well_seen, panoptic, tuple(frames), reliability, tracking)
 
@@ -136,8 +137,3 @@ def _as_pair(item: Pair | tuple[str, Labeling, Labeling]) -> Pair:
     if not isinstance(item, tuple) or len(item) != 3:
         raise InputError(f"pairs: expected Pair or (name, prediction, truth), got {shown(item)}")
     return Pair(*item)
-
-
-def _frame_counts(pair: Pair, scores: SemanticScores) -> FrameCounts:
-    counts = {name: scores[name] for name in scores.names}
-    return FrameCounts(pair.name, len(pair.truth), int(scores.confusion.sum()), counts)

@@ -116,9 +116,9 @@ class Table:
         return bool(self.rows) and all(text == NO_SUCH_SCORE for text in texts)
 
 
-def table_files(folder: Path, stem: str) -> list[Path]:
-    """The files that `Table.write` writes."""
-    return [folder / f"{stem}{suffix}" for suffix in (".md", ".csv", ".json")]
+def table_files(folder: Path, *stems: str) -> list[Path]:
+    """The files that `Table.write` writes of each stem."""
+    return [folder / f"{stem}{suffix}" for stem in stems for suffix in (".md", ".csv", ".json")]
 
 
 @checked

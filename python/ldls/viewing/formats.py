@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -53,12 +53,6 @@ def check_formats(formats: Sequence[str], *, of_run: bool = False) -> None:
 def file_name(frame: str, word: str) -> str:
     """Name of a file of a frame: 000001.label, 000001_lidarseg.bin."""
     return frame + ENDINGS[word]
-
-
-def written_formats(endings: Iterable[str], wanted: Sequence[str]) -> tuple[str, ...]:
-    """The formats that are `wanted`, and those whose `endings` are there already."""
-    there = set(endings)
-    return tuple(dict.fromkeys([*wanted, *(word for word, ending in ENDINGS.items() if ending in there)]))
 
 
 def file_names(frame: str) -> frozenset[str]:

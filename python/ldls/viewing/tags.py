@@ -12,7 +12,6 @@ from ldls.cloud import Ints
 from ldls.palette import Colour
 from ldls.viewing.drawing import font_for, one_line
 
-I32 = NDArray[np.int32]
 AVERSION = 4.0
 """Heights of a tag that it goes aside rather than lie where it had better not be."""
 LONGEST = 20
@@ -95,7 +94,7 @@ def _best_place(
     size: tuple[int, int],
     picture: tuple[int, int],
     taken: Sequence[Box],
-    cover: I32,
+    cover: NDArray[np.int32],
     aversion: float,
 ) -> Box | None:
     """Return the free place nearest to the top of `box`, rather farther off than over objects."""
@@ -116,7 +115,7 @@ def _best_place(
 
 
 def _covered_share(
-    cover: I32, picture: tuple[int, int], left: Ints, top: Ints, right: Ints, bottom: Ints
+    cover: NDArray[np.int32], picture: tuple[int, int], left: Ints, top: Ints, right: Ints, bottom: Ints
 ) -> NDArray[np.float64]:
     """Share of each place that is covered, by sums of the cover over all that lies above and left of a pixel of it."""
     across, down = (cover.shape[1] - 1) / picture[0], (cover.shape[0] - 1) / picture[1]
