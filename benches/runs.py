@@ -16,6 +16,7 @@ import ldls
 from benches.frames import Frame
 from benches.measuring import medians, new_table
 from ldls import batch
+from ldls.simulation.kitti_layout import calibration_lines, write_lines
 
 
 def write_frames(folder: Path, frame: Frame, count: int) -> tuple[Path, Path]:
@@ -33,13 +34,7 @@ def write_frames(folder: Path, frame: Frame, count: int) -> tuple[Path, Path]:
     }
     paths = {parent: folder / f"frame{suffix}" for parent, suffix in first.items()}
     np.ascontiguousarray(frame.points[:, :4], "<f4").tofile(paths[training / "velodyne"])
-    rows = {
-        "P2": frame.camera.projection,
-        "R0_rect": np.eye(3),
-        "Tr_velo_to_cam": frame.camera.T_camera_lidar[:3],
-    }
-    lines = (f"{key}: {' '.join(map(repr, matrix.ravel().tolist()))}\n" for key, matrix in rows.items())
-    paths[training / "calib"].write_text("".join(lines))
+    write_lines(paths[training / "calib"], calibration_lines(frame.camera))
     Image.new("RGB", (width, height)).save(paths[training / "image_2"])
     ldls.save(frame.masks, paths[masks])
     for parent, path in paths.items():

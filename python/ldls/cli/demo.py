@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ldls.cloud import Points
-    from ldls.datasets.frame import CameraImage
+    from ldls.datasets import Frame
     from ldls.segmentation import Segmentation
 
 
@@ -54,7 +53,7 @@ def demo(
     out.mkdir(parents=True, exist_ok=True)
     written = write_formats(result, out, "demo", ("npz", "label", "ply"), [rgb])
     written += save_pictures(out / "demo.png", result, rgb)
-    command = write_inputs(out, frame.points, image, rgb)
+    command = write_inputs(out, frame, rgb)
 
     screen = console()
     screen.print(object_table(result.objects))
@@ -95,21 +94,16 @@ def accuracy_table(result: Segmentation, truth: NDArray[np.int32]) -> Table:
     return table
 
 
-def write_inputs(out: Path, points: Points, image: CameraImage, rgb: NDArray[np.uint8]) -> str:
+def write_inputs(out: Path, frame: Frame, rgb: NDArray[np.uint8]) -> str:
     """Write the frame with the pixels of its image as files that `ldls segment` reads; the command that does so."""
-    import numpy as np
-    from PIL import Image
-
     from ldls.io import save
-    from ldls.simulation.kitti_layout import calibration_lines, write_lines
-    from ldls.viewing import save_picture
+    from ldls.simulation.kitti_layout import calibration_lines, write_lines, write_picture, write_points
 
-    folder = out / "input"
-    folder.mkdir(parents=True, exist_ok=True)
-    np.asarray(points, np.float32).tofile(folder / "points.bin")
+    folder, (image,) = out / "input", frame.images
     assert image.masks is not None
+    write_points(folder / "points.bin", frame)
     save(image.masks, folder / "masks.npz")
-    save_picture(folder / "image.png", Image.fromarray(rgb))
+    write_picture(folder / "image.png", rgb)
     write_lines(folder / "calib.txt", calibration_lines(image.camera))
     files = {
         "points": folder / "points.bin",

@@ -25,6 +25,7 @@ from PIL import Image
 
 from ldls.camera import Camera
 from ldls.camera.rigid import transformed
+from ldls.datasets import Frame
 from ldls.errors import ParameterError
 from ldls.io.files import read_lines, whole_file
 from ldls.io.images import png_of
@@ -75,7 +76,7 @@ def check_there(path: Path, expected: Mapping[Path, Sequence[str]], other: str) 
                 )
 
 
-def write_points(path: Path, frame: SimulatedFrame) -> None:
+def write_points(path: Path, frame: Frame) -> None:
     """Write the points of a frame as KITTI does, and their folder."""
     _write(path, np.asarray(frame.points, "<f4").tobytes())
 

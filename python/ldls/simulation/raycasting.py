@@ -55,7 +55,6 @@ class RayCaster:
         gap = self._offsets[faces[hit]] - np.einsum("ij,ij->i", normals, origins)
         with np.errstate(divide="ignore", invalid="ignore"):
             ranges[hit] = gap / towards
-        lost = ~(ranges > 0)  # a ray within its triangle's plane
-        ranges[lost], faces[lost] = np.inf, MISS
+        ranges[~(ranges > 0)] = np.inf  # a ray within its triangle's plane
         faces[~np.isfinite(ranges)] = MISS
         return ranges, faces

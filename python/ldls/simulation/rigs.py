@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -149,7 +149,7 @@ KITTI = CameraModel(1242, 375, 721.5377, (609.5593, 172.854))
 """KITTI's left colour camera, rectified (P2)."""
 ROBOT = CameraModel(640, 480, 525.0, (319.5, 239.5))
 """A camera as robots carry it: 63 degrees wide."""
-ROBOT_LENS = CameraModel(640, 480, 525.0, (319.5, 239.5), Distortion("plumb_bob", (-0.28, 0.09, 0.0006, -0.0004, 0.0)))
+ROBOT_LENS = replace(ROBOT, distortion=Distortion("plumb_bob", (-0.28, 0.09, 0.0006, -0.0004, 0.0)))
 """The robot's camera with a wide-angle lens: straight lines bow outwards by some 30 pixels at the corners."""
 NUSCENES = CameraModel(1600, 900, 1266.4, (816.3, 491.5))
 """nuScenes' cameras but the one that looks back."""
