@@ -17,7 +17,7 @@ from batch import drives, runs
 from command import command
 from datasets import layouts
 from ldls import batch
-from ldls.batch import frame_work, run_tracks, stored_results
+from ldls.batch import frame_work, journal, run_tracks
 from ldls.batch.known_files import is_written
 from ldls.batch.poses import Poses
 from ldls.datasets import open_source
@@ -297,7 +297,7 @@ def test_tracks_and_map_are_made_of_results_as_the_run_wrote_them_alone(drive, t
 
 def test_digests_of_results_are_read_once(drive, tracked, monkeypatch):
     read = []
-    for module in (frame_work, stored_results):
+    for module in (frame_work, journal):
         monkeypatch.setattr(module, "is_written", lambda path, state: read.append(path.name) or is_written(path, state))
     run(drive, tracked[0], frames=slice(0, 3))
     assert sorted(read) == [f"{number:06d}.npz" for number in range(8)]

@@ -28,6 +28,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import accumulate
@@ -35,11 +36,13 @@ from pathlib import Path
 from types import UnionType
 from typing import IO, Any
 
+import ldls._ldls as _ldls
+from ldls.batch.known_files import is_written
 from ldls.batch.poses import holds_found_poses
 from ldls.errors import BatchError, CorruptFileError
 from ldls.io.files import names_file, open_to_append, sync_folder, whole_file
 from ldls.segmentation.objects import COLUMNS
-from ldls.viewing.formats import ENDINGS, TRACKS
+from ldls.viewing.formats import ENDINGS, RESULT, TRACKS, file_name
 
 JOURNAL_NAME = "journal.jsonl"
 WRITTEN = (*ENDINGS, TRACKS)
@@ -105,6 +108,30 @@ class Journal:
             for frame in frames:
                 if frame in self._places:
                     yield _record_at(file, self._places[frame])
+
+    def stored(self, frames: Sequence[str], sound: Iterable[str]) -> tuple[list[str], list[str]]:
+        """Those of `frames` whose result is stored as it was written, and those where it is missing or another.
+
+        Frames that are not done, or were asked for no results, are neither. Each that nobody has looked at yet is read
+        once, for its digest.
+
+        Args:
+            frames: Names of frames.
+            sound: Those of them whose results, if they are done, this run wrote or found to be as they were written.
+
+        Raises:
+            OSError: A result cannot be read.
+        """
+        done = (record for record in self.records(frames) if "error" not in record)
+        states = {record["frame"]: record["files"].get(file_name(record["frame"], RESULT)) for record in done}
+        states = {name: state for name, state in states.items() if state is not None}
+        seen = {*sound}
+        unseen = [name for name in states if name not in seen]
+        paths = [self._folder / file_name(name, RESULT) for name in unseen]
+        with ThreadPoolExecutor(_ldls.default_threads()) as threads:
+            are_whole = list(threads.map(is_written, paths, [states[name] for name in unseen]))
+        gone = {name for name, is_whole in zip(unseen, are_whole, strict=True) if not is_whole}
+        return [name for name in states if name not in gone], [name for name in unseen if name in gone]
 
     def add(self, records: Sequence[Record]) -> None:
         """Append what became of frames; their files and these lines are on the disk afterwards."""

@@ -26,7 +26,6 @@ from ldls.batch.poses import Poses
 from ldls.batch.run_bag import NOTE, RunBag
 from ldls.batch.run_tracks import TRACKS_TABLE, RunTracks, remove_tracks
 from ldls.batch.settings import RunSettings
-from ldls.batch.stored_results import StoredResults
 from ldls.batch.summary import (
     FAILURES_NAME,
     Summary,
@@ -189,9 +188,8 @@ def run(
         # workers of a killed run may have outlived it for a moment
         remove_unfinished(folder)
         # results of the frames of this run were looked at before, or written
-        find_stored = partial(StoredResults, journal, folder, opened.names, names)
         outdate_bag = partial(_outdate_bag, opened, settings, folder, of_tracks=True)
-        left_out = _write_of_all(tracks, bag, find_stored, outdate_bag)
+        left_out = _write_of_all(tracks, bag, journal, folder, opened.names, names, outdate_bag)
         if write_objects is not None:
             write_objects(objects_of(_found(journal, names, tracks)))
         n_objects = count_objects(_found(journal, names, tracks))
@@ -286,19 +284,28 @@ def _tracks(
 def _write_of_all(
     tracks: RunTracks | None,
     bag: RunBag | None,
-    find_stored: Callable[[], StoredResults],
+    journal: Journal,
+    folder: Path,
+    frames: Sequence[str],
+    sound: Sequence[str],
     before: Callable[[], None],
 ) -> list[str]:
     """Write the tracks, and the bag, which has them, of all frames that are stored; a line for those left out."""
     if tracks is None and bag is None:
         return []
-    stored = find_stored()
+    there, gone = journal.stored(frames, sound)
+    records = partial(journal.records, there)
     # a bag of other tracks must not outlive a run that is killed
-    unplaced = [] if tracks is None else tracks.write(stored.records, before)
+    unplaced = [] if tracks is None else tracks.write(records, before)
     if bag is not None:
-        bag.write(stored.records)
+        bag.write(records)
     no_pose = f"{len(unplaced):,} frames ({some(unplaced)}) have no pose, and are left out of the tracks"
-    return [*([no_pose] if unplaced else []), *([stored.doubt()] if stored.left_out else [])]
+    no_result = (
+        f"{folder}: results (.{RESULT}) of {len(gone):,} frames outside --frames ({some(gone)}) are missing, or were "
+        "changed since they were written; they are left out of tracks, map and bag; run them again, by the same "
+        "command without --frames or with these in it"
+    )
+    return [*([no_pose] if unplaced else []), *([no_result] if gone else [])]
 
 
 def _found(journal: Journal, names: Sequence[str], tracks: RunTracks | None) -> Iterator[Record]:
