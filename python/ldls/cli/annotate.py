@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.table import Table
 
 from ldls.cli.messages import console, say_kept, speaks_plainly
 from ldls.cli.progress import progress
 from ldls.errors import InputError
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 
 @speaks_plainly
@@ -84,8 +82,6 @@ def label_paths(training: Path) -> list[Path]:
 
 def summary(n_objects: Counter[str], n_points: Counter[str]) -> Table:
     """Objects with points, and their points, of each class that was found."""
-    from rich.table import Table
-
     table = Table(title="annotated")
     table.add_column("class")
     table.add_column("objects", justify="right")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.table import Table
 
 from ldls.cli.messages import console, in_options, speaks_plainly
 from ldls.cli.options import refuse
@@ -15,8 +16,6 @@ from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption,
 from ldls.errors import ParameterError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from ldls.datasets import Frame, Source
     from ldls.datasets.inspection import Finding, FrameFacts
 
@@ -104,8 +103,6 @@ def opened(path: Path, dataset: str | None, options: dict[str, Any]) -> Source:
 
 def topic_table(source: Source) -> Table | None:
     """Name, type and number of messages of each topic of a bag; None of other sources."""
-    from rich.table import Table
-
     from ldls.datasets.rosbag import RosBag
 
     if not isinstance(source, RosBag):
@@ -120,8 +117,6 @@ def topic_table(source: Source) -> Table | None:
 
 def summary_table(source: Source, facts: Sequence[FrameFacts]) -> Table:
     """Kind, frames, time, poses, masks, points and truth."""
-    from rich.table import Table
-
     from ldls.datasets.file_source import counts_of
     from ldls.datasets.inspection import classes_of
     from ldls.datasets.stored_masks import own_masks
@@ -147,8 +142,6 @@ def summary_table(source: Source, facts: Sequence[FrameFacts]) -> Table:
 
 def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
     """A row for each camera of the first frame that was read; None where none was."""
-    from rich.table import Table
-
     from ldls.datasets.inspection import field_of_view_deg
 
     whole = next((each for each in facts if each.in_view), None)
@@ -176,8 +169,6 @@ def camera_table(source: Source, facts: Sequence[FrameFacts]) -> Table | None:
 
 def finding_table(findings: Sequence[Finding]) -> Table:
     """The findings, the broken first."""
-    from rich.table import Table
-
     broken = sum(finding.broken for finding in findings)
     table = Table(title=f"{broken:,} broken, {len(findings) - broken:,} worth a look")
     for heading in ("", "frame", "what"):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.table import Table
 
 from ldls.cli.mask_options import (
     CategoriesOption,
@@ -31,8 +32,6 @@ from ldls.cli.source_options import DatasetOption, SourceArgument, SourceOption,
 from ldls.params import Params
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from ldls.batch import Summary
 
 MOST_LISTED = 10
@@ -206,8 +205,6 @@ def show(summary: Summary, out: Path) -> None:
 
 def object_counts(summary: Summary) -> Table:
     """Objects with points of each category: in each frame, added up, and over the drive where they are numbered."""
-    from rich.table import Table
-
     counts = {"objects": summary.objects} | ({"tracks": summary.tracks} if summary.tracks else {})
     table = Table(title="objects found")
     table.add_column("category")
@@ -220,8 +217,6 @@ def object_counts(summary: Summary) -> Table:
 
 def stage_times(summary: Summary) -> Table:
     """Milliseconds a frame that each stage took in a worker."""
-    from rich.table import Table
-
     n_frames = max(summary.n_frames - summary.n_earlier, 1)
     table = Table(title="time a frame")
     table.add_column("stage")
