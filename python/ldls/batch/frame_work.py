@@ -13,7 +13,7 @@ from ldls.batch.journal import KeptRecords
 from ldls.batch.known_files import KnownFiles, State, is_written, look, written
 from ldls.batch.poses import Poses
 from ldls.batch.settings import RunSettings
-from ldls.batch.window import Frames, Outcome, StageError, Window, Work, stage
+from ldls.batch.window import Outcome, StageError, Window, Work, stage
 from ldls.categories import find_categories
 from ldls.datasets import CameraImage, Frame, Source
 from ldls.datasets.stored_masks import FRAME, StoredMasks, fill, own_category_names, own_masks
@@ -132,15 +132,6 @@ class FrameWork:
     def write(self, window: Window) -> None:
         """Write the files of the frames, and what the journal says of them."""
         window.each(self._write)
-
-    def do(self, frames: Frames, before_writing: Callable[[], None] = lambda: None) -> Outcome:
-        """All stages of frames, one after the other."""
-        window = Window.of(frames)
-        self.read(window)
-        self.segment(window)
-        before_writing()
-        self.write(window)
-        return window.outcome()
 
     def judge_earlier(self, record: Mapping[str, Any] | None, together: Sequence[str]) -> Earlier:
         """What an earlier run left of a frame, by its `record` and the files that are there.

@@ -15,7 +15,7 @@ from pathlib import Path
 import ldls._ldls as _ldls
 from ldls.batch.frame_work import FrameWork
 from ldls.batch.lock import HOLDER_NAME
-from ldls.batch.window import Frames, Outcome
+from ldls.batch.window import Frames, Outcome, Window
 from ldls.errors import BatchError
 
 WAIT_S = 60.0
@@ -53,17 +53,19 @@ class RayWorker:
         Raises:
             BatchError: This worker was given up, and the window is done by another.
         """
-        outcome = self._work.do(frames, self._still_wanted)
+        window = Window.of(frames)
+        self._work.read(window)
+        self._work.segment(window)
+        if not self._notes.exists():
+            raise BatchError(f"{self._notes}: is gone, so that this worker is no longer wanted")
+        self._work.write(window)
+        outcome = window.outcome()
         line = json.dumps({"records": outcome.records, "seconds": outcome.seconds}) + "\n"
         # without its notes it was given up; on a full disk the outcome still goes its usual way
         with contextlib.suppress(OSError), os.fdopen(os.open(self._notes, os.O_WRONLY | os.O_APPEND), "ab") as file:
             # closed at once, for only then network file systems show it to others
             file.write(line.encode())
         return outcome
-
-    def _still_wanted(self) -> None:
-        if not self._notes.exists():
-            raise BatchError(f"{self._notes}: is gone, so that this worker is no longer wanted")
 
 
 def _sees(folder: Path, holder: str, wait_s: float) -> bool:
