@@ -143,9 +143,9 @@ def drive_plan(drive: Drive) -> Plan:
         ParameterError: There is no such kind of scene.
     """
     plan = make_plan(drive.seed, kind=drive.kind)
-    poses = _poses(drive, plan.ground, _sweep_seconds(drive))
-    plan.remove(_in_the_way(poses, plan))
-    plan.clear(poses[:, :2, 3], CLEAR_M)
+    way_m = _poses(drive, plan.ground, _sweep_seconds(drive))[:, :2, 3]
+    plan.remove({m for m, thing in enumerate(plan.objects, start=1) if _nearest_m(thing, way_m) < CLEAR_M})
+    plan.clear(way_m, CLEAR_M)
     return plan
 
 
@@ -266,12 +266,6 @@ def _moved_m(thing: SceneObject, ground: Ground, seconds: float | NDArray[np.flo
     (x, y, _), (vx, vy) = thing.centre_m, thing.velocity_m_s
     dx, dy = np.multiply(vx, seconds), np.multiply(vy, seconds)
     return np.stack([dx, dy, ground.height_m(x + dx, y + dy) - ground.height_m(x, y)], axis=-1)
-
-
-def _in_the_way(poses: NDArray[np.float64], plan: Plan) -> set[int]:
-    """Numbers of the objects that come within `CLEAR_M` of the lidar's axis at any time of the drive."""
-    numbered = enumerate(plan.objects, start=1)
-    return {number for number, thing in numbered if _nearest_m(thing, poses[:, :2, 3]) < CLEAR_M}
 
 
 def _nearest_m(thing: SceneObject, way_m: NDArray[np.float64]) -> float:

@@ -58,9 +58,9 @@ class Ground:
             parts.append(self._sheet(x, edge, np.array([right.up_m, left.up_m]), stone, Material.PLAIN))
         return join(parts)
 
-    def _base(self, x_m: NDArray[np.float64], y_m: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    def _base(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.float64]:
         wave = self.roll_m * (np.sin(x_m / 14 + self.phase) - np.sin(self.phase))
-        height: NDArray[np.float64] = self.slope[0] * x_m + self.slope[1] * np.asarray(y_m) + wave
+        height: NDArray[np.float64] = self.slope[0] * x_m + self.slope[1] * y_m + wave
         return height
 
     def _sheet(

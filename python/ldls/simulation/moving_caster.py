@@ -36,9 +36,12 @@ class MovingCaster:
         for there, way_m in chosen:
             faces = np.flatnonzero(there)
             if len(faces):  # Embree has no empty meshes
-                part = _make_part(scene, faces, way_m)
-                self.normals[faces] = part.caster.normals
-                self._parts.append(part)
+                shape = scene.shape.part(faces)
+                centre = (shape.vertices_m.min(axis=0) + shape.vertices_m.max(axis=0)) / 2
+                radius = float(np.linalg.norm(shape.vertices_m - centre, axis=1).max()) + 1e-3
+                caster = RayCaster(shape)
+                self.normals[faces] = caster.normals
+                self._parts.append(_Part(caster, faces, centre, radius, way_m))
 
     def first_hits(self, origins_m: Floats, directions: Floats, moments: Ints) -> tuple[Floats, Ints]:
         """(R,) range in metres (infinity for a miss) and (R,) triangle (-1) of each ray of unit length.
@@ -75,11 +78,3 @@ class _Part:
         along = np.einsum("ij,ij->i", towards, directions)
         aside = np.einsum("ij,ij->i", towards, towards) - along**2
         return np.flatnonzero((aside <= self.radius_m**2) & (along >= -self.radius_m))
-
-
-def _make_part(scene: Scene, faces: Ints, way_m: Floats) -> _Part:
-    shape = scene.shape.part(faces)
-    low, high = shape.vertices_m.min(axis=0), shape.vertices_m.max(axis=0)
-    centre = (low + high) / 2
-    radius = float(np.linalg.norm(shape.vertices_m - centre, axis=1).max()) + 1e-3
-    return _Part(RayCaster(shape), faces, centre, radius, way_m)

@@ -58,7 +58,8 @@ def photograph(
 def _shaded(
     scene: Scene, caster: RayCaster, origin: Floats, directions: Floats, ranges: Floats, faces: NDArray[np.int64]
 ) -> Floats:
-    colours = _sky(directions)
+    up = np.clip(directions[:, 2:] * 2, 0, 1)
+    colours: Floats = (1 - up) * HAZE + up * ZENITH
     hit = np.flatnonzero(faces != MISS)
     rays, normals = directions[hit], caster.normals[faces[hit]]
     facing = np.sign(-np.einsum("ij,ij->i", normals, rays))
@@ -73,12 +74,6 @@ def _shaded(
     fog = -np.expm1(-ranges[hit, None] / 260)
     colours[hit] = (1 - fog) * albedo * (sky + sun[:, None] * SUNLIGHT) + fog * HAZE
     return colours
-
-
-def _sky(directions: Floats) -> Floats:
-    up = np.clip(directions[:, 2:] * 2, 0, 1)
-    sky: Floats = (1 - up) * HAZE + up * ZENITH
-    return sky
 
 
 def _expected_px(scene: Scene, camera: MountedCamera, height_m: float) -> Floats:
@@ -108,7 +103,9 @@ def _textured(shape: Shape, faces: NDArray[np.int64], places_m: Floats, normals:
     ):
         there = materials == material
         colours[there] *= 1 + strength * (_grain(places_m[there], cell_m) - 0.5)[:, None]
-    _joints(colours, materials == Material.PAVING, places_m)
+    paving = materials == Material.PAVING
+    joints = (np.mod(places_m[paving, :2], 0.6) < 0.02).any(axis=1)
+    colours[paving] *= np.where(joints, 0.75, 1.0)[:, None]
     _windows(colours, materials == Material.FACADE, places_m, normals)
     glass = materials == Material.GLASS
     grazing = (1 - np.abs(np.einsum("ij,ij->i", normals[glass], rays[glass]))) ** 2
@@ -123,11 +120,6 @@ def _grain(places_m: Floats, cell_m: float) -> Floats:
     mixed = (mixed ^ (mixed >> 13)) * 1274126177
     grain: Floats = ((mixed >> 8) & 0xFFFF) / 65536.0
     return grain
-
-
-def _joints(colours: Floats, there: NDArray[np.bool_], places_m: Floats) -> None:
-    phase = np.mod(places_m[there, :2], 0.6)
-    colours[there] *= np.where((phase < 0.02).any(axis=1), 0.75, 1.0)[:, None]
 
 
 def _windows(colours: Floats, there: NDArray[np.bool_], places_m: Floats, normals: Floats) -> None:
