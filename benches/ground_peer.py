@@ -7,6 +7,7 @@ import itertools
 import statistics
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,8 +153,8 @@ def ground(_measured: Frame, options: argparse.Namespace) -> Table:
             in_view, peer = scene.points[rows], Patchwork(scene)
             sides: dict[str, Callable[[], object]] = {
                 names[0]: peer.run,
-                names[1]: lambda scene=scene: our_ground(scene.points, scene.camera),  # type: ignore[misc]
-                names[3]: lambda scene=scene, seen=in_view: our_ground(seen, scene.camera),  # type: ignore[misc]
+                names[1]: partial(our_ground, scene.points, scene.camera),
+                names[3]: partial(our_ground, in_view, scene.camera),
             }
             for name, median in medians(sides, runs=min(options.runs, 7)).items():
                 seconds[name].append(median)

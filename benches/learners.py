@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import warnings
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,13 +54,8 @@ def against_learners(measured: Frame, options: argparse.Namespace) -> Table:
         ["peer", "peer, ms", "ldls, ms", "ratio"],
         f"{options.threads} threads on both sides",
     )
+    own = partial(ldls.segment, measured.points, measured.masks, measured.camera, params=params)
     for name, (peer, rounds) in peers.items():
-        found = medians(
-            {
-                "peer": lambda peer=peer: peer(measured, dense),  # type: ignore[misc]
-                "ldls": lambda: ldls.segment(measured.points, measured.masks, measured.camera, params=params),
-            },
-            runs=rounds,
-        )
+        found = medians({"peer": partial(peer, measured, dense), "ldls": own}, runs=rounds)
         add_ratio(table, name, found["peer"], found["ldls"])
     return table

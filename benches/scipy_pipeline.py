@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,9 +111,7 @@ def against_scipy(measured: Frame, options: argparse.Namespace) -> Table:
         labels["ldls"] = result.labels[result.in_view]
         stages["ldls"].append(dict(result.timings))
 
-    def run_best() -> None:
-        ldls.segment(measured.points, measured.masks, measured.camera, params=best)
-
+    run_best = partial(ldls.segment, measured.points, measured.masks, measured.camera, params=best)
     whole = medians({"scipy": run_scipy, "ldls": run_ldls, "best": run_best}, runs=options.runs)
     differ = int((labels["scipy"] != labels["ldls"]).sum())
     table = new_table(
