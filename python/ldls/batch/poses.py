@@ -61,11 +61,11 @@ class Poses:
             FileNotFoundError: There is no such file, or a folder.
         """
         self._source, self._settings = source, settings
+        self._path = path = Path(settings.poses or "")
         self.stamps = _stamps(source, settings)
         self._trajectory: Trajectory | None = None
         self.sha256: str | None = None
         if settings.poses is not None:
-            path = Path(settings.poses)
             if path.is_dir() or not path.exists():
                 found = "a folder" if path.is_dir() else "no such file"
                 raise FileNotFoundError(f"{path}: {found}, expected a file of poses by TUM or KITTI, or {KISS_ICP}")
@@ -104,8 +104,7 @@ class Poses:
     @contextmanager
     def _within_file(self) -> Iterator[None]:
         """Begin errors with the file of poses; where a run found these, say how to find them anew."""
-        path = Path(str(self._settings.poses))
-        with within(str(path)):
+        with within(self._path):
             try:
                 yield
             except PoseError as error:
@@ -118,8 +117,7 @@ class Poses:
     @property
     def _are_found(self) -> bool:
         """True for a file of poses that a run found."""
-        path = Path(str(self._settings.poses))
-        return path.name == FOUND_POSES and holds_found_poses(path.parent)
+        return self._path.name == FOUND_POSES and holds_found_poses(self._path.parent)
 
     def check(self, chosen: Frames) -> None:
         """Refuse, before any work, frames without poses where they are needed, or in another order than their stamps.
@@ -165,7 +163,7 @@ class Poses:
     def _check_clock(self) -> None:
         """Refuse a file that has a pose of no frame; warn of one with stamps for frames that have none of their own."""
         trajectory = self._trajectory
-        if trajectory is None or format_of(Path(str(self._settings.poses))) == "kitti":
+        if trajectory is None or format_of(self._path) == "kitti":
             # which has no stamps, and takes those of the frames
             return
         first, last = float(trajectory.stamps[0]), float(trajectory.stamps[-1])
