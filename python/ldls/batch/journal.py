@@ -189,8 +189,7 @@ class Journal:
                     if self._is_replaced(record, file):
                         break
                 else:
-                    frame = record["frame"]
-                    self._places[frame] = whole
+                    self._places[record["frame"]] = whole
                 whole += len(line)
         return whole
 

@@ -316,19 +316,19 @@ def _found(journal: Journal, names: Sequence[str], tracks: RunTracks | None) -> 
 
 def _pending(windows: Sequence[Frames], work: FrameWork, journal: Journal) -> list[Frames]:
     """The windows that an earlier run left to do; warns of frames whose files were changed since."""
-    frames = [(name, [name for _, name in window]) for window in windows for _, name in window]
-    records = journal.kept(name for name, _ in frames)
+    together = {name: [each for _, each in window] for window in windows for _, name in window}
+    records = journal.kept(together)
     with ThreadPoolExecutor(_ldls.default_threads()) as threads:
-        left = list(threads.map(lambda frame: work.judge_earlier(records.get(frame[0]), frame[1]), frames))
-    changed = [name for (name, _), earlier in zip(frames, left, strict=True) if earlier is Earlier.CHANGED]
+        judged = threads.map(lambda name: work.judge_earlier(records.get(name), together[name]), together)
+        left = dict(zip(together, judged, strict=True))
+    changed = [name for name, earlier in left.items() if earlier is Earlier.CHANGED]
     if changed:
         message = (
             f"{work.out}: files of {len(changed):,} frames were changed since they were written ({some(changed)}); "
             "these frames are done again"
         )
         warnings.warn(message, ChangedFileWarning, stacklevel=4)
-    done = {name for (name, _), earlier in zip(frames, left, strict=True) if earlier is Earlier.DONE}
-    return [window for window in windows if any(name not in done for _, name in window)]
+    return [window for window in windows if any(left[name] is not Earlier.DONE for _, name in window)]
 
 
 def _recorded(
