@@ -18,8 +18,11 @@ if TYPE_CHECKING:
     from ldls.datasets import Source
     from ldls.masks import InstanceMasks
 
-SEGMENTER_HELP = (
-    "What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or grabcut:LABEL_2.txt."
+SEGMENTER = typer.Option(
+    metavar="NAME[:FILE]",
+    help="What makes masks of the image: onnx:MODEL.onnx, torchvision[:NAME], boxes:LABEL_2.txt or "
+    "grabcut:LABEL_2.txt.",
+    show_default=False,
 )
 FrameSegmenterOption = Annotated[
     str | None,

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from ldls.cli.command import Command
 from ldls.cli.frame_files import EXISTING, IMAGE_ID
-from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of, wanted
+from ldls.cli.mask_options import SEGMENTER, CategoriesOption, MinScoreOption, masks_of, wanted
 from ldls.cli.messages import console, speaks_plainly
 from ldls.errors import ParameterError
 
@@ -157,10 +157,7 @@ def convert(
 def make(
     image: Annotated[Path, typer.Argument(metavar="IMAGE", help="Camera image.", **EXISTING)],
     out: OutArgument,
-    segmenter: Annotated[
-        str,
-        typer.Option(metavar="NAME[:FILE]", help=SEGMENTER_HELP, show_default=False),
-    ],
+    segmenter: Annotated[str, SEGMENTER],
     min_score: MinScoreOption = None,
     categories: CategoriesOption = None,
     picture: MaskPictureOption = None,

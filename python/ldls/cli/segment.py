@@ -21,7 +21,7 @@ from ldls.cli.frame_files import (
     RectifiedOption,
     camera_of,
 )
-from ldls.cli.mask_options import SEGMENTER_HELP, CategoriesOption, MinScoreOption, masks_of
+from ldls.cli.mask_options import SEGMENTER, CategoriesOption, MinScoreOption, masks_of
 from ldls.cli.messages import console, object_table, speaks_plainly, timing_table
 from ldls.cli.method_options import takes_params
 from ldls.cli.options import CoresOption, FormatsOption, ObjectsOption, OutOption, PictureOption, words
@@ -45,9 +45,7 @@ def segment(
     out: OutOption,
     columns: ColumnsOption = None,
     masks: Annotated[Path | None, MASKS] = None,
-    segmenter: Annotated[
-        str | None, typer.Option(metavar="NAME[:FILE]", help=SEGMENTER_HELP, show_default=False)
-    ] = None,
+    segmenter: Annotated[str | None, SEGMENTER] = None,
     image: Annotated[
         Path | None,
         typer.Option(
