@@ -23,16 +23,10 @@ def write_frames(folder: Path, frame: Frame, count: int) -> tuple[Path, Path]:
     """Write `count` frames; the folders of the frames and of their masks."""
     height, width = frame.masks.image_size
     training, masks = folder / "training", folder / "masks"
-    for name in ("velodyne", "calib", "image_2"):
-        (training / name).mkdir(parents=True)
-    masks.mkdir()
-    first = {
-        training / "velodyne": ".bin",
-        training / "calib": ".txt",
-        training / "image_2": ".png",
-        masks: ".json",
-    }
-    paths = {parent: folder / f"frame{suffix}" for parent, suffix in first.items()}
+    suffixes = {training / "velodyne": ".bin", training / "calib": ".txt", training / "image_2": ".png", masks: ".json"}
+    paths = {parent: folder / f"frame{suffix}" for parent, suffix in suffixes.items()}
+    for parent in paths:
+        parent.mkdir(parents=True)
     np.ascontiguousarray(frame.points[:, :4], "<f4").tofile(paths[training / "velodyne"])
     write_lines(paths[training / "calib"], calibration_lines(frame.camera))
     Image.new("RGB", (width, height)).save(paths[training / "image_2"])

@@ -62,8 +62,7 @@ def demo(
     screen.print("wrote " + " ".join(map(str, written)), soft_wrap=True)
     screen.print(f"the same from files: {command}", soft_wrap=True)
     if rerun is not None:
-        said = record(result, rerun, name="demo", images={image.name: rgb})
-        screen.print(said, soft_wrap=True)
+        screen.print(record(result, rerun, name="demo", images={image.name: rgb}), soft_wrap=True)
 
 
 def accuracy_table(result: Segmentation, truth: NDArray[np.int32]) -> Table:

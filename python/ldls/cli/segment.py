@@ -157,8 +157,7 @@ def segment(
     screen.print("wrote " + " ".join(map(str, written)), soft_wrap=True)
     if rerun is not None:
         pictures = None if pixels is None else {camera_names(result.views)[0]: pixels}
-        said = record(result, rerun, name=name, images=pictures, diffusion=diffusion)
-        screen.print(said, soft_wrap=True)
+        screen.print(record(result, rerun, name=name, images=pictures, diffusion=diffusion), soft_wrap=True)
 
 
 def _is_photo(path: Path, image_size: tuple[int, int]) -> bool:
