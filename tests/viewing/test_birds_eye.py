@@ -8,7 +8,7 @@ from ldls.palette import instance_colours
 from ldls.viewing import birds_eye_view
 from ldls.viewing.birds_eye import BACKGROUND, DIM, OUT_OF_VIEW, RINGS
 from ldls.viewing.drawing import PAPER
-from ldls.viewing.ground import corners_of, ground_of
+from ldls.viewing.ground import ground_of
 
 # camera axes (x right, y down, z forward) of a lidar whose x is forward and z up, and of one whose y is forward
 X_FORWARD = [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]
@@ -155,14 +155,6 @@ def test_the_picture_fits_and_follows_the_range() -> None:
     assert far.ahead_m > near.ahead_m and far.px_per_m < near.px_per_m
     filled = ground_of(result, size_px=(1000, 500), fill=True)
     assert filled.size_px[0] == pytest.approx(1000, abs=1)
-
-
-def test_corners_go_around_the_box() -> None:
-    (car,) = street(X_FORWARD).objects
-    corners = corners_of(car.box)
-    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-    np.testing.assert_allclose(sides, car.box.size[[1, 0, 1, 0]])
-    np.testing.assert_allclose(corners.mean(axis=0), car.box.center[:2])
 
 
 def test_boxes_can_be_left_out() -> None:

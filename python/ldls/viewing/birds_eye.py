@@ -13,7 +13,7 @@ from ldls.explaining import refused_labels
 from ldls.palette import Colour
 from ldls.segmentation import Segmentation
 from ldls.viewing.drawing import INK, MARK, PAPER, Canvas, disc
-from ldls.viewing.ground import Ground, corners_of, ground_of
+from ldls.viewing.ground import Ground, ground_of
 from ldls.viewing.shown import Shown, Stage
 from ldls.viewing.tags import Box, Tag, draw_tags
 
@@ -80,8 +80,8 @@ def birds_eye_of(shown: Shown, ground: Ground, canvas: Canvas, *, boxes: bool) -
     tags = []
     for each in shown.result.objects if boxes else ():
         if each.box is not None:
-            corners, colour = ground.at(corners_of(each.box)), shown.colours[each.label - 1]
-            around = [tuple(place) for place in (FINE * corners[[0, 1, 2, 3, 0]]).tolist()]
+            corners, colour = ground.at(each.box.corners()[:4, :2]), shown.colours[each.label - 1]
+            around = [tuple(place) for place in (FINE * corners[[0, 3, 2, 1, 0]]).tolist()]
             draw.line(around, colour, 2 * FINE, joint="curve")
             # a name whose object is elsewhere would stand at the edge as if the object did
             if (corners.max(axis=0) >= 0).all() and (corners.min(axis=0) < ground.size_px).all():

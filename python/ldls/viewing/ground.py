@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ldls.cloud import finite_rows
 from ldls.errors import ParameterError
-from ldls.segmentation import OrientedBox, Segmentation
+from ldls.segmentation import Segmentation
 
 WIDTH_PX, HEIGHT_PX = 1800, 1200
 """Greatest size of a picture."""
@@ -70,7 +69,7 @@ def ground_of(
     ranges = np.hypot(*seen.T)
     objects = result.labels[rows] > 0
     reach = range_m or _reach(ranges[objects] if objects.any() else ranges)
-    corners = [corners_of(each.box) for each in result.objects if each.box is not None]
+    corners = [each.box.corners()[:4, :2] for each in result.objects if each.box is not None]
     held = _turned(np.concatenate([np.zeros((1, 2)), *corners]), forward)
     near = np.concatenate([seen[ranges <= reach], held[np.hypot(*held.T) <= (range_m or MOST_RANGE_M)]])
     left, behind = near.min(axis=0) - MARGIN_M
@@ -80,15 +79,6 @@ def ground_of(
         wider = size_px[0] / scale - (right - left)
         left, right = left - wider / 2, right + wider / 2
     return Ground(forward=forward, left_m=left, right_m=right, behind_m=behind, ahead_m=ahead, px_per_m=scale)
-
-
-def corners_of(box: OrientedBox) -> NDArray[np.float64]:
-    """(4, 2) corners of a box on the ground, in metres in the lidar frame, in order around it."""
-    length, width, _ = box.size / 2
-    along = np.array([cos(box.yaw), sin(box.yaw)])
-    across = np.array([-along[1], along[0]])
-    signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-    return np.asarray(box.center[:2] + signs[:, :1] * length * along + signs[:, 1:] * width * across)
 
 
 def _heading(result: Segmentation) -> NDArray[np.float64]:
