@@ -40,14 +40,6 @@ def plain(masks):
     return ldls.InstanceMasks.from_array(masks.to_array())
 
 
-def assert_same(found, expected):
-    assert found.image_size == expected.image_size
-    np.testing.assert_array_equal(found.to_array(), expected.to_array())
-    np.testing.assert_array_equal(found.categories, expected.categories)
-    assert found.scores.tobytes() == expected.scores.tobytes()
-    assert found.names == expected.names
-
-
 def png(width, height, *, bits=8, color=0, image_data=b"", chunks=(), interlace=0):
     """The bytes of a PNG file from those of its chunks."""
     header = struct.pack(">IIBBBBB", width, height, bits, color, 0, 0, interlace)

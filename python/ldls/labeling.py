@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ldls.by_value import ByValue
 from ldls.checks import as_array, checked, numbers, shown
 from ldls.errors import InputError, ShapeError
 from ldls.segmentation import Segmentation
@@ -21,7 +22,7 @@ MOST_CODES = 65_535
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Labeling:
+class Labeling(ByValue):
     """Class and instance of each of N points.
 
     Attributes:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.by_value import ByValue
 from ldls.camera import Camera
 from ldls.categories import class_id
 from ldls.checks import checked
@@ -17,7 +18,7 @@ from ldls.masks import InstanceMasks
 
 
 @checked
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class View:
     """Instance masks of an image, and the camera that took it.
 
@@ -44,7 +45,7 @@ class View:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SeenView:
+class SeenView(ByValue):
     """A view, with the points that it sees and their labels.
 
     Attributes:

@@ -11,7 +11,7 @@ import pytest
 
 import ldls
 from ldls.io.labels import read_labeling
-from mask_samples import assert_same, random_masks
+from mask_samples import random_masks
 
 NAMES = {
     "letters of many languages": "ÄÖü-Ω-Жук-叉车-🚗",
@@ -28,7 +28,7 @@ NAMES = {
 def test_any_name_that_the_system_takes_is_written_and_read(tmp_path, name, suffix):
     masks = ldls.InstanceMasks.from_array(np.eye(4, dtype=bool)[None])
     ldls.save(masks, tmp_path / (name + suffix))
-    assert_same(ldls.read_masks(tmp_path / (name + suffix)), masks)
+    assert ldls.read_masks(tmp_path / (name + suffix)) == masks
     assert [path.name for path in tmp_path.iterdir()] == [name + suffix]
 
 

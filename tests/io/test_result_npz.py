@@ -13,23 +13,9 @@ PLAIN = ("labels", "diffused_labels", "confidence", "in_view", "points", "catego
 
 
 def same(one: ldls.Segmentation, other: ldls.Segmentation) -> None:
-    for name in PLAIN:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        assert getattr(one, name).dtype == getattr(other, name).dtype
-    assert (one.instances, one.params, one.report) == (other.instances, other.params, other.report)
+    assert one == other
     assert dict(one.timings) == dict(other.timings)
-    for seen, other_seen in zip(one.views, other.views, strict=True):
-        for name in ("in_view", "pixels", "labels"):
-            np.testing.assert_array_equal(getattr(seen, name), getattr(other_seen, name))
-        camera, other_camera = seen.view.camera, other_seen.view.camera
-        np.testing.assert_array_equal(camera.projection, other_camera.projection)
-        np.testing.assert_array_equal(camera.T_camera_lidar, other_camera.T_camera_lidar)
-        assert camera.distortion == other_camera.distortion
-        assert (camera.image_size, camera.min_depth_m) == (other_camera.image_size, other_camera.min_depth_m)
-        assert seen.view.name == other_seen.view.name
-        np.testing.assert_array_equal(seen.view.masks.to_array(), other_seen.view.masks.to_array())
-        np.testing.assert_array_equal(seen.view.masks.scores, other_seen.view.masks.scores)
-        assert seen.view.masks.names == other_seen.view.masks.names
+    assert [getattr(one, name).dtype for name in PLAIN] == [getattr(other, name).dtype for name in PLAIN]
 
 
 def through_file(result: ldls.Segmentation, path) -> ldls.Segmentation:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.by_value import ByValue
 from ldls.camera import camera_info
 from ldls.camera.distortion import Distortion
 from ldls.camera.fields import Fields
@@ -58,7 +59,7 @@ def _pose(record: Fields) -> NDArray[np.float64]:
 
 @checked_as(CalibrationError)
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Camera:
+class Camera(ByValue):
     """A camera: a rigid transform from the lidar, the distortion of the lens if any, then a projection to pixels.
 
     Attributes:
@@ -76,7 +77,7 @@ class Camera:
         CalibrationError: A matrix has the wrong shape, is not finite, or cannot be a camera's.
     """
 
-    core: _ldls.Camera = field(init=False, repr=False)
+    core: _ldls.Camera = field(init=False, repr=False, compare=False)
     projection: NDArray[np.float64]
     T_camera_lidar: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     image_size: tuple[int, int] | None = None

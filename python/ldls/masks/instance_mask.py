@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import ldls._ldls as _ldls
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class InstanceMask:
     """One instance of an image.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.by_value import same
 from ldls.categories import COCO_NAMES, find_categories, is_object
 from ldls.checks import as_array, as_python, checked, numbers, shown, whole_number
 from ldls.errors import InputError, LimitError, MaskError, ParameterError, within
@@ -216,6 +217,15 @@ class InstanceMasks:
     def image_size(self) -> tuple[int, int]:
         """(height, width) of the image in pixels."""
         return self.height, self.width
+
+    def __eq__(self, other: object) -> bool:
+        """True for masks of the same pixels, categories, scores and names."""
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(same(value, getattr(other, name)) for name, value in vars(self).items())
+
+    def __hash__(self) -> int:
+        return hash((type(self), self.image_size, len(self)))
 
     def __len__(self) -> int:
         return len(self.core)

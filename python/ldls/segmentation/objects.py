@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.by_value import ByValue
 from ldls.masks import InstanceMask
 from ldls.segmentation.oriented_box import OrientedBox
 from ldls.view import SeenView
@@ -27,7 +28,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SegmentedObject:
+class SegmentedObject(ByValue):
     """The points of one instance.
 
     Attributes:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.by_value import ByValue
 from ldls.checks import checked, numbers
 from ldls.errors import NonFiniteError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class OrientedBox:
+class OrientedBox(ByValue):
     """An upright box in the lidar frame.
 
     Attributes:

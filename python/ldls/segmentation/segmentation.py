@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import ldls._ldls as _ldls
+from ldls.by_value import ByValue
 from ldls.categories import class_id
 from ldls.checks import as_array, checked, shown
 from ldls.cloud import Points
@@ -88,7 +89,7 @@ class Report:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Segmentation:
+class Segmentation(ByValue):
     """Labels of the points of a cloud, in the order of its N points.
 
     Attributes:
@@ -114,7 +115,7 @@ class Segmentation:
     instances: tuple[Instance, ...]
     views: tuple[SeenView, ...]
     report: Report
-    timings: Mapping[str, float]
+    timings: Mapping[str, float] = field(compare=False)
     points: Points
     params: Params
 

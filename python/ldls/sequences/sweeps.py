@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ldls.by_value import ByValue
 from ldls.camera.rigid import as_transform, brought_together, inverse, rigid
 from ldls.checks import checked
 from ldls.checks.values import as_seconds
@@ -52,7 +53,7 @@ NOT_UPRIGHT = (
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(ByValue):
     """A sweep of the lidar, the images that go with it, and where the lidar stood.
 
     Attributes:

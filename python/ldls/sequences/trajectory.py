@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ldls.by_value import ByValue
 from ldls.camera.rigid import from_parts, from_quaternion, inverse, rigid, to_quaternion, transformed
 from ldls.checks import as_array, checked, numbers
 from ldls.checks.values import as_seconds
@@ -31,7 +32,7 @@ LONGEST_S = 1.0
 
 @checked
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(ByValue):
     """The poses of a lidar over time.
 
     Attributes:

@@ -15,8 +15,8 @@ use pyo3::types::{PyBytes, PyType};
 type RunLengths = (usize, usize, Py<PyArray1<u32>>);
 
 /// One mask as column-major run lengths.
-#[pyclass(frozen, module = "ldls._ldls", skip_from_py_object)]
-#[derive(Clone)]
+#[pyclass(frozen, eq, hash, module = "ldls._ldls", skip_from_py_object)]
+#[derive(Clone, PartialEq, Hash)]
 pub struct Rle(pub ldls_core::Rle);
 
 #[pymethods]
@@ -133,7 +133,8 @@ impl Rle {
 }
 
 /// The masks of one image.
-#[pyclass(frozen, module = "ldls._ldls")]
+#[pyclass(frozen, eq, module = "ldls._ldls")]
+#[derive(PartialEq)]
 pub struct Masks(pub ldls_core::InstanceMasks);
 
 #[pymethods]

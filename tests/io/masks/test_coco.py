@@ -6,7 +6,7 @@ from pycocotools import mask as cocomask
 from pycocotools.coco import COCO
 
 import ldls
-from mask_samples import NAMES, assert_same, random_masks
+from mask_samples import NAMES, random_masks
 
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")  # pycocotools
 RLE = {"size": [4, 5], "counts": [3, 2, 15]}
@@ -47,7 +47,7 @@ def test_the_document_of_masks_is_the_content_of_their_file(tmp_path):
     masks = random_masks(4)
     ldls.save(masks, tmp_path / "masks.json", file_name="a.png")
     assert json.loads((tmp_path / "masks.json").read_text()) == masks.to_coco(file_name="a.png")
-    assert_same(ldls.InstanceMasks.from_coco(masks.to_coco()), masks)
+    assert ldls.InstanceMasks.from_coco(masks.to_coco()) == masks
 
 
 def test_ids_and_names_of_numpy_are_written(tmp_path):

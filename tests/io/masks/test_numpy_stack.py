@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import ldls
-from mask_samples import assert_same, plain, random_masks
+from mask_samples import plain, random_masks
 
 PIXELS = np.random.default_rng(1).random((3, 11, 17)) > 0.5
 LAST = np.moveaxis(PIXELS, 0, -1)
@@ -109,4 +109,4 @@ def test_what_would_be_lost_is_refused(tmp_path):
         ldls.save(masks, tmp_path / "masks.npy")
     ldls.save(masks, tmp_path / "masks.npy", pixels_only=True)
     np.testing.assert_array_equal(np.load(tmp_path / "masks.npy"), masks.to_array())
-    assert_same(ldls.read_masks(tmp_path / "masks.npy"), plain(masks))
+    assert ldls.read_masks(tmp_path / "masks.npy") == plain(masks)

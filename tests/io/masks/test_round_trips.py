@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ldls
-from mask_samples import NAMES, assert_same, of_coco, random_masks
+from mask_samples import NAMES, of_coco, random_masks
 
 
 def all_but_pixels(masks):
@@ -48,13 +48,13 @@ def test_any_two_formats_keep_everything(tmp_path, first, second):
         found = masks
         for name in (first, second):
             found = through(KINDS[name], found, tmp_path)
-        assert_same(found, masks)
+        assert found == masks
 
 
 @pytest.mark.parametrize("kind", [pytest.param(kind, id=name) for name, kind in KINDS.items()])
 def test_no_masks_at_all_come_back(tmp_path, kind):
     none = kind.limit(ldls.InstanceMasks.from_array([], image_size=(4, 5)))
-    assert_same(through(kind, none, tmp_path), none)
+    assert through(kind, none, tmp_path) == none
 
 
 @pytest.mark.parametrize("count", [255, 256, 300])
@@ -63,4 +63,4 @@ def test_numbers_of_instances_do_not_wrap(tmp_path, count):
     pixels.reshape(count, -1)[np.arange(count), np.arange(count)] = True
     masks = ldls.InstanceMasks.from_array(pixels, categories=np.full(count, 3), names=NAMES)
     for kind in (KINDS["png"], KINDS["npz"], KINDS["data set"]):
-        assert_same(through(kind, masks, tmp_path), masks)
+        assert through(kind, masks, tmp_path) == masks

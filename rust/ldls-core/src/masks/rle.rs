@@ -9,7 +9,7 @@ use std::ops::Range;
 pub(crate) const MAX_PIXELS: usize = 178_956_970;
 
 /// A binary mask of `height` x `width` pixels as column-major run lengths.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Rle {
     height: usize,
     width: usize,
