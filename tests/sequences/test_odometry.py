@@ -3,6 +3,7 @@
 import re
 import sys
 import weakref
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,9 +23,14 @@ DRIVE = Drive(n_frames=20, seed=2, lidar="hdl-64e", turn_deg_s=15.0)
 N_FRAMES = 8
 
 
+@cache
+def points_of(number):
+    return drive_frame(DRIVE, number).points
+
+
 @pytest.fixture(scope="module")
 def sweeps():
-    return [(0.1 * number, drive_frame(DRIVE, number).points) for number in range(N_FRAMES)]
+    return [(0.1 * number, points_of(number)) for number in range(N_FRAMES)]
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +71,7 @@ def skewed(number):
     """Stamp, points and times of a sweep of the drive, whose lidar turns clockwise while it moves."""
     true = drive_poses(DRIVE)
     stamps = 0.1 * np.arange(len(true))
-    points = drive_frame(DRIVE, number).points.astype(float)
+    points = points_of(number).astype(float)
     times = -np.arctan2(points[:, 1], points[:, 0]) / np.pi * 0.05
     at = stamps[number] + times
     places = np.stack([np.interp(at, stamps, true[:, axis, 3]) for axis in range(3)], axis=1)

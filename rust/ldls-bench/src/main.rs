@@ -4,6 +4,7 @@
 //! with AVX2 as one and the same, without AVX-512: the search for neighbours runs its AVX2 kernel here.
 
 use ldls_bench::{Prepared, STAGES, Stage, Street};
+use rayon::prelude::*;
 use std::env;
 use std::process::{Command, ExitCode};
 
@@ -36,9 +37,9 @@ fn main() -> ExitCode {
         println!("not counted: {reason}");
         return ExitCode::SUCCESS;
     }
+    let counts: Vec<u64> = RECORDED.par_iter().map(|(stage, _)| count(stage)).collect();
     let mut within = true;
-    for (stage, recorded) in RECORDED {
-        let counted = count(stage);
+    for ((stage, recorded), counted) in RECORDED.into_iter().zip(counts) {
         let percent = 100.0 * (counted as f64 / recorded as f64 - 1.0);
         let excess = percent > MARGIN;
         println!(
