@@ -18,6 +18,8 @@ from ldls.io.points.text_rows import COMMENTS, Row, cells_of, is_number, read_ro
 DELIMITERS = (";", "\t", ",")
 """Tried in this order; where none stands in the first line, blanks separate."""
 QUOTED = re.compile('"[^"]*"')
+HEADING = re.compile(r'[^"]*:\s+')
+"""What may stand before names: Columns: x y z."""
 
 
 def read(path: Path) -> NDArray[np.float64]:
@@ -44,14 +46,14 @@ def _parse(text: str) -> NDArray[np.float64]:
     rows = text_rows(text)
     if not rows:
         raise TruncatedFileError("empty, expected a line x y z for each point")
+    body = _behind_count([row for row in rows if not _is_comment(row)])
+    n_cells = max((len(cells_of(line, _delimiter(line))) for _, line in body[:1]), default=MAX_COLUMNS)
+    told = [(number, _names(line)) for number, line in body[:1]]
     # comments may stand above the names, which may be one themselves
-    comments = [*takewhile(_is_comment, rows)]
-    first = rows[len(comments) : len(comments) + 1]
-    n_cells = max((len(cells_of(line, _delimiter(line))) for _, line in first), default=0)
-    told = [(number, names) for number, line in comments if _are_columns(names := _names(line), n_cells)]
-    told += [(number, _names(line)) for number, line in first]
+    for row in takewhile(_is_comment, rows):
+        told += [(row[0], _names(row[1]))] if _has_columns(row[1], n_cells, is_first=row is rows[0]) else []
     number, names = next((each for each in told if each[1] is not None), (0, None))
-    rows = _behind_count([row for row in rows if row[0] > number and not _is_comment(row)])
+    rows = _behind_count([row for row in body if row[0] > number])
     if names is None:
         return _parse_nameless(rows)
     delimiter = _delimiter(rows[0][1]) if rows else None
@@ -61,7 +63,8 @@ def _parse(text: str) -> NDArray[np.float64]:
 def _behind_count(rows: list[Row]) -> list[Row]:
     """Rows of points, held against their count where a line of it stands above them."""
     count = rows[0][1].strip() if len(rows) > 1 else ""
-    if not (count.isascii() and count.isdigit()):
+    # longer numbers count nothing that a file holds
+    if not (count.isascii() and count.isdigit() and len(count) <= 18):
         return rows
     found = len(rows) - 1
     if found != int(count):
@@ -75,17 +78,23 @@ def _is_comment(row: Row) -> bool:
 
 
 def _names(line: str) -> list[str] | None:
-    bare = line.lstrip("#/ ")
+    heading = HEADING.match(line)
+    bare = line.lstrip("#/ ") if heading is None else line[heading.end() :]
     names = [name.strip() for name in cells_of(bare, _delimiter(bare))]
     return names if {"x", "y", "z"} <= {plain_name(name) for name in names} or _are_words(line, names) else None
 
 
-def _are_columns(names: list[str] | None, n_cells: int) -> bool:
-    """True for names of so many columns, or with x y z side by side, unlike a sentence: x ahead, y to the left."""
+def _has_columns(comment: str, n_cells: int, *, is_first: bool) -> bool:
+    """True for names of so many columns; or with x y z side by side, unlike a sentence: x ahead, y to the left.
+
+    Below the first line, or behind a colon, names of other columns than there are make a sentence as well.
+    """
+    names = _names(comment)
     if names is None or len(names) == n_cells:
         return names is not None
     at = sorted(number for number, name in enumerate(names) if plain_name(name) in {"x", "y", "z"})
-    return at[-1] - at[0] == len(at) - 1
+    is_near = at[-1] - at[0] == len(at) - 1 and (is_first or at[-1] < n_cells)
+    return is_near and not HEADING.match(comment)
 
 
 def _are_words(line: str, cells: list[str]) -> bool:
