@@ -8,7 +8,7 @@ import numpy as np
 
 
 class ByValue:
-    """Base of dataclasses with arrays: two of one class are equal where their fields are, NaN to NaN."""
+    """Base of dataclasses with arrays: two of one class are equal where their fields are, NaN in arrays to NaN."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
