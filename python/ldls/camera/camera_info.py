@@ -86,7 +86,12 @@ def _distortion(fields: Fields) -> Distortion:
 
 
 def _part(fields: Fields) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, int] | None]:
-    """Offset x, y and binning x, y of the part of the full image that is left, and its (height, width) if known."""
+    """The part of the full image that is left: cut to a region, then shrunk by binning.
+
+    Returns:
+        Its offset (2,) x y in pixels of the full image, its binning (2,) x y in such pixels a pixel, and its (height,
+        width), if known.
+    """
     roi = fields.find("roi")
     region = roi if isinstance(roi, Mapping) else _attributes(roi, ROI_FIELDS)
     roi_fields = Fields(f"{fields.place}: roi", region)

@@ -66,6 +66,12 @@ def test_rows_of_text_are_points(tmp_path, text, expected):
     assert points.dtype == np.float64
 
 
+@pytest.mark.parametrize("ending", [".csv", ".txt", ".xyz", ".asc", ".pts"])
+def test_endings_of_text(tmp_path, ending):
+    (tmp_path / f"a{ending}").write_text("1.5 -2 3e-3\n4 5 6\n")
+    np.testing.assert_array_equal(ldls.read_points(tmp_path / f"a{ending}"), ROWS)
+
+
 @pytest.mark.parametrize(
     ("text", "error", "message"),
     [

@@ -48,10 +48,9 @@ def _parse(text: str) -> NDArray[np.float64]:
         raise TruncatedFileError("empty, expected a line x y z for each point")
     body = _behind_count([row for row in rows if not _is_comment(row)])
     n_cells = max((len(cells_of(line, _delimiter(line))) for _, line in body[:1]), default=MAX_COLUMNS)
-    told = [(number, _names(line)) for number, line in body[:1]]
     # comments may stand above the names, which may be one themselves
-    for row in takewhile(_is_comment, rows):
-        told += [(row[0], _names(row[1]))] if _has_columns(row[1], n_cells, is_first=row is rows[0]) else []
+    comments = [row for row in takewhile(_is_comment, rows) if _has_columns(row[1], n_cells, is_first=row is rows[0])]
+    told = ((number, _names(line)) for number, line in [*body[:1], *comments])
     number, names = next((each for each in told if each[1] is not None), (0, None))
     rows = _behind_count([row for row in body if row[0] > number])
     if names is None:

@@ -137,6 +137,7 @@ def of_kinds(
 
 
 def _lost_m(written: NDArray[np.float64], kept: NDArray[np.number]) -> float:
+    """The most that a coordinate (n,) in metres loses in the type that the header gives it."""
     finite = np.isfinite(written) & np.isfinite(kept)
     return float(np.abs(written[finite] - kept[finite]).max(initial=0))
 
